@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+import contextlib
+from typing import TYPE_CHECKING, Any, Iterator
 
 from drone_mesh.communication.interfaces import IInternetConnection
 from drone_mesh.errors import ConfigurationError
@@ -16,14 +17,20 @@ if TYPE_CHECKING:
     from drone_mesh.users.desk import UsersDesk
 
 
+@contextlib.contextmanager
+def _extra(extra: str, needs: str) -> Iterator[None]:
+    """Around an import. Raises ConfigurationError if a package of this extra is missing."""
+    try:
+        yield
+    except ImportError as error:
+        package = f"the Python package {error.name}: pip install 'drone_mesh[{extra}]'"
+        raise ConfigurationError(f"{needs} {package}") from error
+
+
 def http_internet(submit: Submit, http: HttpSettings, **settings: Any) -> IInternetConnection:
     """Create an HttpInternet. Also raises ConfigurationError if its libraries are missing."""
-    try:  # they take a second to load
+    with _extra("http", "orders over HTTP need"):  # they take a second to load
         from drone_mesh.internet.http_internet import HttpInternet
-    except ImportError as error:
-        raise ConfigurationError(
-            f"orders over HTTP need the Python package {error.name}: pip install 'drone_mesh[http]'"
-        ) from error
     return HttpInternet(submit, http, **settings)
 
 
@@ -31,21 +38,13 @@ def mqtt_internet(
     submit: Submit, users: UsersDesk, broker: Broker, **settings: Any
 ) -> MqttInternet:
     """Create an MqttInternet. Also raises ConfigurationError if its library is missing."""
-    try:
+    with _extra("mqtt", "MQTT needs"):
         from drone_mesh.internet.mqtt_internet import MqttInternet
-    except ImportError as error:
-        raise ConfigurationError(
-            f"MQTT needs the Python package {error.name}: pip install 'drone_mesh[mqtt]'"
-        ) from error
     return MqttInternet(submit, users, broker, **settings)
 
 
 def status_server(status: ReadStatus, http: HttpSettings) -> StatusServer:
     """Create a StatusServer. Also raises ConfigurationError if its libraries are missing."""
-    try:
+    with _extra("http", "--http needs"):
         from drone_mesh.internet.status import StatusServer
-    except ImportError as error:
-        raise ConfigurationError(
-            f"--http needs the Python package {error.name}: pip install 'drone_mesh[http]'"
-        ) from error
     return StatusServer(status, http)

@@ -20,14 +20,9 @@ _KEY = MeshKey(b"the key of a lab")
 
 
 def network_of(scenario: Scenario, streams: Streams, places: list[StartPoint]) -> Network:
-    timing = MeshTiming(
-        check_period_s=scenario.timing.check_period_s,
-        connection_lost_after_s=scenario.timing.connection_lost_after_s,
-        send_attempts=scenario.timing.send_attempts,
-    )
     network = Network(
         seed=streams.number("mesh"),
-        timing=timing,
+        timing=MeshTiming(**scenario.timing.model_dump()),
         routing=scenario.routing,
         max_distance_m=scenario.range_m,
         **_options(scenario, streams, places),

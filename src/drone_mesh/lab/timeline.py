@@ -6,7 +6,7 @@ import contextlib
 import math
 import random
 from dataclasses import dataclass
-from typing import Callable, Iterator, NamedTuple, Protocol, Sequence
+from typing import Callable, Iterable, Iterator, NamedTuple, Protocol, Sequence
 
 from drone_mesh.communication.data.ticket import Ticket
 from drone_mesh.communication.observer import MeshEventKind
@@ -142,7 +142,15 @@ class Timeline:
         if seconds is not None:
             self._network.clock.call_at(self._network.clock.now_s + seconds, undo, None)
 
-    def _power(self, nodes: list[int], on: bool) -> None:
+    def _routers(self, alive: bool | None = None) -> list[int]:
+        """All routers by id; those with power (or without) if `alive` is given."""
+        return [
+            node_id
+            for node_id, node in sorted(self._network.nodes.items())
+            if not node.is_gateway and alive in (None, node.antenna.powered)
+        ]
+
+    def _power(self, nodes: Iterable[int], on: bool) -> None:
         for node in nodes:
             self._network.power(node, on)
 
@@ -200,7 +208,7 @@ class Timeline:
 
     def _battery(self, fault: Fault, rng: random.Random) -> list[int]:
         what, clock = fault.what, self._network.clock
-        routers = sorted(set(self._network.nodes) - set(gateways_of(self._network)))
+        routers = self._routers()
         nodes = sorted(rng.sample(routers, round(what.share * len(routers))))
         if what.fly_m is not None:
             self._flights.limit(nodes, what.fly_m, self._die)
@@ -225,8 +233,7 @@ class Timeline:
                 if at_s >= end_s:
                     break
                 clock.call_at(at_s, self._churn_one, (alive, rng.random()))
-        routers = sorted(set(self._network.nodes) - set(gateways_of(self._network)))
-        at_s = clock.now_s
+        routers, at_s = self._routers(), clock.now_s
         while what.switched and at_s < end_s:
             chosen = sorted(rng.sample(routers, min(what.switched, len(routers))))
             clock.call_at(at_s, self._switch, chosen)
@@ -235,26 +242,18 @@ class Timeline:
 
     def _switch(self, chosen: list[int]) -> None:
         powered = [n for n in chosen if self._network.nodes[n].antenna.powered]
-        for action, nodes in (
-            ("death", powered),
-            ("birth", [n for n in chosen if n not in powered]),
-        ):
-            with self.disruption(action, nodes):
-                for node in nodes:
-                    self._network.power(node, action == "birth")
+        self._die_or_return(powered, False)
+        self._die_or_return([n for n in chosen if n not in powered], True)
+
+    def _die_or_return(self, nodes: list[int], on: bool) -> None:
+        with self.disruption("birth" if on else "death", nodes):
+            self._power(nodes, on)
 
     def _churn_one(self, what: tuple[bool, float]) -> None:
         alive, draw = what
-        gateways = set(gateways_of(self._network))
-        fit = [
-            node_id
-            for node_id, node in sorted(self._network.nodes.items())
-            if node_id not in gateways and node.antenna.powered == alive
-        ]
+        fit = self._routers(alive)
         if fit:
-            chosen = fit[int(draw * len(fit))]
-            with self.disruption("death" if alive else "birth", [chosen]):
-                self._network.power(chosen, not alive)
+            self._die_or_return([fit[int(draw * len(fit))]], not alive)
 
     def _order(self, fault: Fault, rng: random.Random) -> list[int]:
         what = fault.what
@@ -274,12 +273,7 @@ class Timeline:
 
     def _random_order(self, draws: tuple[float, float, float]) -> None:
         which, direction, within_m = draws
-        gateways = set(gateways_of(self._network))
-        fit = [
-            node_id
-            for node_id, node in sorted(self._network.nodes.items())
-            if node_id not in gateways and node.antenna.powered
-        ]
+        fit = self._routers(alive=True)
         if fit:
             node = fit[int(which * len(fit))]
             here, angle = self._network.location(node), 2 * math.pi * direction

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import dataclasses
 import logging
 from dataclasses import dataclass
@@ -11,7 +12,6 @@ from typing import TYPE_CHECKING
 from drone_mesh.drone.engines import GROUND, MAVLINK, FlightOptions, create_engine
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.interfaces import IDroneEngine
-from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError, LocationUnknown
 from drone_mesh.raspberry.emulated_air import EmulatedAir
 
@@ -100,9 +100,8 @@ class EmulatedFleet:
     def move_radios(self) -> None:
         """Move each radio to the position of its drone."""
         for node_id, engine in self._engines.items():
-            place = _place(engine)
-            if place is not None:
-                self.air.move(node_id, place)
+            with contextlib.suppress(LocationUnknown):
+                self.air.move(node_id, engine.get_location())
 
     @property
     def origin(self) -> Origin | None:
@@ -118,10 +117,3 @@ class EmulatedFleet:
         """End the simulated vehicles; the engines belong to their nodes."""
         if self._server is not None:
             self._server.close()
-
-
-def _place(engine: IDroneEngine) -> Location | None:
-    try:
-        return engine.get_location()
-    except LocationUnknown:
-        return None

@@ -28,20 +28,14 @@ from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError, MeshError, naming_argument
 from drone_mesh.internet.http_settings import HttpSettings
-from drone_mesh.nrf24.settings import (
-    DATA_RATES,
-    DEFAULT_RATE,
-    BroadcastMode,
-    RadioSettings,
-    TxPower,
-)
+from drone_mesh.nrf24.settings import DATA_RATES, BroadcastMode, RadioSettings, TxPower
 from drone_mesh.nrf24.spi import SPI_HZ
 from drone_mesh.raspberry.air_options import AirOptions, add_air_options, air_options
 from drone_mesh.raspberry.emulated_fleet import FleetOptions, add_fleet_options, fleet_options
 from drone_mesh.raspberry.flight_options import add_flight_options, flight_options
 from drone_mesh.raspberry.http_options import add_http_options, http_options
 from drone_mesh.raspberry.mqtt_options import MqttOptions, add_mqtt_options, mqtt_options
-from drone_mesh.raspberry.wiring_options import add_wiring_options
+from drone_mesh.raspberry.wiring_options import add_channel_options, add_wiring_options
 
 MOST_EMULATED = 17  # our choice: as in the field case, and what one machine can emulate
 CHECK_DRONE = "check-drone"  # the last argument of raspberry_router
@@ -152,18 +146,7 @@ def _parser(program: str, description: str) -> argparse.ArgumentParser:
     )
     add_wiring_options(parser)
     radio = parser.add_argument_group("radio")
-    radio.add_argument(
-        "--channel",
-        type=whole(0, 125),
-        default=RadioSettings.channel,
-        help="radio channel, 0..125: 2400 + CHANNEL MHz (default: %(default)s)",
-    )
-    radio.add_argument(
-        "--rate",
-        choices=DATA_RATES,
-        default=DEFAULT_RATE,
-        help="data rate in bits per second (default: %(default)s)",
-    )
+    add_channel_options(radio)
     radio.add_argument(
         "--power",
         type=int,

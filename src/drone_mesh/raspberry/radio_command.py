@@ -18,13 +18,13 @@ from drone_mesh.errors import ConfigurationError, MeshError
 from drone_mesh.nrf24.emulator.pcapng import LINKTYPE_PAYLOADS, CapturedPacket, PcapngWriter
 from drone_mesh.nrf24.emulator.wall_clock import WallClock
 from drone_mesh.nrf24.gpio import CePin, GpiodCe, GpiodIrq, IrqPin
-from drone_mesh.nrf24.settings import DATA_RATES, DEFAULT_RATE, RadioSettings
+from drone_mesh.nrf24.settings import DATA_RATES, RadioSettings
 from drone_mesh.nrf24.spi import SpiDevice, open_spi
 from drone_mesh.raspberry import radio_tests, range_test
 from drone_mesh.raspberry.emulated_partner import PARTNER_ID, EmulatedPartner
 from drone_mesh.raspberry.field_radio import FieldRadio
 from drone_mesh.raspberry.node_status import version
-from drone_mesh.raspberry.wiring_options import add_wiring_options
+from drone_mesh.raspberry.wiring_options import add_channel_options, add_wiring_options
 from drone_mesh.stopping import quiet_on_closed_pipe
 
 REPORT_ROUNDS = 20
@@ -180,15 +180,7 @@ def _parser() -> argparse.ArgumentParser:
         default=MAX_NODE_ID,
         help="id of this radio (default: %(default)s)",
     )
-    parser.add_argument(
-        "--channel",
-        type=whole(0, 125),
-        default=RadioSettings.channel,
-        help="channel (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--rate", choices=DATA_RATES, default=DEFAULT_RATE, help="data rate (default: %(default)s)"
-    )
+    add_channel_options(parser)
     parser.add_argument(
         "--emulated",
         type=float,

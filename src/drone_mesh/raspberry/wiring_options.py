@@ -1,4 +1,4 @@
-"""The wiring of a radio: options that the programs of a Pi share."""
+"""The wiring of a radio and its channel: options that the programs of a Pi share."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import argparse
 
 from drone_mesh.arguments import whole
 from drone_mesh.nrf24.gpio import CE_GPIO, IRQ_GPIO
+from drone_mesh.nrf24.settings import DATA_RATES, DEFAULT_RATE, RadioSettings
 from drone_mesh.nrf24.spi import SPI_HZ
 
 HIGHEST_GPIO = 27  # of the 40-pin header
@@ -42,6 +43,22 @@ def add_wiring_options(parser: argparse.ArgumentParser) -> None:
         default=SPI_HZ,
         metavar="HZ",
         help="SPI clock; 1000000 for long wires (default: %(default)s)",
+    )
+
+
+def add_channel_options(group: argparse._ActionsContainer) -> None:
+    """Add where on the air a radio is: its channel and rate."""
+    group.add_argument(
+        "--channel",
+        type=whole(0, 125),
+        default=RadioSettings.channel,
+        help="radio channel, 0..125: 2400 + CHANNEL MHz (default: %(default)s)",
+    )
+    group.add_argument(
+        "--rate",
+        choices=DATA_RATES,
+        default=DEFAULT_RATE,
+        help="data rate in bits per second (default: %(default)s)",
     )
 
 
