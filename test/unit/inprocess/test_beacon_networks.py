@@ -252,6 +252,21 @@ def test_a_message_for_a_node_that_nobody_announces_is_searched_for():
     assert network.run_until(lambda: ticket.state is TicketState.DELIVERED, within_s=3.0)
 
 
+def test_a_packet_without_a_next_hop_waits_for_two_and_a_half_seconds():
+    network = Network(seed=1, routing="beacon")
+    network.add_gateway(0, 0.0, 0.0)
+    network.add_router(1, 6.0, 0.0)
+    network.add_router(2, 12.0, 0.0)
+    network.run_for(10.0)
+    network.power(2, False)
+    network.echo(0, 2, lambda _answer: None)
+    couriers = [node.component.control._courier for node in network.nodes.values()]
+    network.run_for(2.0)
+    assert any(courier.holds for courier in couriers)
+    network.run_for(1.0)
+    assert not any(courier.holds for courier in couriers)
+
+
 def test_pilots_who_fly_the_fleet_cause_no_repair_flight():
     network = moving(nodes=12, radio="disc")
     network.run_for(300.0)

@@ -52,6 +52,14 @@ def test_after_a_turn_the_velocity_is_that_of_the_new_leg(drone, motion):
     assert motion.at(6.8).velocity == pytest.approx((2.0, 0.0, 0.0))
 
 
+def test_soon_after_a_turn_a_receivers_noise_is_no_great_velocity(drone, motion):
+    fly(drone, motion, 6.0, 0.0)
+    motion.has_turned(6.5)
+    motion.at(6.5)
+    drone.place = Location(0.0, 0.2, 0.0)
+    assert motion.at(6.7).velocity == pytest.approx((0.0, 0.4, 0.0))
+
+
 def test_an_unknown_place_has_no_motion(drone, motion):
     drone.place = None
     assert motion.at(0.0) is None

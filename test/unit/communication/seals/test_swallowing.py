@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import pytest
 from seal_rig import KEY, packet
 
 from drone_mesh.communication.data.ticket import TO_GATEWAY, TicketState
+from drone_mesh.communication.heartbeats.detours import Detours
+from drone_mesh.communication.heartbeats.relay_check import RelayCheck
 from drone_mesh.communication.heartbeats.swallowing import Swallowing
+from drone_mesh.communication.routing.child_table_tree import ChildTableTree
+from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.inprocess import Network
 from drone_mesh.lab.proofs.stranger import Hole
 
@@ -71,6 +77,26 @@ def test_without_another_route_a_node_keeps_its_connection():
     for _ in range(30):
         network.run_for(10.0)
         assert network.connected(2)
+
+
+def test_a_relay_that_swallowed_is_tried_again_after_ten_minutes():
+    neighbours = SimpleNamespace(ids=lambda: (1, 2), hops_of=lambda _node: 1)
+    detours = Detours(neighbours)
+    parts = SimpleNamespace(
+        node_id=8,
+        now_s=100.0,
+        timing=MeshTiming(),
+        seals=SimpleNamespace(reserved_bytes=lambda _kind: 7),
+        routing=ChildTableTree(),
+    )
+    check = RelayCheck(parts, detours)
+    check.gateway_sent_place()
+    for _ in range(2):
+        check._swallowing.asked(90.0)
+    check.run(gateway=0, next_hop=1, hops=2)
+    assert check.take_detour() == 2
+    assert detours.avoids(1, 699.0)
+    assert not detours.avoids(1, 701.0)
 
 
 def test_no_relay_is_suspected_if_the_gateway_never_reported_its_place():
