@@ -8,8 +8,9 @@ from typing import Callable, Sequence
 
 from drone_mesh.bench.cases import Case
 from drone_mesh.bench.measurement import MEGABYTE, await_all_on
+from drone_mesh.bench.observation import StateSample
 from drone_mesh.bench.progress import ProgressLine
-from drone_mesh.bench.system import BenchmarkError, System
+from drone_mesh.bench.system import System
 
 SAMPLE_PERIOD_S = 60.0  # simulated
 WARM_UP_S = 600.0  # simulated; growth before this is ignored
@@ -120,20 +121,14 @@ def soak(
         assert watch.all_on is not None
         next_s = watch.all_on.sim_s
         end_s = next_s + hours * 3600.0
+
+        def say() -> None:
+            now_s = watch.last.sim_s if watch.last else 0.0
+            progress.say(f"simulated {now_s:.0f} s of {end_s:.0f} s")
+
         while next_s <= end_s:
-
-            def reached(sim_s: float = next_s) -> bool:
-                return watch.last is not None and watch.last.sim_s >= sim_s
-
-            def say(sim_s: float = next_s) -> None:
-                now_s = watch.last.sim_s if watch.last else 0.0
-                progress.say(f"simulated {now_s:.0f} s of {end_s:.0f} s")
-
-            if not system.wait_for(reached, SAMPLE_WITHIN_S, say):
-                raise BenchmarkError(
-                    f"a minute of simulated time takes more than {SAMPLE_WITHIN_S:g} s"
-                )
-            sample = _take_sample(system)
+            state = system.wait_until_s(next_s, SAMPLE_WITHIN_S, say, "a minute of simulated time")
+            sample = _take_sample(system, state)
             result.samples.append(sample)
             progress.clear()
             on_sample(sample)
@@ -142,9 +137,7 @@ def soak(
     return result
 
 
-def _take_sample(system: System) -> Sample:
-    sample = system.watch.last
-    assert sample is not None
+def _take_sample(system: System, sample: StateSample) -> Sample:
     use = system.use()
     return Sample(
         sim_s=sample.sim_s,

@@ -18,7 +18,7 @@ from typing import Callable, Iterable, Iterator, Sequence
 
 import psutil
 
-from drone_mesh.bench.observation import PROBE, WATCH, Watch, from_line
+from drone_mesh.bench.observation import PROBE, WATCH, StateSample, Watch, from_line
 from drone_mesh.bench.processes import Use, family, take_use
 from drone_mesh.errors import MeshError
 from drone_mesh.web import LOOPBACK
@@ -157,6 +157,22 @@ class System:
             progress()
             time.sleep(POLL_PERIOD_S)
         return True
+
+    def wait_until_s(
+        self, sim_s: float, within_s: float, progress: Callable[[], None], complaint: str
+    ) -> StateSample:
+        """The first state from this simulated second on.
+
+        Raises BenchmarkError with the complaint if it does not come within so much wall time.
+        """
+        watch = self.watch
+
+        def is_there() -> bool:
+            return watch.last is not None and watch.last.sim_s >= sim_s
+
+        if not self.wait_for(is_there, within_s, progress) or watch.last is None:
+            raise BenchmarkError(f"{complaint} takes more than {within_s:g} s")
+        return watch.last
 
     def use(self) -> Use:
         """The cost of fleet and master so far, without the probe."""

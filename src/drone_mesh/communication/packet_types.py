@@ -11,7 +11,6 @@ import enum
 from typing import Callable, NamedTuple, Sequence
 
 TECHNIQUE_TYPES = range(8, 64)
-REPORT_TYPES = range(64, 128)
 DATA_TYPES = range(128, 256)  # users' data; data/packets.py describes their bodies
 
 

@@ -11,7 +11,6 @@ from drone_mesh.nrf24.airtime import NS_PER_S
 from drone_mesh.nrf24.emulator.fading import Position
 
 CHANNEL_MHZ = 1.0  # what a receiver takes in at 250 kbit/s and 1 Mbit/s; 2 at 2 Mbit/s [DS 5.4]
-WIFI_MHZ = 20.0
 BURST_S = 1.5e-3  # our choice: a full Wi-Fi frame at 8 Mbit/s
 _KEPT_NS = NS_PER_S // 10  # bursts that ended earlier than this are forgotten
 

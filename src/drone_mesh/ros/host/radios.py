@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import Protocol
 
 from drone_mesh.communication.interfaces import IWirelessCommunication
-from drone_mesh.execution import ExecutorSlot, MeshExecutor
-from drone_mesh.ros.host.announcements import PlaceOf
+from drone_mesh.execution import ExecutorSlot
 from drone_mesh.ros.host.simulator_link import SimulatorLink
 from drone_mesh.ros.host.virtual_nrf24 import VirtualNRF24
 
@@ -54,45 +53,22 @@ class Radios(Protocol):
         """Stop all workers and threads; returns when they have ended."""
 
 
-class VirtualRadios:
+class VirtualRadios(SimulatorLink):
     """An ideal disc, in the process of the WirelessSignalSimulator; all nodes share one worker."""
 
     own_threads = False
-
-    def __init__(self, executor: MeshExecutor, place_of: PlaceOf) -> None:
-        self._executor = executor
-        self._link = SimulatorLink(executor, place_of)
-
-    @property
-    def ready(self) -> bool:
-        """Whether there is a simulator."""
-        return self._link.connected
-
-    @property
-    def never_handed_over(self) -> int:
-        """Packets, since the start, that no simulator accepted."""
-        return self._link.never_handed_over
-
-    @property
-    def under_way(self) -> int:
-        """See SimulatorLink."""
-        return self._link.under_way
 
     def figures(self) -> dict[str, float]:
         """Empty: on an ideal disc packets do not collide."""
         return {}
 
-    def start(self) -> None:
-        """Start looking for a simulator."""
-        self._link.start()
-
     def slot(self) -> ExecutorSlot:
         """A slot in the executor of the host."""
-        return self._executor.slot()
+        return self.executor.slot()
 
     def antenna(self, node_id: int, slot: ExecutorSlot) -> IWirelessCommunication:
         """The antenna of a node."""
-        return VirtualNRF24(node_id, self._link, slot)
+        return VirtualNRF24(node_id, self, slot)
 
     def remove(self, node_id: int) -> None:
         """Does nothing: the antenna has already left the link."""
@@ -102,7 +78,7 @@ class VirtualRadios:
 
     def fall_silent(self) -> None:
         """Stop looking for a simulator; sends to a connected one stay quick."""
-        self._link.stop()
+        self.stop()
 
     def close(self) -> None:
         """Does nothing: there is nothing left to close."""

@@ -38,7 +38,7 @@ class SimulatorLink(rospy.SubscribeListener):
     """
 
     def __init__(self, executor: MeshExecutor, place_of: PlaceOf) -> None:
-        self._executor = executor
+        self.executor = executor
         self._connection: SimulatorConnection | None = None
         self._lock = threading.Lock()
         self._throttled_log = ThrottledLog(_log)
@@ -96,7 +96,7 @@ class SimulatorLink(rospy.SubscribeListener):
             self._under_way -= 1
 
     @property
-    def connected(self) -> bool:
+    def ready(self) -> bool:
         """Whether packets can be handed to a simulator."""
         return self._connection is not None
 
@@ -178,7 +178,7 @@ class SimulatorLink(rospy.SubscribeListener):
                     self.antennas.announce_unregistered()
                 if not self._probing:
                     self._probing = True
-                    self._executor.submit(self._probe)
+                    self.executor.submit(self._probe)
 
     def _try_to_connect(self) -> None:
         if self._publisher.get_num_connections() == 0:
@@ -204,7 +204,7 @@ class SimulatorLink(rospy.SubscribeListener):
             if self._connection is not connection:
                 return
             self._connection = None
-        self._executor.submit(lambda _now_s: connection.close())  # not during a call of the worker
+        self.executor.submit(lambda _now_s: connection.close())  # not during a call of the worker
         _log.error("lost the simulator: %s", error)
         self._wake.set()
 

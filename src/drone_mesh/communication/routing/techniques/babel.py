@@ -68,11 +68,6 @@ class Babel(GatewayRoutes):
         """Drop all updates for it until they are repeated."""
         self._routes.forget_gateway(gateway)
 
-    def on_time(self, now_s: float) -> None:
-        """Advertise what has changed."""
-        assert self._essentials is not None
-        self._essentials.search_other_nodes_in_range()
-
     def on_packet(self, creator: int, from_: int, kind: int, body: bytes) -> None:
         """A starving node needs a new sequence number: create it, or forward the request."""
         if kind != REQUEST_TYPE or self._essentials is None:

@@ -13,7 +13,7 @@ from collections import deque
 from typing import NamedTuple
 
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.routing.techniques.gateway_routes import GatewayRoutes
+from drone_mesh.communication.routing.techniques.gateway_routes import GatewayRoutes, newer_by
 
 ORIGINATOR = struct.Struct("<BHBB")  # gateway, sequence number, transmit quality, hops left
 ORIGINATOR_TYPE = 9
@@ -57,7 +57,7 @@ class Batman(GatewayRoutes):
             return
         gateway, sequence, quality, hops_left = ORIGINATOR.unpack_from(body)
         me = self._essentials.get_node_id()
-        age = (sequence - self._newest.get(gateway, sequence - 1) + 2**15) % 2**16 - 2**15
+        age = newer_by(sequence, self._newest.get(gateway, sequence - 1))
         if gateway == me or age < 1 - WINDOW:
             return
         quality = round(quality / self.links.etx(from_)) * (MAX_QUALITY - HOP_PENALTY)

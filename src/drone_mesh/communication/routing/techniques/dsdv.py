@@ -12,7 +12,7 @@ from typing import NamedTuple
 from drone_mesh.communication import messages
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.packet_types import MessageType
-from drone_mesh.communication.routing.techniques.gateway_routes import GatewayRoutes
+from drone_mesh.communication.routing.techniques.gateway_routes import GatewayRoutes, newer_by
 
 ENTRY = struct.Struct("<BHB")  # gateway + 1 (0: no entry), sequence number, hops
 INFINITE_HOPS = 255  # with an odd sequence number: the route is broken
@@ -78,18 +78,13 @@ class Dsdv(GatewayRoutes):
         if entry is not None and entry.hops != INFINITE_HOPS:
             self._break(gateway, entry)
 
-    def on_time(self, now_s: float) -> None:
-        """Advertise what has changed."""
-        assert self._essentials is not None
-        self._essentials.search_other_nodes_in_range()
-
     def _hear(self, gateway: int, heard: Entry) -> None:
         assert self._essentials is not None
         if gateway == self._essentials.get_node_id():
             return
         known = self._vectors.get(gateway)
         new = heard._replace(hops=min(heard.hops + 1, INFINITE_HOPS))
-        age = 1 if known is None else _newer_by(heard.sequence, known.sequence)
+        age = 1 if known is None else newer_by(heard.sequence, known.sequence)
         broken = new.hops == INFINITE_HOPS
         if broken and (known is None or known.next_hop != heard.next_hop):
             return  # about a route that this node does not use
@@ -105,8 +100,3 @@ class Dsdv(GatewayRoutes):
     def _advertise_soon(self) -> None:
         if self._essentials is not None:
             self._essentials.wake_at(self._essentials.now_s() + SETTLING_S)
-
-
-def _newer_by(sequence: int, other: int) -> int:
-    """The distance from `other` to `sequence` on a circle of 2**16; negative: it is older."""
-    return (sequence - other + 2**15) % 2**16 - 2**15

@@ -59,11 +59,6 @@ class EtxTree(GatewayRoutes):
             if self._rank(gateway) and self.next_hop_to_gateway(gateway) != from_:
                 self._essentials.wake_at(self._essentials.now_s() + SOON_S)
 
-    def on_time(self, now_s: float) -> None:
-        """Advertise."""
-        assert self._essentials is not None
-        self._essentials.search_other_nodes_in_range()
-
     def next_hop_to_gateway(self, gateway: int) -> int:
         """The parent, replaced only by one that is better by SWITCH_BELOW."""
         costs = {

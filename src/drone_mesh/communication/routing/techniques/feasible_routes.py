@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.routing.techniques.gateway_routes import LinkCosts
+from drone_mesh.communication.routing.techniques.gateway_routes import LinkCosts, newer_by
 
 COST_PER_ETX = 256  # RFC 8966, appendix A.2.2
 INFINITE = 0xFFFF
@@ -22,7 +22,7 @@ class Distance(NamedTuple):
 
     def better_than(self, other: Distance) -> bool:
         """RFC 8966, 3.5.1."""
-        newer = (self.sequence - other.sequence + 2**15) % 2**16 - 2**15
+        newer = newer_by(self.sequence, other.sequence)
         return newer > 0 or (newer == 0 and self.metric < other.metric)
 
 

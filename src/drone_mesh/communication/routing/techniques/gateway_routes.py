@@ -31,6 +31,11 @@ class LinkCosts:
         return self._etx.get(neighbour, 1.0)
 
 
+def newer_by(sequence: int, other: int) -> int:
+    """The distance from `other` to `sequence` on a circle of 2**16; negative: it is older."""
+    return (sequence - other + 2**15) % 2**16 - 2**15
+
+
 class GatewayRoutes(ChildTableTree):
     """Routes to gateways come from `next_hop_to_gateway`; all others are those of the tree.
 
@@ -54,6 +59,11 @@ class GatewayRoutes(ChildTableTree):
     @abc.abstractmethod
     def forget_gateway(self, gateway: int) -> None:
         """`gateway` did not answer: drop all routes to it."""
+
+    def on_time(self, now_s: float) -> None:
+        """Advertise what has changed: PRESENT carries it, where the technique says so."""
+        assert self._essentials is not None
+        self._essentials.search_other_nodes_in_range()
 
     def get_direction_to_node(self, node: int) -> int:
         """The next hop for `node`, or NO_ROUTE."""
