@@ -4,6 +4,7 @@ No `from __future__ import annotations` here: FastAPI reads the annotations at r
 Python 3.8.
 """
 
+import functools
 import logging
 import time
 from typing import Any, Dict, List, Optional, Tuple, Union
@@ -93,25 +94,14 @@ def guarded_app(title: str, description: str, access: Access) -> Tuple[FastAPI, 
 
 
 def _answer_errors_with_a_reason(app: FastAPI) -> None:
-    def refuse(status: int, reason: str) -> JSONResponse:
-        return JSONResponse({"detail": reason}, status)
+    async def refuse(status: int, _request: Request, error: Exception) -> JSONResponse:
+        return JSONResponse({"detail": str(error)}, status)
+
+    statuses = ((GoalRefused, 422), (PlaceTaken, 409), (NotCarriedOut, 503), (AnswerLate, 504))
+    for kind, status in statuses:
+        app.add_exception_handler(kind, functools.partial(refuse, status))
 
     @app.exception_handler(RequestValidationError)
     async def bad_request(_request: Request, error: RequestValidationError) -> JSONResponse:
-        return refuse(422, "; ".join(f"{e['loc'][-1]}: {e['msg']}" for e in error.errors()))
-
-    @app.exception_handler(GoalRefused)
-    async def bad_goal(_request: Request, error: GoalRefused) -> JSONResponse:
-        return refuse(422, str(error))
-
-    @app.exception_handler(PlaceTaken)
-    async def place_taken(_request: Request, error: PlaceTaken) -> JSONResponse:
-        return refuse(409, str(error))
-
-    @app.exception_handler(NotCarriedOut)
-    async def not_carried_out(_request: Request, error: NotCarriedOut) -> JSONResponse:
-        return refuse(503, str(error))
-
-    @app.exception_handler(AnswerLate)
-    async def answer_late(_request: Request, error: AnswerLate) -> JSONResponse:
-        return refuse(504, str(error))
+        detail = "; ".join(f"{e['loc'][-1]}: {e['msg']}" for e in error.errors())
+        return JSONResponse({"detail": detail}, 422)

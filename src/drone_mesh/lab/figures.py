@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
 from drone_mesh.lab.experiment import as_text
-from drone_mesh.lab.metrics import METRICS
+from drone_mesh.lab.metrics.registry import METRICS, is_censored, unit_of
 from drone_mesh.lab.results import Results, is_share
 from drone_mesh.lab.statistics import Interval
 from drone_mesh.lab.tables import summary_of
@@ -84,7 +84,7 @@ def axis_drawing(results: Results, axis: str, series: str | None) -> Drawing:
             f"{results.axis_names[name]} = {as_text(value)}" for name, value in fixed.items()
         )
         caption += f" Drawn for {held}; the tables have all cells."
-    if any(_is_censored(metric) for metric in metrics):
+    if any(map(is_censored, metrics)):
         caption += " Times to heal include only runs that healed; compare the share healed as well."
     return Drawing(f"axis_{_file_name(axis)}", f"Over {results.axis_names[axis]}", caption, figure)
 
@@ -184,13 +184,8 @@ def distinct(values: Any) -> list[Any]:
 
 def metric_title(metric: str) -> str:
     """The metric's name, with its unit unless the name ends with it."""
-    unit = METRICS[metric].unit if metric in METRICS else ""
-    is_said = unit in ("", "0/1", metric) or metric.endswith(f"_{unit}")
-    return metric if is_said else f"{metric} ({unit})"
-
-
-def _is_censored(metric: str) -> bool:
-    return metric in METRICS and METRICS[metric].censored
+    unit = unit_of(metric)
+    return f"{metric} ({unit})" if unit else metric
 
 
 def short(text: str) -> str:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any, Mapping, Sequence
 
 from drone_mesh.lab.experiment import as_text
-from drone_mesh.lab.metrics import METRICS
+from drone_mesh.lab.metrics.registry import METRICS, is_censored, unit_of
 from drone_mesh.lab.results import Results, Row, is_share, number
 from drone_mesh.lab.statistics import (
     Interval,
@@ -100,7 +100,7 @@ def survival_of(rows: Mapping[int, Row]) -> Survival:
 
 def cells_table(results: Results) -> Table:
     """One row per cell, one column per metric of the experiment."""
-    metrics = [name for name in results.metrics if not _is_censored(name)]
+    metrics = [name for name in results.metrics if not is_censored(name)]
     rows = []
     for index, cell in enumerate(results.loaded.cells):
         counted, drawn = results.of_cell(index), results.drawn(index)
@@ -257,14 +257,9 @@ def _verdict(difference: Interval, p: float, metric: str) -> str:
     return "better" if (difference.value < 0) == (better == "less") else "worse"
 
 
-def _is_censored(metric: str) -> bool:
-    return metric in METRICS and METRICS[metric].censored
-
-
 def _with_unit(metric: str) -> str:
-    unit = METRICS[metric].unit if metric in METRICS else ""
-    ends_with_unit = unit == metric or metric.endswith(f"_{unit}")
-    return metric if not unit or unit == "0/1" or ends_with_unit else f"{metric}, {unit}"
+    unit = unit_of(metric)
+    return f"{metric}, {unit}" if unit else metric
 
 
 def _shown(interval: Interval, metric: str) -> str:

@@ -31,6 +31,17 @@ def listed() -> dict[str, Metric]:
     return {metric.family or name: metric for name, metric in METRICS.items()}
 
 
+def is_censored(column: str) -> bool:
+    """Whether this column is a metric that is empty if its event did not happen."""
+    return column in METRICS and METRICS[column].censored
+
+
+def unit_of(column: str) -> str:
+    """The unit of a column; empty if it has none, or its name says it."""
+    unit = METRICS[column].unit if column in METRICS else ""
+    return "" if unit in ("0/1", column) or column.endswith(f"_{unit}") else unit
+
+
 def measure_all(record: RunRecord) -> dict[str, float]:
     """Every metric of a run, by name."""
     return {name: metric.measure(record) for name, metric in METRICS.items()}
