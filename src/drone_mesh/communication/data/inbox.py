@@ -44,13 +44,14 @@ class Inbox:
         self._unacknowledged = 0  # fragments of complete messages
         self._complete = 0  # number of the latest complete reliable message
         self._repeated_s = -math.inf
+        self._asked: Poll | None = None  # what the next ACK is about; None: the latest complete one
         self.ack_due_s = self._ack_latest_s = math.inf
 
     def fragment(self, index: int, body: bytes, now_s: float) -> list[Whole]:
         """Process a fragment; returns deliverable messages. Raises PacketError if damaged."""
         if index == 0 and not self._is_current(packets.head_of(body).session, now_s):
             return []
-        if self.ack_due_s < math.inf:
+        if now_s < self.ack_due_s < math.inf:
             self.ack_due_s = min(now_s + self._ack_delay_s, self._ack_latest_s)
         number, reassembly = body[0], self._reassembly
         if reassembly.is_done(number):
@@ -72,17 +73,20 @@ class Inbox:
         return len(self._reassembly) > 0 or any(order.holds for order in self._ports.values())
 
     def poll(self, poll: Poll, now_s: float) -> None:
-        """Answer the sender's POLL."""
+        """The sender asks for an ACK: it is due now."""
         if poll.nonce == packets.NO_ANSWER:
             return
-        if poll.session == self._session:
-            self._unacknowledged, self.ack_due_s = 0, math.inf
-        self._acknowledge(self._ack(poll.number, poll.nonce, poll.session))
+        self._asked = poll
+        self.ack_due_s = min(self.ack_due_s, now_s)
+
+    def acknowledge(self) -> None:
+        """Send the ACK that is due."""
+        asked = self._asked or Poll(self._session, packets.NO_ANSWER, self._complete)
+        self._asked, self._unacknowledged, self.ack_due_s = None, 0, math.inf
+        self._acknowledge(self._ack(asked.number, asked.nonce, asked.session))
 
     def on_time(self, now_s: float) -> list[Whole]:
-        """Send a due ACK; returns messages that have waited for earlier ones for too long."""
-        if now_s >= self.ack_due_s:
-            self._acknowledge_now()
+        """Returns messages that have waited for earlier ones for too long."""
         self._reassembly.expire(now_s)
         overdue = []
         for order in self._ports.values():
@@ -102,7 +106,7 @@ class Inbox:
         self._session = session
         self._reassembly = Reassembly(self._room, self._open)
         self._ports.clear()
-        self._unacknowledged, self.ack_due_s = 0, math.inf
+        self._asked, self._unacknowledged, self.ack_due_s = None, 0, math.inf
         return True
 
     def _order(self, whole: Whole) -> PortOrder:
@@ -118,8 +122,8 @@ class Inbox:
         self._complete = whole.head.number
         self._unacknowledged += count
         if self._unacknowledged >= ACK_AT or index != count - 1:
-            self._acknowledge_now()
-        else:
+            self.ack_due_s = min(self.ack_due_s, now_s)
+        elif self.ack_due_s > now_s:
             if self.ack_due_s == math.inf:
                 self._ack_latest_s = now_s + self._ack_within_s
             self.ack_due_s = min(now_s + self._ack_delay_s, self._ack_latest_s)
@@ -127,11 +131,8 @@ class Inbox:
     def _repeat_ack(self, number: int, now_s: float) -> None:
         if now_s - self._repeated_s >= self._repeat_s:
             self._repeated_s = now_s
-            self._acknowledge(self._ack(number, 0, self._session))
-
-    def _acknowledge_now(self) -> None:
-        self._unacknowledged, self.ack_due_s = 0, math.inf
-        self._acknowledge(self._ack(self._complete, 0, self._session))
+            self._asked = self._asked or Poll(self._session, packets.NO_ANSWER, number)
+            self.ack_due_s = min(self.ack_due_s, now_s)
 
     def _ack(self, number: int, nonce: int, session: int) -> Ack:
         if session != self._session:

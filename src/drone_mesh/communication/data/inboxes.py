@@ -8,6 +8,7 @@ from collections import OrderedDict
 from typing import Callable
 
 from drone_mesh.communication.data import packets
+from drone_mesh.communication.data.ack_turns import AckTurns
 from drone_mesh.communication.data.echo import SendPacket
 from drone_mesh.communication.data.inbox import Inbox
 from drone_mesh.communication.data.packets import Ack, Poll
@@ -35,11 +36,13 @@ class Inboxes:
         self._on_arrived = on_arrived
         self._inboxes: OrderedDict[tuple[int, bool], Inbox] = OrderedDict()  # last used last
         self._tidy_s = math.inf
+        antenna = parts.antenna
+        self._turns = AckTurns(antenna.medium, antenna.patience)
 
     @property
     def due_s(self) -> float:
         """When to call `on_time`; infinity: there is nothing to do."""
-        return min([self._tidy_s, *(inbox.ack_due_s for inbox in self._inboxes.values())])
+        return min(self._tidy_s, self._turns.next_s(self._inboxes.values()))
 
     def fragment(self, sender: int, to_all: bool, index: int, body: bytes) -> None:
         """Process a fragment. Raises PacketError if it is damaged."""
@@ -49,20 +52,29 @@ class Inboxes:
             self._on_arrived(sender, to_all, whole)
         if self._tidy_s == math.inf and inbox.unfinished:
             self._tidy_s = now_s + TIDY_PERIOD_S
+        if inbox.ack_due_s <= now_s:
+            self._acknowledge_due(now_s)
 
     def poll(self, sender: int, poll: Poll) -> None:
         """Answer the POLL of a sender."""
-        self._inbox(sender, to_all=False).poll(poll, self._parts.now_s)
+        now_s = self._parts.now_s
+        self._inbox(sender, to_all=False).poll(poll, now_s)
+        self._acknowledge_due(now_s)
 
     def on_time(self) -> None:
         """Send due ACKs, and drop what is too old."""
         now_s = self._parts.now_s
+        self._acknowledge_due(now_s)
         for (sender, to_all), inbox in list(self._inboxes.items()):
             for whole in inbox.on_time(now_s):
                 self._on_arrived(sender, to_all, whole)
         if now_s >= self._tidy_s:
             unfinished = any(inbox.unfinished for inbox in self._inboxes.values())
             self._tidy_s = now_s + TIDY_PERIOD_S if unfinished else math.inf
+
+    def _acknowledge_due(self, now_s: float) -> None:
+        while now_s >= self._turns.next_s(self._inboxes.values()):
+            self._turns.acknowledge(self._inboxes.values(), now_s)
 
     def _inbox(self, sender: int, to_all: bool) -> Inbox:
         key = (sender, to_all)

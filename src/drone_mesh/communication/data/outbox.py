@@ -5,7 +5,7 @@ an ACK: when the message is complete, when its last fragment arrived but others 
 answer to a POLL. Missing fragments are then sent again. The sender sends a POLL when no ACK arrives
 in time, and when the window is full; while one is unanswered, it sends nothing else. If there are
 relays on a shared channel on the way, a train takes the place of the window (see RelayedWay), also
-for messages that are not reliable, and a pause may follow an answer.
+for messages that are not reliable.
 """
 
 from __future__ import annotations
@@ -53,7 +53,6 @@ class Outbox:
         self._way = RelayedWay(self._round_trip)
         self._nonce = 0
         self._latest: OutgoingMessage | None = None  # message whose fragment left last
-        self._may_begin = True  # another message, after its pause
         self.not_before_s = -math.inf  # no route: time of the next attempt
 
     def __len__(self) -> int:
@@ -79,7 +78,6 @@ class Outbox:
 
     def next_packet(self, now_s: float) -> DataPacket | None:
         """The next packet to send; call `on_sent` once it was sent."""
-        self._may_begin = not self._way.pauses(now_s)
         train = self._way.train
         if train is None:
             poll = self._timely_poll(now_s)
@@ -139,8 +137,6 @@ class Outbox:
             return
         if packet.kind == packets.POLL:
             self._way.interrupted()
-            if message.asks:
-                self._way.silence(now_s - message.asked_s)
             message.asked_s, message.asks = now_s, message.asks + 1
             return
         self._latest = message
@@ -159,8 +155,8 @@ class Outbox:
         else:
             self._close(message, TicketState.SENT)
 
-    def answered(self, ack: Ack, now_s: float, patience: float = 0.0) -> None:
-        """Process an ACK of the receiver; `patience` of the antenna: how busy the channel is."""
+    def answered(self, ack: Ack, now_s: float) -> None:
+        """Process an ACK of the receiver."""
         if ack.session != self._session:
             return
         complete = {
@@ -181,10 +177,9 @@ class Outbox:
             message = self._open[number]
             if number == ack.number:
                 self._measure(message, ack, now_s)
-                self._way.rest(patience, now_s)
             self._window.grow(message.in_flight)
             self._close(message, TicketState.DELIVERED)
-        if self._way.answered(ack.nonce, not self._in_flight(), now_s, patience):
+        if self._way.answered(ack.nonce, not self._in_flight(), now_s):
             for message in self._open.values():
                 if not message.ticket.reliable:
                     message.sent &= message.known  # lost fragments are not sent again
@@ -204,8 +199,6 @@ class Outbox:
             due_s = min(due_s, message.expires_s)
         if self._waiting:
             due_s = min(due_s, self._waiting[0].expires_s)
-            if now_s < self._way.pause_ends_s():
-                due_s = min(due_s, self._way.pause_ends_s())
         return self.not_before_s if now_s < self.not_before_s else due_s
 
     def expire(self, now_s: float, has_route: bool) -> None:
@@ -257,7 +250,7 @@ class Outbox:
     # One message ------------------------------------------------------------------------------
 
     def _may_open(self) -> bool:
-        if not self._waiting or not self._may_begin:
+        if not self._waiting or len(self._open) >= self._way.most_messages:
             return False
         return self._fragmentation.may_open(self._waiting[0].ticket)
 

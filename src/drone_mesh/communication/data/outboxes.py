@@ -71,7 +71,7 @@ class Outboxes:
         """Process an ACK of a receiver."""
         outbox = self._outboxes.get(by)
         if outbox is not None:
-            outbox.answered(ack, self._parts.now_s, self._parts.antenna.patience())
+            outbox.answered(ack, self._parts.now_s)
 
     def send(self) -> float:
         """Send what may be sent now; returns when to call it again, or infinity."""

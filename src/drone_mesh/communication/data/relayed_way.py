@@ -1,25 +1,26 @@
 """RelayedWay: how one outbox shares the channel with the relays on its way.
 
-It sends trains instead of single packets (see Train), and pauses between messages (MessagePause).
-Without relays on the same channel there is no train, and no pause counts.
+It sends trains instead of single packets (see Train). Without relays on the same channel there is
+no train.
 """
 
 from __future__ import annotations
 
 from drone_mesh.communication.data import packets
-from drone_mesh.communication.data.message_pause import MessagePause
+from drone_mesh.communication.data.fragmentation import MOST_OPEN
 from drone_mesh.communication.data.round_trip import RoundTrip
-from drone_mesh.communication.data.train import LEAST_LENGTH, Train
+from drone_mesh.communication.data.train import Train
+
+MOST_RELAYED = 6  # our choice: with 12, senders on a full channel get turns that are long and few
 
 
 class RelayedWay:
-    """The train that is under way, if there are relays, and the pause after it."""
+    """The train that is under way, if there are relays."""
 
     def __init__(self, round_trip: RoundTrip) -> None:
         """`round_trip`: of the outbox; answers to trains are measured in it."""
         self.train: Train | None = None
         self._round_trip = round_trip
-        self._pause = MessagePause()
 
     def set_relayed(self, relayed: bool) -> None:
         """Set whether there are relays on the same channel."""
@@ -37,13 +38,10 @@ class RelayedWay:
         """Whether relays wait for more of a train."""
         return self.train is not None and self.train.is_open
 
-    def pauses(self, now_s: float) -> bool:
-        """Whether no message begins now."""
-        return self.train is not None and now_s < self._pause.until_s
-
-    def pause_ends_s(self) -> float:
-        """When the latest pause ends, or ended."""
-        return self._pause.until_s
+    @property
+    def most_messages(self) -> int:
+        """How many messages may be on their way at once."""
+        return MOST_OPEN if self.train is None else MOST_RELAYED
 
     def waits_until_s(self, train: Train) -> float:
         """When to ask again for the answer that a train waits for."""
@@ -64,23 +62,11 @@ class RelayedWay:
         """The POLL that ends a train was sent."""
         train = self.train
         assert train is not None
-        if train.waits:
-            self.silence(now_s - train.asked_s)
         train.is_open = False
         if nonce != packets.NO_ANSWER:
             train.asked(nonce, now_s)
 
-    def silence(self, timeout_s: float) -> None:
-        """No answer came in time."""
-        self._pause.on_silence(timeout_s)
-
-    def rest(self, patience: float, now_s: float) -> None:
-        """An answer came: pause, for a shorter time after a train that can still become shorter."""
-        if self.train is not None:
-            share = min(1.0, LEAST_LENGTH / max(1, self.train.left))
-            self._pause.on_answer(share * self._round_trip.mean_s, patience, now_s)
-
-    def answered(self, nonce: int, arrived: bool, now_s: float, patience: float) -> bool:
+    def answered(self, nonce: int, arrived: bool, now_s: float) -> bool:
         """An answer came; `arrived`: nothing is known to be missing. True: it ends a train."""
         train = self.train
         if train is None:
@@ -88,7 +74,6 @@ class RelayedWay:
         ends = train.waits and nonce == train.nonce
         if ends:
             self._round_trip.measured(now_s - train.asked_s)
-            self.rest(patience, now_s)
         if ends or (arrived and not train.waits):
             train.end(arrived)
         return ends

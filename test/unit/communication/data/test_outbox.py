@@ -1,56 +1,14 @@
-"""The pause between messages on a shared channel, and what an outbox does without answers."""
+"""How many messages an outbox sends, and what it does without answers."""
 
 from __future__ import annotations
 
 import pytest
 
 from drone_mesh.communication.data import packets
-from drone_mesh.communication.data.message_pause import MOST_PAUSE_S, MessagePause
 from drone_mesh.communication.data.outbox import Outbox
 from drone_mesh.communication.data.outgoing import OutgoingMessage
 from drone_mesh.communication.data.round_trip import FIRST_TIMEOUT_S, MOST_TIMEOUT_S
 from drone_mesh.communication.data.ticket import Ticket, TicketState
-
-BUSY, QUIET = 2.5, 0.0
-
-
-def test_on_a_quiet_channel_no_pause_follows_an_answer():
-    pace = MessagePause()
-    pace.on_answer(0.1, QUIET, 7.0)
-    assert pace.until_s < 7.0
-
-
-def test_the_pause_doubles_with_each_timeout_and_shrinks_with_each_answer():
-    pace = MessagePause()
-    for expected_s in (1.0, 2.0, 4.0, 8.0):
-        pace.on_silence(1.0)
-        assert pace.pause_s == expected_s
-    pace.on_answer(1.0, QUIET, 100.0)
-    assert pace.pause_s == pytest.approx(6.4)
-    assert pace.until_s == pytest.approx(106.4)
-    pace.on_answer(0.5, QUIET, 100.0)
-    assert pace.pause_s == pytest.approx(4.0)  # eight round trips
-    for _ in range(30):
-        pace.on_answer(0.1, QUIET, 100.0)
-    assert pace.pause_s == 0.0
-
-
-def test_the_pause_is_bounded():
-    pace = MessagePause()
-    for _ in range(20):
-        pace.on_silence(1.0)
-    assert pace.pause_s == MOST_PAUSE_S == 30.0
-
-
-def test_on_a_busy_channel_it_grows_with_each_answer_to_eight_round_trips():
-    pace, pauses = MessagePause(), []
-    for _ in range(10):
-        pace.on_answer(0.2, BUSY, 0.0)
-        pauses.append(pace.pause_s)
-    assert pauses[:3] == pytest.approx([0.1, 0.25, 0.475])
-    assert pauses[-1] == pytest.approx(1.6)
-    pace.on_answer(0.2, 1.6, 0.0)  # nearly as busy
-    assert pace.pause_s < 1.6
 
 
 def outbox_with(count, relayed):
@@ -71,6 +29,12 @@ def send_all(outbox, now_s):
             return sent
         outbox.on_sent(packet, now_s)
         sent.append(packet)
+
+
+@pytest.mark.parametrize(("relayed", "most"), [(False, 12), (True, 6)])
+def test_behind_relays_fewer_messages_are_on_their_way_at_once(relayed, most):
+    outbox, _ = outbox_with(30, relayed)
+    assert sum(packet.kind != packets.POLL for packet in send_all(outbox, 0.0)) == most
 
 
 def ack_of(packet, nonce):
