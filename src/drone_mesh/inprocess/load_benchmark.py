@@ -1,7 +1,7 @@
 """What users' messages do to a mesh: `python3 -m drone_mesh.inprocess.load_benchmark --help`.
 
 A grid of nodes on the fast model of the shared channel, 6 m apart with a range of 9 m. Random nodes
-send reliable messages to the gateway, at random moments; then the busiest relay dies.
+send reliable messages to the gateway, at random moments; then the busiest relay dies, or none.
 """
 
 from __future__ import annotations
@@ -65,8 +65,15 @@ class _Traffic:
         self._later()
 
 
-def measure(nodes: int, rate: float, seconds: float, seed: int, data_rate: str = "250k") -> Load:
-    """Offer `rate` messages/s to a mesh of so many nodes, of which one dies."""
+def measure(
+    nodes: int,
+    rate: float,
+    seconds: float,
+    seed: int,
+    data_rate: str = "250k",
+    unharmed: bool = False,
+) -> Load:
+    """Offer `rate` messages/s to a mesh of so many nodes, of which one dies unless `unharmed`."""
     network = Network(seed=seed, radio="shared", rate=data_rate)
     network.add_fleet(routers=nodes - 1, gridsize=math.isqrt(nodes - 1), spacing=SPACING_M)
     network.run_until(network.all_connected, CONNECT_WITHIN_S)
@@ -74,9 +81,10 @@ def measure(nodes: int, rate: float, seconds: float, seed: int, data_rate: str =
     traffic = _Traffic(network, rate, seed)
     traffic.begin()
     network.run_for(BEFORE_S)
-    dead = busiest_relay(network)
-    traffic.senders.remove(dead)
-    network.power(dead, False)
+    if not unharmed:
+        dead = busiest_relay(network)
+        traffic.senders.remove(dead)
+        network.power(dead, False)
     network.run_for(SETTLE_S)
     traffic.offered.clear()
     frames, received = _frames(network), len(network.received.get(0, ()))
@@ -130,12 +138,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--seed", type=whole(0, MOST), default=1, help="of all choices; %(default)s"
     )
     parser.add_argument("--rate", choices=DATA_RATES, default="250k")
+    parser.add_argument("--unharmed", action="store_true", help="no relay dies")
     parsed = parser.parse_args(arguments)
     print("| nodes | offered/s | taken/s | delivered/s | connected | frames/s | fairness |")
     print("|---|---|---|---|---|---|---|")
     for nodes in parsed.nodes:
         for offered in parsed.offered:
-            load = measure(nodes, offered, parsed.seconds, parsed.seed, parsed.rate)
+            load = measure(
+                nodes, offered, parsed.seconds, parsed.seed, parsed.rate, parsed.unharmed
+            )
             print(
                 f"| {nodes} | {offered:g} | {load.offered:.1f} | {load.delivered:.1f} | "
                 f"{load.connected:.1%} | {load.frames:.0f} | {load.fairness:.2f} |"

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.fragmentation import MOST_OPEN
-from drone_mesh.communication.data.round_trip import RoundTrip
+from drone_mesh.communication.data.round_trip import FIRST_TIMEOUT_S, RoundTrip
 from drone_mesh.communication.data.train import Train
 
-MOST_RELAYED = 6  # our choice: with 12, senders on a full channel get turns that are long and few
+MOST_IN_TURN = 6  # our choice: with 12, turns are long and few
 
 
 class RelayedWay:
@@ -40,8 +40,9 @@ class RelayedWay:
 
     @property
     def most_messages(self) -> int:
-        """How many messages may be on their way at once."""
-        return MOST_OPEN if self.train is None else MOST_RELAYED
+        """How many messages may be on their way at once: few if answers wait for others' turns."""
+        takes_turns = self.train is not None and self._round_trip.mean_s > FIRST_TIMEOUT_S
+        return MOST_IN_TURN if takes_turns else MOST_OPEN
 
     def waits_until_s(self, train: Train) -> float:
         """When to ask again for the answer that a train waits for."""

@@ -31,10 +31,18 @@ def send_all(outbox, now_s):
         sent.append(packet)
 
 
-@pytest.mark.parametrize(("relayed", "most"), [(False, 12), (True, 6)])
-def test_behind_relays_fewer_messages_are_on_their_way_at_once(relayed, most):
-    outbox, _ = outbox_with(30, relayed)
-    assert sum(packet.kind != packets.POLL for packet in send_all(outbox, 0.0)) == most
+@pytest.mark.parametrize(
+    ("relayed", "answered_s", "most"), [(False, 3.0, 12), (True, 0.5, 12), (True, 3.0, 6)]
+)
+def test_behind_relays_few_messages_leave_at_once_while_answers_are_late(relayed, answered_s, most):
+    outbox, _ = outbox_with(1, relayed)
+    (first,) = send_all(outbox, 0.0)
+    outbox.answered(ack_of(first, nonce=0), answered_s)
+    for number in range(1, 31):
+        ticket = Ticket(number, to=0, port=5, size=16, reliable=True)
+        outbox.add(OutgoingMessage(ticket, bytes(16), answered_s))
+    sent = send_all(outbox, answered_s)
+    assert [packet.kind for packet in sent] == [packets.FRAGMENTS.start] * most
 
 
 def ack_of(packet, nonce):
