@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import platform
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Sequence
+from typing import Callable, Sequence, TypeVar
 
 from drone_mesh.bench.inprocess import InProcessResult, SealCost
 from drone_mesh.bench.measurement import RosResult
 from drone_mesh.bench.overload import OverloadResult
 from drone_mesh.bench.soak import Sample, SoakResult
+
+R = TypeVar("R")
 
 UNKNOWN = "-"
 SMALL_CORES = 0.005  # processes that use less have no column
@@ -62,64 +65,59 @@ def table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     )
 
 
+def _columns(results: Sequence[R], *columns: tuple[str, Callable[[R], str]]) -> str:
+    """A table with a row for each result; a column is its heading and what it shows."""
+    headings = [heading for heading, _show in columns]
+    return table(headings, [[show(result) for _heading, show in columns] for result in results])
+
+
 def ros_tables(results: Sequence[RosResult]) -> str:
     """Three tables: start, traffic, cost."""
     return "\n\n".join(
         (
             "Start, in seconds. Connected: from the start of the last node until all are "
-            "connected.\n\n"
-            + table(
-                ("drones", "spacing", "speed", "all on (wall)", "connected (sim)", "(wall)"),
-                [
-                    [
-                        *_fleet(result),
-                        f"{result.on_after_wall_s:.1f}",
-                        _seconds_or_how_many(result),
-                        _number(result.connected_after_wall_s, 1),
-                    ]
-                    for result in results
-                ],
+            "connected.",
+            _columns(
+                results,
+                *_FLEET,
+                ("all on (wall)", lambda r: f"{r.on_after_wall_s:.1f}"),
+                ("connected (sim)", _seconds_or_how_many),
+                ("(wall)", lambda r: _number(r.connected_after_wall_s, 1)),
             ),
             "Traffic per second of wall time. Lost: share of the packets for nodes in range, and "
             "the number lost before the measurement, while nodes were starting. Speed of simulated "
-            "time.\n\n"
-            + table(
-                (
-                    "drones",
-                    "spacing",
-                    "speed",
-                    "messages/s",
-                    "deliveries/s",
-                    "lost",
-                    "lost at the start",
-                    "factor reached",
-                    "worst timer lag",
-                ),
-                [
-                    [
-                        *_fleet(result),
-                        f"{result.messages_per_wall_s:.0f}",
-                        _number(result.deliveries_per_wall_s, 0),
-                        UNKNOWN if result.lost_share is None else f"{result.lost_share:.3%}",
-                        _number(result.lost_before, 0),
-                        f"{result.reached_real_time_factor:.2f}",
-                        _milliseconds(result.worst_timer_lag_s),
-                    ]
-                    for result in results
-                ],
+            "time.",
+            _columns(
+                results,
+                *_FLEET,
+                ("messages/s", lambda r: f"{r.messages_per_wall_s:.0f}"),
+                ("deliveries/s", lambda r: _number(r.deliveries_per_wall_s, 0)),
+                ("lost", lambda r: UNKNOWN if r.lost_share is None else f"{r.lost_share:.3%}"),
+                ("lost at the start", lambda r: _number(r.lost_before, 0)),
+                ("factor reached", lambda r: f"{r.reached_real_time_factor:.2f}"),
+                ("worst timer lag", lambda r: _milliseconds(r.worst_timer_lag_s)),
             ),
             "Cost. Cores used by each process and by all; milliseconds of processor time of all "
-            "per message, and per simulated second and link; memory of all, in MB.\n\n"
-            + _cost_table(results),
+            "per message, and per simulated second and link; memory of all, in MB.",
+            _cost_table(results),
         )
     )
 
 
-def _fleet(result: RosResult) -> list[str]:
+def _drones(result: RosResult) -> str:
+    return f"{result.drones}, {result.flying} flying" if result.flying else str(result.drones)
+
+
+def _speed(result: RosResult) -> str:
     factor = result.real_time_factor
-    speed = "as fast as possible" if factor == 0 else f"{factor:g}"
-    drones = f"{result.drones}, {result.flying} flying" if result.flying else str(result.drones)
-    return [drones, f"{result.spacing_m:g} m", speed]
+    return "as fast as possible" if factor == 0 else f"{factor:g}"
+
+
+_FLEET: Sequence[tuple[str, Callable[[RosResult], str]]] = (
+    ("drones", _drones),
+    ("spacing", lambda result: f"{result.spacing_m:g} m"),
+    ("speed", _speed),
+)
 
 
 def _seconds_or_how_many(result: RosResult) -> str:
@@ -136,28 +134,25 @@ def _milliseconds(seconds: float | None) -> str:
     return UNKNOWN if seconds is None else f"{1000 * seconds:.0f} ms"
 
 
+def _cores_of(name: str, result: RosResult) -> str:
+    return _number(result.cores.get(name), 2)
+
+
 def _cost_table(results: Sequence[RosResult]) -> str:
     names = sorted(
         {name for result in results for name, cores in result.cores.items() if cores > SMALL_CORES}
     )
-    headings = [
-        *("drones", "spacing", "speed", *names, "all"),
-        *("ms/message", "links", "ms/s and link", "PSS", "RSS"),
-    ]
-    rows = [
-        [
-            *_fleet(result),
-            *(_number(result.cores.get(name), 2) for name in names),
-            f"{sum(result.cores.values()):.2f}",
-            _number(result.cpu_ms_per_message, 2),
-            str(result.links),
-            _number(result.cpu_ms_per_sim_s_and_link, 2),
-            f"{result.pss_mb:.0f}",
-            f"{result.rss_mb:.0f}",
-        ]
-        for result in results
-    ]
-    return table(headings, rows)
+    return _columns(
+        results,
+        *_FLEET,
+        *((name, functools.partial(_cores_of, name)) for name in names),
+        ("all", lambda r: f"{sum(r.cores.values()):.2f}"),
+        ("ms/message", lambda r: _number(r.cpu_ms_per_message, 2)),
+        ("links", lambda r: str(r.links)),
+        ("ms/s and link", lambda r: _number(r.cpu_ms_per_sim_s_and_link, 2)),
+        ("PSS", lambda r: f"{r.pss_mb:.0f}"),
+        ("RSS", lambda r: f"{r.rss_mb:.0f}"),
+    )
 
 
 def inprocess_table(results: Sequence[InProcessResult]) -> str:
@@ -168,31 +163,19 @@ def inprocess_table(results: Sequence[InProcessResult]) -> str:
         f"In process, one core: simulated seconds per second of processor time (of wall time). "
         f"Medians of {runs} runs and the best run, for the first {period} and the {period} "
         f"after them; packets per second of processor time after them.\n\n"
-        + table(
-            (
-                "nodes",
-                "spacing",
-                "from the start",
-                "best",
-                "after",
-                "best",
-                "packets",
-                "all connected",
-            ),
-            [
-                [
-                    str(result.drones),
-                    f"{result.spacing_m:g} m",
-                    f"{result.from_start_per_cpu_s:.0f} ({result.from_start_per_wall_s:.0f})",
-                    f"{result.from_start_best_per_cpu_s:.0f}",
-                    f"{result.running_per_cpu_s:.0f} ({result.running_per_wall_s:.0f})",
-                    f"{result.running_best_per_cpu_s:.0f}",
-                    f"{result.packets_per_cpu_s:.0f}",
-                    "yes" if result.all_connected else "no",
-                ]
-                for result in results
-            ],
-        )
+    ) + _columns(
+        results,
+        ("nodes", lambda r: str(r.drones)),
+        ("spacing", lambda r: f"{r.spacing_m:g} m"),
+        (
+            "from the start",
+            lambda r: f"{r.from_start_per_cpu_s:.0f} ({r.from_start_per_wall_s:.0f})",
+        ),
+        ("best", lambda r: f"{r.from_start_best_per_cpu_s:.0f}"),
+        ("after", lambda r: f"{r.running_per_cpu_s:.0f} ({r.running_per_wall_s:.0f})"),
+        ("best", lambda r: f"{r.running_best_per_cpu_s:.0f}"),
+        ("packets", lambda r: f"{r.packets_per_cpu_s:.0f}"),
+        ("all connected", lambda r: "yes" if r.all_connected else "no"),
     )
 
 
