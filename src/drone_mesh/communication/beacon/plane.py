@@ -64,7 +64,9 @@ class BeaconPlane(IControlPlane):
             lambda from_, node: self._routes.leads_not_to(node, from_),
         )
         self._trickle = Trickle(self._antenna.medium, basics.rng)
-        self._searches = Searches(self._me, self._routes, self._broadcast)
+        self._searches = Searches(
+            self._me, self._routes, self._broadcast, self._antenna.medium.hop_s
+        )
         self._sent = 0  # beacons
         self._look_s = -math.inf  # when it looks at everything anew, whatever a beacon says
         self._probed_s = self._retry_s = self._check_s = -math.inf

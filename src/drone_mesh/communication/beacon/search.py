@@ -15,6 +15,7 @@ HOPS_AROUND = 2  # our choice: of a search by a relay, which was near the node a
 SAME_S = 5.0  # our choice: far longer than a search takes to pass through a mesh
 MOST_IN_VAIN = 5  # our choice: searches in a row for a node
 PAUSE_S = 10.0  # our choice: after them
+GAP_HOPS = 400  # our choice: between two searches; each takes time on the air for every node
 
 Broadcast = Callable[[int, int, bytes], None]
 
@@ -22,10 +23,14 @@ Broadcast = Callable[[int, int, bytes], None]
 class Searches:
     """The searches of one node, and its part in those of others."""
 
-    def __init__(self, node_id: int, routes: BeaconRoutes, broadcast: Broadcast) -> None:
+    def __init__(
+        self, node_id: int, routes: BeaconRoutes, broadcast: Broadcast, hop_s: float
+    ) -> None:
         self._node_id = node_id
         self._routes = routes
         self._broadcast = broadcast
+        self._gap_s = GAP_HOPS * hop_s
+        self._free_s = -math.inf  # when the last search that was heard or sent is over
         self._number = 0
         self._searched: dict[int, tuple[float, int]] = {}  # by node: when, how often in vain
         self._seen_s: dict[tuple[int, int], float] = {}  # creator, number
@@ -36,8 +41,9 @@ class Searches:
         at_s, in_vain = self._searched.get(node, (-math.inf, 0))
         if now_s - at_s >= PAUSE_S:
             in_vain = 0
-        if now_s - at_s < AGAIN_S or in_vain >= MOST_IN_VAIN:
+        if now_s - at_s < AGAIN_S or in_vain >= MOST_IN_VAIN or now_s < self._free_s:
             return
+        self._free_s = now_s + self._gap_s
         self._searched[node] = now_s, in_vain + 1
         self._number = (self._number + 1) % 2**16
         search = Search(node, self._number, hops)
@@ -52,6 +58,7 @@ class Searches:
         for old in [seen for seen, at_s in self._seen_s.items() if now_s - at_s >= SAME_S]:
             del self._seen_s[old]
         self._seen_s[key] = now_s
+        self._free_s = now_s + self._gap_s
         self._routes.led_to(creator, from_)
         if search.node == self._node_id:
             return True
