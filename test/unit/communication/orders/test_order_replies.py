@@ -338,6 +338,13 @@ def test_a_second_order_for_a_drone_ends_the_repeats_of_the_first():
     assert (first.state, first.reason) == (OrderState.REPLACED, "by order 2")
 
 
+def test_a_hundred_old_orders_are_remembered_besides_the_latest_of_each_drone():
+    rig = gateway_rig()
+    for height in range(120):
+        assert rig.mesh.send_goal_request_to_drone(5, 1.0, 0.0, height, rig.now_s)
+    assert [order.number for order in rig.mesh.get_orders()] == list(range(21, 122))
+
+
 def states(rig):
     return [order.state.in_words(order.reason) for order in rig.mesh.get_orders()]
 

@@ -128,6 +128,21 @@ def test_a_node_without_a_key_is_named(caplog):
     assert "node 7, sends packets without a seal: it has no key" in caplog.text
 
 
+def test_a_neighbour_is_named_after_two_check_periods_at_the_earliest(caplog):
+    """A restarted one answers a challenge by then."""
+    caplog.set_level(logging.WARNING)
+    network = line(2)
+    network.run_for(10.0)
+    for _ in range(5):
+        assert "node 7" not in caplog.text
+        network.inject(1, packet("07 07 03 01 fe 00 01"))
+        network.run_for(4.5)
+    network.run_for(3.0)
+    network.inject(1, packet("07 07 03 01 fe 00 01"))
+    network.run_for(1.0)
+    assert "node 7, sends packets without a seal: it has no key" in caplog.text
+
+
 def test_replayed_packets_show_in_the_log(caplog):
     caplog.set_level(logging.WARNING)
     network = line(2)
