@@ -143,6 +143,14 @@ def test_without_tiles_there_is_the_grid_and_nothing_is_fetched(start_console, v
     assert [url for url in page.requests if "leaflet" in url or "/tiles/" in url] == []
 
 
+def test_the_page_says_why_a_gateway_without_an_origin_has_no_map(start_console, visit, tile_file):
+    page = visit(start_console("--real", "--tiles", tile_file).url)
+    page.wait_for_drones(len(PLACES))
+    page.page.wait_for_selector("#map-credit:text('the gateway does not know where it is')")
+    check(page, "no origin")
+    assert [url for url in page.requests if "leaflet" in url or "/tiles/" in url] == []
+
+
 class TileServer(ThreadingHTTPServer):
     """Another server, with the same tile everywhere."""
 

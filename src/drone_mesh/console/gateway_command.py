@@ -30,18 +30,12 @@ ASK_PERIOD_S = 1.0  # our choice
 GATEWAY_TOKEN = "DRONE_MESH_TOKEN"  # as of the gateway
 PAGE_TOKEN = "DRONE_MESH_CONSOLE_TOKEN"
 
-_log = logging.getLogger(__name__)
-
 
 class GatewayFeed:
     """Polls the gateway once a second and passes its answers to the store. One thread."""
 
-    def __init__(
-        self, client: GatewayClient, store: FrameStore, runner: ConsoleRunner, has_map: bool = False
-    ) -> None:
-        """`has_map`: the page has tiles, and the log says so if they cannot be shown."""
+    def __init__(self, client: GatewayClient, store: FrameStore, runner: ConsoleRunner) -> None:
         self._client = client
-        self._needs_origin = has_map
         self._store = store
         self._runner = runner
         self._seen = 0  # number of the last event
@@ -65,9 +59,6 @@ class GatewayFeed:
         if mesh.stamp_s < self._uptime_s:  # restarted: its events count from 1 again
             self._seen, last, events = 0, 0, []
         self._seen, self._uptime_s = last, mesh.stamp_s
-        if self._needs_origin and origin is None:
-            _log.warning("no map: the gateway %s has no --origin", self._client.url)
-            self._needs_origin = False  # said once
 
         def take() -> None:
             self._store.origin = origin
@@ -149,7 +140,7 @@ def _serve(
     runner = ConsoleRunner(server, address, port)
     runner.start()
     print(token.greeting(address, runner.port), flush=True)
-    feed = GatewayFeed(client, store, runner, has_map=tiles is not None)
+    feed = GatewayFeed(client, store, runner)
     try:
         feed.ask()
         while not stop.wait(ASK_PERIOD_S):

@@ -227,18 +227,3 @@ def test_the_origin_is_the_gateways():
     assert origin_of(MESH) is None  # an older gateway
     with pytest.raises(ConfigurationError):
         origin_of({**MESH, "origin": [152, 5, 3]})
-
-
-def test_a_map_without_an_origin_is_explained_once_in_the_log(gateway, caplog):
-    feed = GatewayFeed(GatewayClient(gateway.url), FrameStore(), PromptRunner(), has_map=True)
-    feed.ask()
-    feed.ask()
-    assert [record.getMessage() for record in caplog.records] == [
-        f"no map: the gateway {gateway.url} has no --origin"
-    ]
-
-
-def test_a_map_with_an_origin_needs_no_explanation(gateway, caplog):
-    gateway.answer = {**MESH, "origin": [52.0907, 5.1214, 3.0]}
-    GatewayFeed(GatewayClient(gateway.url), FrameStore(), PromptRunner(), has_map=True).ask()
-    assert not caplog.records

@@ -78,7 +78,8 @@ export class Flights extends EventTarget {
 
   /** Several drones go as one standing order, if somebody keeps those. */
   async #order(moves, what) {
-    if (moves.length === 1 || !this.mesh.actions.includes("formation")) return this.#orderEach(moves);
+    if (moves.length === 1 || !this.mesh.actions.includes("formation"))
+      return this.#orderEach(moves);
     const places = moves.map(({ id, x, y, z }) => [id, metres(x), metres(y), z]);
     const request = { do: "formation", name: what.slice(0, MAX_NAME), places };
     try {

@@ -21,6 +21,9 @@ function zoomFor(scale, latitude) {
   return Math.log2((scale * metres) / TILE_PX);
 }
 
+const NO_ORIGIN =
+  "no map: the gateway does not know where it is; start it with --origin LAT,LON,ALT";
+
 export class Tiles {
   #library = null;
   #leaflet = null; // its map
@@ -37,14 +40,16 @@ export class Tiles {
 
   /** Draws the map for the camera as it is now. */
   follow() {
-    const { map, origin } = this.mesh;
+    const { map, origin, clock } = this.mesh;
     const offered = Boolean(map && origin);
     document.body.toggleAttribute("data-on-map", offered);
     const wanted = offered && byId("show-map").checked;
     byId("tiles").hidden = !wanted;
-    byId("map-credit").hidden = !(wanted && map.credit);
+    const misses = map && !origin && clock.t !== undefined; // only a gateway may have none
+    const line = misses ? NO_ORIGIN : (wanted && map.credit) || "";
+    byId("map-credit").hidden = !line;
+    if (byId("map-credit").textContent !== line) byId("map-credit").textContent = line;
     if (!wanted) return;
-    if (byId("map-credit").textContent !== map.credit) byId("map-credit").textContent = map.credit;
     if (this.#leaflet) this.#move(origin);
     else this.#load(map);
   }
