@@ -87,6 +87,7 @@ class Departures:
         self._behind = _behind(self._nodes.values())
         self._rerouting: set[int] = set()  # their routes lead over a drone that is leaving
         self._keep_away: set[int] = set()  # drones at rest that others wait for
+        self._hinder: set[int] = set()  # drones at rest in the way of others, who wait anyway
         members = self._reach.over(self._resting)
         self._at_home = {n for n in self._resting & goals.keys() if self._is_at(n, goals[n])}
         self._connected = {n for n, node in self._nodes.items() if node.connected}
@@ -100,9 +101,16 @@ class Departures:
         """Who may set out now, and where to, of those that can be ordered."""
         choice = Choice()
         left = sorted(set(candidates) & self._to_go & self._resting, key=self._rank)
-        first = [drone for drone in left if drone in self._first]
-        if not self._some_wait(first, choice):
-            self._some_wait([drone for drone in left if drone not in self._first], choice)
+        first: set[int] = set()
+        more = set(left) & set(self._first)
+        waits = False
+        while more:
+            first |= more
+            waits = self._some_wait([drone for drone in left if drone in first], choice)
+            more = self._hinder & set(left) - first
+            self._keep_away |= more
+        if not waits:
+            self._some_wait([drone for drone in left if drone not in first], choice)
         if not self._ends:
             self._resolve([drone for drone in left if drone not in choice.blocked], choice)
         return choice
@@ -174,7 +182,9 @@ class Departures:
     def _may_go_later(self, drone: int, to: Location) -> bool:
         """Whether it only waits for those that fly now, or for other routes."""
         path = self._path(drone, to)
-        if path is not None and self._airspace.in_the_way(drone, path):
+        in_the_way = [] if path is None else self._airspace.in_the_way(drone, path)
+        if in_the_way:
+            self._hinder.update(in_the_way)
             return False
         stay = self._stay_without(drone)
         return stay is not None and self._are_enough(len(stay) + len(self._ends))

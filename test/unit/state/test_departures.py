@@ -126,6 +126,14 @@ def test_drones_of_the_latest_formation_set_out_first_and_others_leave_them_room
     assert list(Departures(state, goals, {}).choose(goals).set_out) == [1]
 
 
+def test_who_stands_in_the_way_of_the_latest_formation_sets_out_before_the_others():
+    places = {n: at(0.9 * n - 5, 2.0) for n in range(1, 11)} | {1: at(6, 6)}
+    goals = {1: at(8, 0), 2: at(-6, 6), 3: at(6, 6)}
+    state = mesh(places)
+    state.nodes[9].path = (*places[9].to_vector(), 8.0, -8.0, 0.0)
+    assert list(Departures(state, goals, {}, first={3}).choose(goals).set_out) == [1]
+
+
 def test_a_far_drone_does_not_wait_for_one_whose_place_a_waiting_relay_holds():
     places = {n: at(0.9 * n - 9, -2.0) for n in range(1, 17)} | {17: at(6, 3), 18: at(14, 3)}
     goals = {16: at(6, 3), 17: at(30, 30), 18: at(40, 40), 15: at(-40, 0)}
