@@ -117,6 +117,7 @@ class FlownLayouts(Part):
     apart_s: AtLeast0 = 10.0  # between two orders
     shuffled: bool = False  # in another order in each run
     at_once: bool = False  # all drones set out together
+    ring_m: Optional[Above0] = None  # then a ring of all routers through the gateway: its radius
 
 
 class Messages(Part):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Callable, Collection, Sequence
 
 from drone_mesh.drone.location import Location
@@ -38,22 +39,38 @@ class Formations:
         self._number = 0
         self._events_read = 0
 
-    def fly(self, cases: Sequence[int], apart_s: float, at_once: bool) -> None:
-        """Order these layouts one after the other, from now on."""
-        clock = self._network.clock
-        for count, case in enumerate(cases):
-            clock.call_at(clock.now_s + count * apart_s, self._give, (case, at_once))
+    def fly(
+        self, cases: Sequence[int], apart_s: float, at_once: bool, ring_m: float | None = None
+    ) -> None:
+        """Order these layouts one after the other, from now on, and then a ring of that radius."""
+        clock, nodes = self._network.clock, self._network.nodes
+        layouts = [(f"layout {case}", dict(self._layouts.orders(case))) for case in cases]
+        if ring_m is not None:
+            layouts.append(("ring", self._ring(ring_m)))
+        for count, (name, layout) in enumerate(layouts):
+            goals = {drone: goal for drone, goal in layout.items() if drone in nodes}
+            clock.call_at(clock.now_s + count * apart_s, self._give, (name, goals, at_once))
         clock.call_at(clock.now_s, self._look, None)
 
-    def _give(self, what: tuple[int, bool]) -> None:
-        case, at_once = what
+    def _ring(self, radius_m: float) -> dict[int, Location]:
+        """A place for each router, on a circle that the first gateway closes."""
+        gateway, *_others = gateways = gateways_of(self._network)
+        start = self._network.location(gateway)
+        routers = sorted(self._network.nodes.keys() - set(gateways))
+        goals = {}
+        for count, router in enumerate(routers, 1):
+            angle = 2 * math.pi * count / (len(routers) + 1)
+            north_m, east_m = radius_m * math.sin(angle), radius_m * (1 - math.cos(angle))
+            goals[router] = Location(start.latitude + north_m, start.longitude + east_m, 0.0)
+        return goals
+
+    def _give(self, what: tuple[str, dict[int, Location], bool]) -> None:
+        name, self._goals, at_once = what
         status = self._network.status()
-        orders = self._layouts.orders(case)
-        self._goals = {drone: goal for drone, goal in orders if drone in self._network.nodes}
         self.given_s, self.reached_s = status.stamp_s, None
         self._at_once = at_once
         self._plan(status, self._reach())
-        self._number = self._orders.give(f"layout {case}", self._goals, status.stamp_s, at_once)
+        self._number = self._orders.give(name, self._goals, status.stamp_s, at_once)
 
     def _plan(self, status: MeshStatus, reach: Collection[int]) -> None:
         standing = self._orders.goals(status)

@@ -285,7 +285,7 @@ class Timeline:
         what, cases = fault.what, list(fault.what.cases)
         if what.shuffled:
             rng.shuffle(cases)
-        self.formations.fly(cases, what.apart_s, what.at_once)
+        self.formations.fly(cases, what.apart_s, what.at_once, what.ring_m)
         return []
 
     def send_order(self, node: int, x: float, y: float, height: int) -> None:

@@ -32,6 +32,17 @@ def happened(record: RunRecord) -> list[tuple[float, str, tuple[int, ...]]]:
     return [tuple(item) for item in record.happened]
 
 
+def test_the_last_layout_is_a_ring_of_all_routers_that_the_gateway_closes() -> None:
+    flown = {"at_s": 15, "layouts": {"cases": [201], "apart_s": 5, "ring_m": 4}}
+    record = run(
+        layout={"kind": "line", "drones": 4}, routing="beacon", faults=[flown], duration_s=90
+    )
+    assert record.formations.missing == []
+    places = record.end.places
+    center = (places[0][0] + 4.0, places[0][1])
+    assert [math.dist(places[node][:2], center) for node in range(4)] == pytest.approx([4.0] * 4)
+
+
 # Layouts
 
 
