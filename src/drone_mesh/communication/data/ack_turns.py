@@ -14,9 +14,10 @@ import math
 from typing import Callable, Iterable
 
 from drone_mesh.communication.data.inbox import Inbox
-from drone_mesh.communication.medium import Medium
+from drone_mesh.communication.medium import FAST_HOP_S, Medium
 
-TURN_S = 0.4  # our choice, per check period of patience: up to 1 s, a first timeout (RFC 6298)
+# Our choice, at 250 kbit/s and per check period of patience: up to 1 s, a first timeout (RFC 6298).
+TURN_S = 0.4
 
 
 class AckTurns:
@@ -24,7 +25,7 @@ class AckTurns:
 
     def __init__(self, medium: Medium, patience: Callable[[], float]) -> None:
         """`patience`: see IWirelessCommunication; 0 on a quiet channel, where no ACK waits."""
-        self._turn_s = medium.stretched(TURN_S)
+        self._turn_s = TURN_S * (medium.hop_s / FAST_HOP_S)
         self._patience = patience
         self._latest: Inbox | None = None  # acknowledged last
         self._ends_s = -math.inf  # at the latest

@@ -10,16 +10,17 @@ from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.ack_turns import TURN_S, AckTurns
 from drone_mesh.communication.data.inbox import ACK_DELAY_S, Inbox
 from drone_mesh.communication.data.packets import Head, Poll
-from drone_mesh.communication.medium import UNDISTURBED, Medium
+from drone_mesh.communication.medium import FAST_HOP_S, Medium
 
 ROOM = 27
 BUSY = 2.5
+SHARED = Medium.for_hop(FAST_HOP_S)
 
 
 class Receiver:
     """A node with three senders; `acknowledged`: time, sender and number of each ACK."""
 
-    def __init__(self, patience, medium=UNDISTURBED):
+    def __init__(self, patience, medium=SHARED):
         self.acknowledged = []
         self.now_s = 0.0
         self.inboxes = [
@@ -109,10 +110,11 @@ def test_a_poll_waits_for_its_turn_and_the_ack_is_about_what_it_asks():
     assert [ack[1:] for ack in receiver.acknowledged] == [(0, 0), (1, 4)]
 
 
-def test_a_slow_medium_has_longer_turns():
-    receiver = Receiver(BUSY, Medium.for_hop(0.026))
+@pytest.mark.parametrize(("hop_s", "times"), [(0.026, 10), (0.0026, 1), (0.0013, 0.5)])
+def test_turns_are_as_long_as_hops_take(hop_s, times):
+    receiver = Receiver(BUSY, Medium.for_hop(hop_s))
     receiver.message(0, 0)
     receiver.message(1, 0)
     receiver.run(100.0)
     (first_s, _, _), (second_s, _, _) = receiver.acknowledged
-    assert second_s - first_s == pytest.approx(10 * TURN_S * BUSY)
+    assert second_s - first_s == pytest.approx(times * TURN_S * BUSY)
