@@ -75,6 +75,27 @@ def test_the_arrival_after_a_long_flight_is_reported_as_soon_as_there_is_a_route
     assert replies(rig) == []
 
 
+@pytest.mark.parametrize(("waited_s", "told"), [(100.0, [(7, 3, "")]), (140.0, [])])
+def test_the_arrival_waits_two_minutes_for_a_route(waited_s, told):
+    rig = drone_rig()
+    rig.hear(f"00 00 06 01 01 {TO_Y_20} 07 00")
+    rig.forget()
+    rig.engine.place = Location(20.0, 0.0, 0.0)
+    rig.wait(waited_s)
+    assert replies(rig) == []
+    rig.connect_to_gateway()
+    rig.wait(1.1)
+    assert replies(rig) == told
+
+
+def test_a_drone_has_arrived_if_it_stands_a_metre_from_the_goal():
+    rig = drone_rig()
+    rig.hear(f"00 00 06 01 01 {TO_Y_1} 07 00")
+    rig.forget()
+    fly_to(rig, Location(1.0, 1.2, 0.0))
+    assert replies(rig) == [(7, 3, "")]
+
+
 def test_a_flight_that_ends_elsewhere_is_given_up_with_the_distance():
     rig = drone_rig()
     rig.hear(f"00 00 06 01 01 {TO_Y_2} 07 00")
@@ -223,6 +244,16 @@ def test_a_query_is_answered_with_the_state_of_that_order(number, outcome):
     rig.hear(f"00 00 41 01 01 {number}")
     assert rig.sent(kind=64) == [packet(f"01 01 40 00 00 {number} {outcome:02x}")]
     assert len(rig.engine.goals) == 1
+
+
+@pytest.mark.parametrize(("number", "outcome"), [(1, 5), (2, 6), (9, 1)])
+def test_a_drone_remembers_its_last_eight_orders(number, outcome):
+    rig = drone_rig()
+    for other in range(1, 10):
+        rig.hear(f"00 00 06 01 01 {(TO_Y_1, TO_Y_2)[other % 2]} {other:02x} 00")
+    rig.forget()
+    rig.hear(f"00 00 41 01 01 {number:02x} 00")
+    assert {p[7] for p in rig.sent(kind=64)} == {outcome}
 
 
 # At the gateway --------------------------------------------------------------------------------
