@@ -495,6 +495,7 @@ def test_on_a_phone_the_selected_node_its_switch_and_its_close_button_stay_on_th
         "17 is lost",
         lambda: page.page.inner_text("#node-condition") == "not connected to a gateway",
     )
+    assert page.page.get_attribute("#node-condition", "data-severity") == "2"
     assert page.page.locator("#node-facts dt:text-is('Last gateway')").is_visible()
     fallback = page.page.locator("#node-facts div:has(dt:text-is('Fallback position')) dd")
     page.wait_for(

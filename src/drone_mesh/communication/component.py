@@ -82,19 +82,20 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
         """Do what is due."""
         deadlines = self._deadlines
         deadlines.now_s = now_s
+        at_s = deadlines.at_s
         self.control.on_time(now_s)
-        if now_s >= deadlines.get(Due.ASK_POSITION):
+        if now_s >= at_s[Due.ASK_POSITION]:
             self._watch_flight()
-        if now_s >= deadlines.get(Due.ORDER_REPLIES):
+        if now_s >= at_s[Due.ORDER_REPLIES]:
             self._orders.on_due()
-        if now_s >= deadlines.get(Due.DATA):
+        if now_s >= at_s[Due.DATA]:
             self.data.on_due()
-        if now_s >= deadlines.get(Due.NODE_REPORT):
+        if now_s >= at_s[Due.NODE_REPORT]:
             self._reporter.on_due()
-        if now_s >= deadlines.get(Due.OWN_ID):
+        if now_s >= at_s[Due.OWN_ID]:
             deadlines.set(Due.OWN_ID, math.inf)
             self._antenna.switch_power(True)
-        due_s = deadlines.get(Due.CHECK)
+        due_s = at_s[Due.CHECK]
         if now_s >= due_s:
             period_s = self._timing.check_period_s
             deadlines.set(Due.CHECK, due_s + period_s * ((now_s - due_s) // period_s + 1.0))

@@ -31,19 +31,23 @@ class Deadlines:
 
     def __init__(self) -> None:
         self.now_s = 0.0
-        self._at_s = [math.inf] * len(Due)
+        self.at_s = [math.inf] * len(Due)  # by Due; changes only here
         self.next_s = math.inf  # the earliest of all
 
     def set(self, due: Due, at_s: float) -> None:
         """Schedule `due` at `at_s`; infinity cancels it."""
-        self._at_s[due] = at_s
-        self.next_s = min(self._at_s)
+        before_s = self.at_s[due]
+        self.at_s[due] = at_s
+        if at_s <= self.next_s:
+            self.next_s = at_s
+        elif before_s <= self.next_s:
+            self.next_s = min(self.at_s)
 
     def get(self, due: Due) -> float:
         """When `due` is; infinity: never."""
-        return self._at_s[due]
+        return self.at_s[due]
 
     def clear(self) -> None:
         """Cancel everything."""
-        self._at_s = [math.inf] * len(Due)
+        self.at_s[:] = [math.inf] * len(Due)
         self.next_s = math.inf

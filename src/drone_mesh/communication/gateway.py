@@ -73,7 +73,7 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
     def tick(self, now_s: float) -> None:
         """Do what is due."""
         super().tick(now_s)
-        if now_s >= self._deadlines.get(Due.ORDERS):
+        if now_s >= self._deadlines.at_s[Due.ORDERS]:
             self._book.on_due()
 
     def set_internet(self, works: bool, now_s: float) -> None:

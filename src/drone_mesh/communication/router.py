@@ -60,12 +60,12 @@ class MeshnetworkRouter(MeshnetworkComponent):
     def tick(self, now_s: float) -> None:
         """Do what is due."""
         super().tick(now_s)
-        if now_s >= self._deadlines.get(Due.GOAL):
+        if now_s >= self._deadlines.at_s[Due.GOAL]:
             self._deadlines.set(Due.GOAL, math.inf)
             goal = self._pilot.goal
             if goal is not None:
                 self._repair.announce_place(goal)
-        if now_s >= self._deadlines.get(Due.REPAIR) and self._repair.on_due():
+        if now_s >= self._deadlines.at_s[Due.REPAIR] and self._repair.on_due():
             self._landed()
 
     def _check(self, due_s: float) -> None:

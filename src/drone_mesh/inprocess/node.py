@@ -69,7 +69,7 @@ class InProcessNode:
 
     def plan(self) -> None:
         """Schedule the component's next tick; to be called after every call into it."""
-        self._planned_s = self.component.next_tick_s
+        self._planned_s = self.deadlines.next_s
         if self._planned_s < math.inf:
             self._clock.call_at(self._planned_s, self._tick, self._planned_s)
 

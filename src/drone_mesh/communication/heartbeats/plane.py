@@ -51,9 +51,9 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
 
     def on_time(self, now_s: float) -> None:
         """Introduce the node, and let the technique do what it planned."""
-        if now_s >= self._deadlines.get(Due.INTRODUCE):
+        if now_s >= self._deadlines.at_s[Due.INTRODUCE]:
             self._introduction.on_due()
-        if now_s >= self._deadlines.get(Due.ROUTING):
+        if now_s >= self._deadlines.at_s[Due.ROUTING]:
             self._deadlines.set(Due.ROUTING, math.inf)
             self._technique.on_time(now_s)
 

@@ -52,7 +52,7 @@ class RouterHeartbeats(HeartbeatPlane):
 
     def on_time(self, now_s: float) -> None:
         """Do what is due."""
-        if now_s >= self._deadlines.get(Due.ANSWER):
+        if now_s >= self._deadlines.at_s[Due.ANSWER]:
             self._connection.answer_missed()
         super().on_time(now_s)
 

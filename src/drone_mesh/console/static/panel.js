@@ -46,6 +46,7 @@ export class NodePanel {
     setText(byId("node-condition"), node.trouble || node.condition);
     byId("node-condition").title = node.trouble || node.condition;
     byId("node-condition").dataset.colour = node.colour;
+    byId("node-condition").dataset.severity = node.trouble ? node.severity : "";
     setText(byId("power"), node.on ? "Switch off" : "Switch on");
     this.#facts(node);
   }
