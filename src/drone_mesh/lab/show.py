@@ -14,9 +14,7 @@ from drone_mesh.lab.plan import PlannedRun
 from drone_mesh.lab.provenance import code_version
 from drone_mesh.lab.record import RunRecord
 from drone_mesh.lab.results import Results, load_results
-from drone_mesh.lab.simulation import Simulation
-from drone_mesh.lab.streams import Streams
-from drone_mesh.lab.worker import scenario_of
+from drone_mesh.lab.worker import scenario_of, simulation_of
 from drone_mesh.state.model import MeshStatus
 
 
@@ -34,10 +32,9 @@ def replay(results: Results, beginning: str) -> Replay:
     """Run it again. Raises MeshError like the run itself."""
     planned = results.find_run(beginning)
     spec = planned.spec
-    scenario = scenario_of(spec.scenario)
-    if scenario.model == "ideal":
+    if scenario_of(spec.scenario).model == "ideal":
         raise ConfigurationError(f"run {spec.run} uses model ideal, which has no events to show")
-    simulation = Simulation(scenario, Streams(spec.seed, spec.repetition))
+    simulation = simulation_of(spec)
     states: list[MeshStatus] = []
     record = simulation.run(states.append)
     label = results.loaded.cells[planned.cell].label

@@ -568,6 +568,17 @@ def test_show_repeats_exactly_that_run(
     assert "fault: kill" in shown
 
 
+def test_show_repeats_a_whole_sequence_of_faults(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "faults.yaml"
+    path.write_text("name: x\nbase:\n  sequence: {drones: [8, 9]}\n  sample_s: 2\n")
+    run(path, tmp_path / "out", "seeds=1")
+    capsys.readouterr()
+    assert lab("show", tmp_path / "out", read_rows(tmp_path / "out/runs.csv")[0]["run"]) == 0
+    assert "reproduces the run" in capsys.readouterr().out
+
+
 def test_show_says_why_the_run_differs(
     experiment: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -43,9 +43,10 @@ class LoneRepair(IRepairStrategy):
         self._samples: list[bool] | None = None  # of the power in the channel, while it measures
 
     def patience(self, silent: bool) -> float:
-        """In silence, look around after the usual time, and then rarely."""
+        """In silence, look around after the usual time, and then rarely; after all steps, too."""
+        patience = SILENCE_PATIENCE if silent and self._looked else 1.0
         is_lone = self._was_everywhere and not self.mesh.neighbours()
-        return SILENCE_PATIENCE if is_lone or (silent and self._looked) else 1.0
+        return SILENCE_PATIENCE * patience if is_lone else patience
 
     def on_gateway_found(self) -> None:
         """Start over: the next loss is a new one."""
