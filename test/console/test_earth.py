@@ -92,7 +92,7 @@ def test_places_and_tracks_are_saved_in_degrees(page):
     page.page.fill("#fly-x", "14")
     page.page.press("#fly-x", "Enter")
     page.page.click("#held-now")
-    page.wait_for("it flew", lambda: abs(float(page.row(3, X)) - 14) < 0.2)
+    page.wait_for("it is there", lambda: page.row(3, X) == "14.0")
     page.page.click("#files-button")
     saved = {}
     for name in ("places.geojson", "tracks.geojson", "places.kml", "tracks.kml"):
@@ -111,7 +111,7 @@ def test_places_and_tracks_are_saved_in_degrees(page):
     (three,) = (place for place in places if place["properties"]["drone"] == 3)
     longitude, latitude, altitude = three["geometry"]["coordinates"]
     there = ORIGIN.to_frame(EarthPlace(latitude, longitude, altitude))
-    assert there.longitude == pytest.approx(14, abs=0.2)
+    assert there.longitude == pytest.approx(14, abs=0.1)
 
 
 def test_positions_are_shown_and_typed_in_degrees_on_wish(page):
