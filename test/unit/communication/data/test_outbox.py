@@ -7,7 +7,7 @@ import pytest
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.outbox import Outbox
 from drone_mesh.communication.data.outgoing import OutgoingMessage
-from drone_mesh.communication.data.round_trip import FIRST_TIMEOUT_S, MOST_TIMEOUT_S
+from drone_mesh.communication.data.round_trip import FIRST_TIMEOUT_S, MOST_TIMEOUT_S, RoundTrip
 from drone_mesh.communication.data.ticket import Ticket, TicketState
 
 
@@ -93,3 +93,10 @@ def test_a_node_that_is_connected_again_asks_at_once_what_arrived():
         send_all(outbox, tenth / 10)
     outbox.ask_anew(40.0)
     assert outbox.due_s(40.0) == pytest.approx(40.0 + FIRST_TIMEOUT_S)
+
+
+def test_the_timeout_is_three_tenths_of_a_second_at_least_and_doubles_without_answers():
+    round_trip = RoundTrip()
+    for _ in range(30):
+        round_trip.measured(0.005)
+    assert [round_trip.timeout_s(unanswered) for unanswered in (0, 1, 2)] == [0.3, 0.6, 1.2]

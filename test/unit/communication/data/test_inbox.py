@@ -1,0 +1,96 @@
+"""What a receiver answers and keeps, and for how long (docs/data.md)."""
+
+from __future__ import annotations
+
+import pytest
+
+from drone_mesh.communication.data import packets
+from drone_mesh.communication.data.flood import SeenFragments
+from drone_mesh.communication.data.inbox import Inbox
+from drone_mesh.communication.data.ordering import PortOrder
+from drone_mesh.communication.data.outgoing import LIFETIME_S
+from drone_mesh.communication.data.packets import Head
+from drone_mesh.communication.data.reassembly import Whole
+
+ROOM = 27
+OLD, NEW = 7, 8  # sessions of the sender
+
+
+class Receiver:
+    """One inbox; `acks`: when an ACK left."""
+
+    def __init__(self):
+        self.acks = []
+        self.inbox = Inbox(ROOM, lambda ack: self.acks.append(round(self.now_s, 3)))
+        self.now_s = 0.0
+
+    def first(self, number, now_s, session=OLD, size=4):
+        """The first fragment of a message arrives; returns what was delivered."""
+        self.run(now_s)
+        payload = bytes(size)
+        check = packets.checksum(session, 5, number, payload)
+        head = Head(number, session, 5, size, True, 0, number, check)
+        body = packets.first_body(head, payload, ROOM)
+        return [whole.head.number for whole in self.inbox.fragment(0, body, now_s)]
+
+    def second(self, number, now_s):
+        """The second and last fragment of a message of 20 bytes arrives."""
+        self.run(now_s)
+        body = packets.further_body(number, 1, bytes(20), ROOM)
+        return [whole.head.number for whole in self.inbox.fragment(1, body, now_s)]
+
+    def run(self, until_s):
+        """Send the ACKs that become due."""
+        while self.inbox.ack_due_s <= until_s:
+            self.now_s = self.inbox.ack_due_s
+            self.inbox.acknowledge()
+        self.now_s = until_s
+
+
+def test_an_ack_leaves_after_a_pause_or_after_two_tenths_of_a_second_without_one():
+    receiver = Receiver()
+    for number in range(30):
+        receiver.first(number, 0.01 * number)
+    receiver.run(1.0)
+    assert receiver.acks == [0.2, pytest.approx(0.31)]  # the last message arrived at 0.29
+
+
+def test_an_ack_is_repeated_unasked_three_times_a_second_at_most():
+    receiver = Receiver()
+    receiver.first(0, 0.0)
+    receiver.run(1.0)
+    for n in range(100):
+        receiver.first(0, 1.0 + 0.01 * n)  # the sender missed the ACK
+    receiver.run(3.0)
+    assert receiver.acks[1:] == pytest.approx([1.0, 1.3, 1.6, 1.9], abs=0.011)
+
+
+@pytest.mark.parametrize(("after_s", "delivered"), [(29.0, []), (31.0, [1])])
+def test_a_late_packet_of_the_session_before_does_not_bring_that_back_for_30_s(after_s, delivered):
+    receiver = Receiver()
+    receiver.first(0, 0.0, OLD)
+    receiver.first(0, 10.0, NEW)
+    assert receiver.first(1, 10.0 + after_s, OLD) == delivered
+
+
+@pytest.mark.parametrize(("after_s", "delivered"), [(59.0, [3]), (61.0, [])])
+def test_an_incomplete_message_is_kept_for_a_minute(after_s, delivered):
+    receiver = Receiver()
+    assert receiver.first(3, 0.0, size=20) == []
+    receiver.inbox.on_time(after_s)
+    assert receiver.second(3, after_s) == delivered
+
+
+@pytest.mark.parametrize(("after_s", "is_new"), [(4.0, False), (6.0, True)])
+def test_a_flooded_fragment_counts_as_known_for_five_seconds(after_s, is_new):
+    seen = SeenFragments()
+    assert seen.is_new(2, 9, 0, 0.0)
+    assert seen.is_new(2, 9, 0, after_s) is is_new
+
+
+def test_a_message_waits_for_earlier_ones_for_longer_than_their_sender_tries_and_not_for_ever():
+    order = PortOrder()
+    for number, behind in ((7, 0), (9, 1)):
+        order.take(Whole(Head(0, 0, 0, 1, True, behind, number, 0), b"."), 0.0)
+    assert order.overdue(LIFETIME_S + 30.0) == []
+    assert [whole.head.order for whole in order.overdue(2.0 * LIFETIME_S)] == [9]
