@@ -1,7 +1,8 @@
 """What users' messages do to a mesh: `python3 -m drone_mesh.inprocess.load_benchmark --help`.
 
-A grid of nodes on the fast model of the shared channel, 6 m apart with a range of 9 m. Random nodes
-send reliable messages to the gateway, at random moments; then the busiest relay dies, or none.
+A grid of nodes, 6 m apart with a range of 9 m, on the fast model of the shared channel or on
+emulated chips. Random nodes send reliable messages to the gateway, at random moments; then the
+busiest relay dies, or none.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from typing import NamedTuple, Sequence
 
 from drone_mesh.arguments import MOST, whole
 from drone_mesh.errors import QueueFull
+from drone_mesh.inprocess.chip_air import ChipAir
 from drone_mesh.inprocess.network import Network
 from drone_mesh.inprocess.shared_air import SharedAir
 from drone_mesh.nrf24.settings import DATA_RATES
@@ -72,9 +74,10 @@ def measure(
     seed: int,
     data_rate: str = "250k",
     unharmed: bool = False,
+    radio: str = "shared",
 ) -> Load:
     """Offer `rate` messages/s to a mesh of so many nodes, of which one dies unless `unharmed`."""
-    network = Network(seed=seed, radio="shared", rate=data_rate)
+    network = Network(seed=seed, radio=radio, rate=data_rate)
     network.add_fleet(routers=nodes - 1, gridsize=math.isqrt(nodes - 1), spacing=SPACING_M)
     network.run_until(network.all_connected, CONNECT_WITHIN_S)
     network.run_for(10.0)
@@ -121,7 +124,7 @@ def fairness(hops: dict[int, int], offered: Counter[int], arrived: Counter[int])
 
 
 def _frames(network: Network) -> int:
-    assert isinstance(network.air, SharedAir)
+    assert isinstance(network.air, (SharedAir, ChipAir))
     return network.air.frames
 
 
@@ -138,6 +141,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--seed", type=whole(0, MOST), default=1, help="of all choices; %(default)s"
     )
     parser.add_argument("--rate", choices=DATA_RATES, default="250k")
+    parser.add_argument("--radio", choices=("shared", "chips"), default="shared")
     parser.add_argument("--unharmed", action="store_true", help="no relay dies")
     parsed = parser.parse_args(arguments)
     print("| nodes | offered/s | taken/s | delivered/s | connected | frames/s | fairness |")
@@ -145,7 +149,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for nodes in parsed.nodes:
         for offered in parsed.offered:
             load = measure(
-                nodes, offered, parsed.seconds, parsed.seed, parsed.rate, parsed.unharmed
+                nodes,
+                offered,
+                parsed.seconds,
+                parsed.seed,
+                parsed.rate,
+                parsed.unharmed,
+                parsed.radio,
             )
             print(
                 f"| {nodes} | {offered:g} | {load.offered:.1f} | {load.delivered:.1f} | "
