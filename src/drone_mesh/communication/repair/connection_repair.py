@@ -80,6 +80,7 @@ class ConnectionRepair(RepairViews):
         """A gateway answers again."""
         self._clear()
         self._tried_goals.clear()
+        self._tried_spots.clear()
         self._strategy.reason = ""
         self._strategy.on_gateway_found()
         if self._flight is not None:
@@ -179,6 +180,8 @@ class ConnectionRepair(RepairViews):
         self._flies_to_place_of = step.owner if step in self.steps else NO_ROUTE
         if step.owner != self.node_id:
             self._tried_goals.append(step.place)
+            if self.silent:
+                self._tried_spots.append(flight.goal)
         elif self._flight is not None and self._tried_goals:
             self._tried_goals.pop()  # it turns back before it has been there
         self._parts.neighbours.forget_all()
@@ -286,7 +289,7 @@ class ConnectionRepair(RepairViews):
         if step.owner == self.node_id:
             return step.place
         if self.silent:
-            known = [step.place, *self._taken.all()]
+            known = [step.place, *self._taken.all(), *self._tried_spots]
             return own_spot(step.place, self.node_id, self.clearance_m, known)
         return self._taken.at_or_beside(step.place, self._landing(step))
 

@@ -55,8 +55,9 @@ class GroupRepair(LoneRepair):
 
     def patience(self, silent: bool) -> float:
         """After a flight of a drone of the group, later rounds come sooner, until none flies."""
+        patience = super().patience(silent)
         may_fly = self._news.drone_flew and self._rounds_without_flier <= ROUNDS_WITHOUT_FLIER
-        return LATER_ROUNDS if may_fly and not silent else super().patience(silent)
+        return LATER_ROUNDS if may_fly and not silent and patience == 1.0 else patience
 
     def on_emergency(self) -> None:
         """With neighbours: start an election. Alone: fly."""
@@ -66,14 +67,19 @@ class GroupRepair(LoneRepair):
             self.on_emergency_alone()
 
     def fly_alone(self) -> None:
-        """One step; it comes back if it hears no node there.
+        """One step; it comes back if it hears no node there. After the last one it starts over.
 
         A drone that flies to the gateway, as after an order, looks for it on the way: it need not.
         """
         mesh, here = self.mesh, self.mesh.own_place()
         mesh.happened(RouterEvent.NO_NEIGHBOURS)
         step, self.reason = self._next_step(alone=True)
+        if step is None and self._was_everywhere:
+            self._was_everywhere = False
+            mesh.try_again()
+            step, self.reason = self._next_step(alone=True)
         if step is None:
+            self._was_everywhere = not mesh.why_not_fly()
             return
         if here is not None and (mesh.silent or not step.home):
             self._look(step, here)
@@ -130,7 +136,10 @@ class GroupRepair(LoneRepair):
             return None, f"cannot fly: {why_not}"
         reason = "knows no place to fly to"
         is_first_choice = True
-        for step in mesh.steps:
+        steps = mesh.steps
+        for step in steps:
+            if step.owner == NO_ROUTE and len(steps) > 1 and not (alone and self._was_everywhere):
+                continue
             if mesh.was_at(step):
                 if is_first_choice:
                     reason = f"flew to the place of {step.owner} without success"

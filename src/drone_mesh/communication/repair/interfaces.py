@@ -116,7 +116,10 @@ class IRepairActions(abc.ABC):
     @property
     @abc.abstractmethod
     def steps(self) -> list[Step]:
-        """The flights back: to the lost next hop and the gateway; else where it was connected."""
+        """The flights back: to the lost next hop, the gateway, and where it was connected last.
+
+        The last one has the owner NO_ROUTE; it is for a drone that has no other.
+        """
 
     @property
     @abc.abstractmethod
@@ -137,9 +140,16 @@ class IRepairActions(abc.ABC):
 
     @abc.abstractmethod
     def was_at(self, step: Step) -> bool:
-        """Whether the drone flew there since it was last connected."""
+        """Whether the drone flew there since it was last connected, or since `try_again`."""
 
     # Actions ---------------------------------------------------------------------------------
+
+    @abc.abstractmethod
+    def try_again(self) -> None:
+        """Forget where the drone was in vain, except where it is now.
+
+        In a silence it will look around at other spots.
+        """
 
     @abc.abstractmethod
     def fly(self, step: Step, until_connected: bool = False) -> None:

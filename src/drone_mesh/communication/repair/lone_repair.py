@@ -31,6 +31,7 @@ class LoneRepair(IRepairStrategy):
 
     _stood_at: Location | None = None  # during a look around: its start
     _looked = False  # since the connection was lost
+    _was_everywhere = False  # alone, it has no further step
     _in_silence = False  # several neighbours fell silent together before it
     _landed_s = -math.inf  # from its latest look around
     _jammed_s = -math.inf  # when its channel was last found to be jammed
@@ -42,12 +43,15 @@ class LoneRepair(IRepairStrategy):
         self._samples: list[bool] | None = None  # of the power in the channel, while it measures
 
     def patience(self, silent: bool) -> float:
-        """In silence, look around after the usual time, and then rarely."""
-        return SILENCE_PATIENCE if silent and self._looked else 1.0
+        """In silence, look around after the usual time, and then rarely; after all steps, too."""
+        patience = SILENCE_PATIENCE if silent and self._looked else 1.0
+        is_lone = self._was_everywhere and not self.mesh.neighbours()
+        return SILENCE_PATIENCE * patience if is_lone else patience
 
     def on_gateway_found(self) -> None:
         """Start over: the next loss is a new one."""
         self._stood_at, self._looked, self._samples = None, False, None
+        self._was_everywhere = False
         self._jammed_s = -math.inf
         self.listens = False
 
@@ -73,6 +77,7 @@ class LoneRepair(IRepairStrategy):
         A drone that lost a single neighbour may connect at once: that one has probably died.
         """
         if self._stood_at is not None:
+            self.mesh.ask_places()  # those that heard it in flight would not answer a PRESENT
             self.listens, self._landed_s = self._in_silence, self.mesh.now_s
             self.mesh.wait_until(self.mesh.now_s + self.mesh.medium.stretched(LISTENS_S))
 

@@ -33,6 +33,7 @@ class RepairViews(IRepairActions):
         self._control = control
         self._options = options
         self._tried_goals: list[Location] = []  # goals of this drone since it was last connected
+        self._tried_spots: list[Location] = []  # where it looked around in a silence since then
 
     @property
     def node_id(self) -> int:
@@ -95,9 +96,11 @@ class RepairViews(IRepairActions):
     @property
     def steps(self) -> list[Step]:  # noqa: D102
         places, gateway = self._parts.places, self._control.gateway
-        candidates = [(places.good, places.good_id), (places.gateway, gateway)]
-        if places.good is None and places.gateway is None:
-            candidates = [(places.connected_at, NO_ROUTE)]
+        candidates = [
+            (places.good, places.good_id),
+            (places.gateway, gateway),
+            (places.connected_at, NO_ROUTE),
+        ]
         return [
             Step(place, owner, home=owner == gateway != NO_ROUTE)
             for place, owner in candidates
@@ -119,6 +122,12 @@ class RepairViews(IRepairActions):
         here = self._parts.pilot.place() if step.owner == NO_ROUTE else None
         places = [*self._tried_goals, *filter(None, [here])]
         return any(step.place.distance_m(place) < radius_m for place in places)
+
+    def try_again(self) -> None:  # noqa: D102
+        here, near_m = self._parts.pilot.place(), 2 * PITCH * self.clearance_m
+        self._tried_goals = [
+            goal for goal in self._tried_goals if here and goal.distance_m(here) <= near_m
+        ]
 
     def _view(self, node: int) -> NeighbourView:
         heard, hops = self._parts.neighbours.place_of(node), self._parts.neighbours.hops_of(node)

@@ -541,6 +541,21 @@ def test_a_drone_that_knows_no_place_flies_to_where_it_was_connected_last():
     assert rig.engine.goals[:1] == [Location(12.0, 0.0, 0.0)]
 
 
+def test_alone_after_every_step_it_looks_where_it_was_connected_last_and_then_starts_over():
+    """At the gateway's place it waits for long: the gateway may be off for a while."""
+    rig = lone_rig()
+    left_s = []
+    while rig.now_s < 800.0:
+        rig.wait(1.0)
+        if len(rig.engine.goals) > len(left_s):
+            rig.engine.place = rig.engine.goals[-1]
+            left_s.append(rig.now_s)
+    there = rig.engine.goals.index(BESIDE_GATEWAY)
+    assert rig.engine.goals[there + 1 :] == [HOME, BESIDE_GATEWAY] * 2
+    assert left_s[there + 1] - left_s[there] > 150.0
+    assert left_s[there + 3] - left_s[there + 1] > 300.0
+
+
 def test_a_drone_that_knows_no_place_and_is_where_it_was_connected_last_stays_and_says_so():
     rig = Rig()
     rig.engine.place = Location(12.0, 0.0, 0.0)
@@ -1065,6 +1080,31 @@ def test_a_drone_whose_neighbours_fell_silent_together_looks_around_once_and_com
     assert rig.engine.goals == [there, HOME]
     rig.wait(30.0)
     assert len(rig.engine.goals) > 2
+
+
+def test_on_the_ground_it_asks_again_as_those_that_heard_it_in_flight_say_nothing_by_themselves():
+    rig = silent_rig()
+    rig.wait_until(EMERGENCY_S + 0.1)
+    fly(rig, rig.engine.goals[0])
+    rig.hear("09 09 03 01 fe 01 01")
+    while "LANDED" not in rig.kinds():
+        rig.antenna.broadcasts.clear()
+        rig.wait(0.1)
+    assert REQUEST in [payload[2] for payload in rig.antenna.broadcasts]
+    rig.hear(place(9, 8.0))
+    rig.wait(7.0)
+    assert len(rig.engine.goals) == 1
+
+
+def test_later_looks_at_the_same_place_end_at_other_spots():
+    rig = silent_rig()
+    while rig.now_s < 1300.0:
+        rig.wait(1.0)
+        rig.engine.place = (rig.engine.goals or [HOME])[-1]
+    goals = rig.engine.goals
+    looks = [goal for goal, after in zip(goals, goals[1:]) if after == HOME]  # and not legs
+    assert len(looks) == len(set(looks)) == 3
+    assert all(look.distance_m(Location(4.0, 0.0, 0.0)) < 13.0 for look in looks)
 
 
 def test_it_stays_where_it_hears_a_node_that_it_did_not_know():
