@@ -129,7 +129,7 @@ class InProcessAir(IInProcessAir):
         if not near:
             self._links[one].pop(other, None)
             self._links[other].pop(one, None)
-        elif frozenset((one, other)) not in self._cut:
+        elif not self.is_cut(one, other):
             self._links[one][other] = self._antennas[other]
             self._links[other][one] = self._antennas[one]
 
@@ -140,6 +140,10 @@ class InProcessAir(IInProcessAir):
         (self._cut.add if off else self._cut.discard)(frozenset((one, other)))
         self._unlink(one)
         self._link(one)
+
+    def is_cut(self, one: int, other: int) -> bool:
+        """Whether `cut` ended the link between two nodes, wherever they are."""
+        return frozenset((one, other)) in self._cut
 
     def in_range(self, node: int) -> dict[int, InProcessAntenna]:
         """By id: the antennas that `node` could reach if they were on. Do not modify."""
@@ -170,7 +174,7 @@ class InProcessAir(IInProcessAir):
         if self.sees is not None:
             heard = {n: heard[n] for n in heard if self.sees(here, others[n])}
         if self._cut:
-            return {n: heard[n] for n in heard if frozenset((node, n)) not in self._cut}
+            return {n: heard[n] for n in heard if not self.is_cut(node, n)}
         return heard
 
     def _link(self, node: int) -> None:

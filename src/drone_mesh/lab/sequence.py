@@ -76,6 +76,13 @@ class SequenceRun(Simulation):
                 changed_s = network.now_s()
             before = now
 
+    def is_able(self, node: int) -> bool:
+        """Also: links to nodes with a path to the gateway still work, wherever the drone flies."""
+        air = self.network.air
+        assert isinstance(air, InProcessAir)
+        helpers = physical_graph(self.network).hops_from([GATEWAY], {node})
+        return super().is_able(node) and not all(air.is_cut(node, other) for other in helpers)
+
     def _alive(self) -> list[int]:
         """Routers with power."""
         nodes = self.network.nodes

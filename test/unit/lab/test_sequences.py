@@ -36,6 +36,26 @@ def test_no_drone_rests_at_the_place_of_one_that_was_silent_or_lost_a_link(numbe
     assert resting_close(record) == 0
 
 
+@pytest.mark.parametrize(("density", "number"), [([5, 6.5], 1520), ([7, 9], 1250)])
+def test_a_lone_drone_whose_link_to_the_gateway_failed_for_good_finds_others(density, number):
+    """The next ones are 9.1 and 9.2 m from where it first lands beside the gateway."""
+    incidents = ["silent_for_a_while", "links_cut", "cut_vertex_killed", "many_killed"]
+    content = {"sequence": {"density": density, "incidents": incidents}, "sample_s": 2}
+    record = SequenceRun(Scenario.model_validate(content), Streams(0, number)).run()
+    assert record.left_behind == {}
+
+
+def test_no_repair_is_expected_of_a_drone_whose_links_have_all_failed():
+    run = SequenceRun(Scenario.model_validate({"sequence": {"drones": [8, 8]}}), Streams(0, 1))
+    record = run.run()
+    lost = min(record.able)
+    for other in run.network.nodes.keys() - {lost, 0}:
+        run.network.air.cut(lost, other)
+    assert run.is_able(lost)
+    run.network.air.cut(lost, 0)
+    assert not run.is_able(lost)
+
+
 @pytest.mark.parametrize("number", range(8))
 def test_drones_that_know_where_the_gateway_moved_are_not_left_behind(number):
     content = {"sequence": {"incidents": ["gateway_moved"], "drones": [8, 30]}, "sample_s": 2}

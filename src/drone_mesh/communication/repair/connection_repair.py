@@ -180,10 +180,10 @@ class ConnectionRepair(RepairViews):
         self._flies_to_place_of = step.owner if step in self.steps else NO_ROUTE
         if step.owner != self.node_id:
             self._tried_goals.append(step.place)
-            if self.silent:
-                self._tried_spots.append(flight.goal)
+            self._tried_spots.append(flight.goal)
         elif self._flight is not None and self._tried_goals:
             self._tried_goals.pop()  # it turns back before it has been there
+            self._tried_spots.pop()
         self._parts.neighbours.forget_all()
         self._parts.neighbours.takes_off(by_order=False)
         self._parts.routing.node_moved_location()
@@ -291,7 +291,7 @@ class ConnectionRepair(RepairViews):
         if self.silent:
             known = [step.place, *self._taken.all(), *self._tried_spots]
             return own_spot(step.place, self.node_id, self.clearance_m, known)
-        return self._taken.at_or_beside(step.place, self._landing(step))
+        return self._taken.at_or_beside(step.place, self._landing(step), self._tried_spots)
 
     def _landing(self, step: Step) -> Landing:
         """Where the drone comes from, and which links it needs at the place of the lost node.
@@ -300,6 +300,8 @@ class ConnectionRepair(RepairViews):
         leaves, which another one may take, and to a relay that it does not know, on the way to the
         gateway.
         """
+        near_m = 2 * PITCH * self.clearance_m
+        tried = [spot for spot in self._tried_spots if spot.distance_m(step.place) < near_m]
         neighbours = self._parts.neighbours
         heard = [neighbours.place_of(node) for node in sorted(neighbours.ids())]
         origin = self.own_place() or step.place
@@ -309,6 +311,8 @@ class ConnectionRepair(RepairViews):
         if gateway is not None and not step.home:
             away_m = min(self.range_m - PITCH * self.clearance_m, step.place.distance_m(gateway))
             links.append(step.place.towards(gateway, away_m))
+        if tried:  # there it heard nobody: now from the other side
+            origin = Location(*(2.0 * mid - spot for mid, spot in zip(step.place, tried[-1])))
         return Landing(origin, [] if step.home else links)
 
     def _plan_emergency(self) -> None:

@@ -146,10 +146,7 @@ class IRepairActions(abc.ABC):
 
     @abc.abstractmethod
     def try_again(self) -> None:
-        """Forget where the drone was in vain, except where it is now.
-
-        In a silence it will look around at other spots.
-        """
+        """Let it fly once more to where it was in vain; it lands at another side of each place."""
 
     @abc.abstractmethod
     def fly(self, step: Step, until_connected: bool = False) -> None:

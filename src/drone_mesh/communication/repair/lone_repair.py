@@ -77,7 +77,6 @@ class LoneRepair(IRepairStrategy):
         A drone that lost a single neighbour may connect at once: that one has probably died.
         """
         if self._stood_at is not None:
-            self.mesh.ask_places()  # those that heard it in flight would not answer a PRESENT
             self.listens, self._landed_s = self._in_silence, self.mesh.now_s
             self.mesh.wait_until(self.mesh.now_s + self.mesh.medium.stretched(LISTENS_S))
 

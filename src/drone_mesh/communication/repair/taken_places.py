@@ -5,6 +5,8 @@ docs/protocol.md, "Places of silent drones".
 
 from __future__ import annotations
 
+from typing import Sequence
+
 from drone_mesh.communication.parts import NodeParts
 from drone_mesh.communication.repair.options import LostPlace, RepairOptions
 from drone_mesh.communication.repair.spots import Landing, free_spot
@@ -32,14 +34,18 @@ class TakenPlaces:
             if node != me and not (exact and now_s - heard.heard_s > FRESH_S)
         ]
 
-    def is_free(self, spot: Location) -> bool:
-        """Whether no other drone is within the clearance."""
+    def is_free(self, spot: Location, tried: Sequence[Location] = ()) -> bool:
+        """Whether no other drone is within the clearance, and no spot where it was in vain."""
         clearance_m = self._options.clearance_m
-        return all(spot.distance_m(other) >= clearance_m for other in self.all())
+        return all(spot.distance_m(other) >= clearance_m for other in [*self.all(), *tried])
 
-    def at_or_beside(self, place: Location, landing: Landing) -> Location:
-        """`place` if that is free, else the best spot near it."""
-        return place if self.is_free(place) else self.beside(place, landing)
+    def at_or_beside(
+        self, place: Location, landing: Landing, tried: Sequence[Location] = ()
+    ) -> Location:
+        """`place` if that is free, else the best spot near it; none of those that it `tried`."""
+        if self.is_free(place, tried):
+            return place
+        return free_spot(place, landing, self._options, [*self.all(), *tried])
 
     def beside(self, place: Location, landing: Landing, skip: int = 0) -> Location:
         """The best free spot near `place`; `skip`: see free_spot."""

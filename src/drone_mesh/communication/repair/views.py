@@ -33,7 +33,7 @@ class RepairViews(IRepairActions):
         self._control = control
         self._options = options
         self._tried_goals: list[Location] = []  # goals of this drone since it was last connected
-        self._tried_spots: list[Location] = []  # where it looked around in a silence since then
+        self._tried_spots: list[Location] = []  # where it landed for these
 
     @property
     def node_id(self) -> int:
@@ -124,10 +124,7 @@ class RepairViews(IRepairActions):
         return any(step.place.distance_m(place) < radius_m for place in places)
 
     def try_again(self) -> None:  # noqa: D102
-        here, near_m = self._parts.pilot.place(), 2 * PITCH * self.clearance_m
-        self._tried_goals = [
-            goal for goal in self._tried_goals if here and goal.distance_m(here) <= near_m
-        ]
+        self._tried_goals.clear()
 
     def _view(self, node: int) -> NeighbourView:
         heard, hops = self._parts.neighbours.place_of(node), self._parts.neighbours.hops_of(node)
