@@ -71,7 +71,7 @@ def left_behind(run: RunRecord) -> float:
     return float(len(run.left_behind))
 
 
-@metric("drones", "of these, the ones that can fly and know where a gateway is", better="less")
+@metric("drones", "the ones that can fly, have a link left and know a gateway", better="less")
 def left_able(run: RunRecord) -> float:
     return float(len(run.left_behind.keys() & run.able))
 
