@@ -119,9 +119,49 @@ class MeshConsoleTest(unittest.TestCase):
         wait_for("paused", WALL_LIMIT_S, lambda: page.clock["paused"])
         self.assertTrue(page.order(do="speed", paused=False, factor=5)["done"])
         wait_for("faster", WALL_LIMIT_S, lambda: page.clock["factor"] == 5)
+        two = page.order(do="formation", name="two", places=[[1, 3, 5, 0], [2, 6, 5, 0]])
+        self.assertTrue(two["done"], two["text"])
+        places = [[3.0, 5.0, 0.0], [6.0, 5.0, 0.0]]
+        wait_for(
+            "both at their places",
+            WALL_LIMIT_S,
+            lambda: [page.nodes[n]["position"] for n in ("1", "2")] == places,
+        )
+        wait_for("all connected after it", WALL_LIMIT_S, page.all_connected)
         self.assertTrue(page.order(do="layout", case=1)["done"])
         wait_for("1 flies", WALL_LIMIT_S, lambda: page.nodes["1"]["path"])
         self.assertEqual(log.failures(), [])
+
+    def test_1_the_origin_is_that_of_the_running_simulation(self) -> None:
+        open_page()
+        with urlopen(f"http://{HOST}/earth/places.geojson", timeout=5) as answer:
+            places = json.load(answer)["features"]
+        self.assertEqual([place["properties"]["drone"] for place in places], [1, 2])
+        self.assertAlmostEqual(places[0]["geometry"]["coordinates"][1], 52.09, delta=0.01)
+
+    def test_7_a_layout_whose_drones_have_no_route_yet_is_kept_and_carried_out_later(self) -> None:
+        page = open_page()
+        wait_for("two connected routers", WALL_LIMIT_S, page.all_connected)
+        for node in (1, 2):
+            self.assertTrue(page.order(do="power", node=node, on=False)["done"])
+        wait_for(
+            "both are off", WALL_LIMIT_S, lambda: not any(page.nodes[n]["on"] for n in ("1", "2"))
+        )
+        lost = "the gateway to have no route to them"
+        wait_for(lost, WALL_LIMIT_S, lambda: page.nodes["0"]["neighbours"] == 0)
+        kept = page.order(do="formation", name="kept", places=[[1, 4, 4, 0], [2, 7, 4, 0]])
+        self.assertTrue(kept["done"], kept["text"])
+        self.assertIn("no route yet to drones 1..2", kept["text"])
+        for node in (1, 2):
+            self.assertTrue(page.order(do="power", node=node, on=True)["done"])
+        wait_for(
+            "both at their places",
+            WALL_LIMIT_S,
+            lambda: (
+                [page.nodes[n]["position"] for n in ("1", "2")]
+                == [[4.0, 4.0, 0.0], [7.0, 4.0, 0.0]]
+            ),
+        )
 
     def test_2_what_cannot_be_done_is_answered_in_words(self) -> None:
         page = open_page()

@@ -145,7 +145,7 @@ _DONE = {"pause": "paused", "resume": "resumed", "stop": "ended"}
 
 
 def _outcome(name: str, answer: OrderLayoutResponse | OrderFormationResponse) -> str:
-    if not (answer.sent or answer.later):
+    if not (answer.sent or answer.later or answer.no_route):  # the manager keeps those
         raise OrderRefused(f"{name}: {answer.message}")
     return f"{name}: {answer.message}"
 
