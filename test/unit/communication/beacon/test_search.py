@@ -44,3 +44,33 @@ def test_a_node_repeats_the_search_of_another_and_waits_before_its_own(routes, s
     routes.now_s = 400 * HOP_S
     searches.search(22, 2)
     assert sent[1:] == [(1, b"\x16\x01\x00\x02")]
+
+
+def test_on_a_fast_medium_the_same_node_is_searched_again_after_six_tenths_of_a_second(
+    routes, sent
+):
+    searches = Searches(1, routes, lambda *_: sent.append(routes.now_s), 1e-5)
+    for step in range(14):
+        routes.now_s = step / 8
+        searches.search(21, 2)
+    assert sent == [0.0, 0.625, 1.25]
+
+
+def test_after_five_searches_in_vain_it_pauses_for_ten_seconds(routes, searches, sent):
+    searched_s = []
+    for second in range(40):
+        routes.now_s = 2.0 * second
+        searches.search(21, 2)
+        if len(sent) > len(searched_s):
+            searched_s.append(routes.now_s)
+    assert searched_s[:7] == [0.0, 2.0, 4.0, 6.0, 8.0, 18.0, 20.0]
+
+
+@pytest.mark.parametrize(("after_s", "repeated"), [(4.0, 1), (6.0, 2)])
+def test_a_search_that_comes_again_is_repeated_once_within_five_seconds(
+    routes, searches, sent, after_s, repeated
+):
+    searches.heard(3, 3, FOR_21)
+    routes.now_s = after_s
+    searches.heard(3, 4, FOR_21)
+    assert len(sent) == repeated

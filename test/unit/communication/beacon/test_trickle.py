@@ -25,6 +25,23 @@ def test_the_interval_grows_to_a_bound_that_still_shows_a_dead_parent_in_time(tr
     assert trickle.interval_s == AT_REST_S
 
 
+def test_an_interval_is_a_third_longer_than_the_one_before_it(trickle):
+    intervals = []
+    for _ in range(4):
+        trickle.sent(trickle.due_s)
+        intervals.append(trickle.interval_s)
+    assert intervals == pytest.approx([0.5, 0.65, 0.845, 1.0985])
+
+
+def test_beacons_come_up_to_a_fifth_of_the_interval_early_or_late(trickle):
+    shares = []
+    for turn in range(200):
+        trickle.sent(10.0 * turn)
+        shares.append((trickle.due_s - 10.0 * turn) / trickle.interval_s)
+    assert 0.8 <= min(shares) < 0.82
+    assert 1.18 < max(shares) <= 1.2
+
+
 def test_a_change_makes_the_interval_short_again(trickle):
     for _ in range(10):
         trickle.sent(trickle.due_s)
