@@ -126,6 +126,19 @@ def test_a_drone_that_others_fly_stays_reachable():
     assert served >= 0.99
 
 
+def test_drones_at_rest_do_without_links_that_only_fading_makes():
+    network = grid(side=5, rate="250k", fading="rayleigh")
+    network.run_for(20.0)
+    parents = {node: network.path_to_gateway(node) for node in network.nodes}
+    lengths = [
+        network.location(path[0]).distance_m(network.location(path[1]))
+        for path in parents.values()
+        if path is not None and len(path) > 1
+    ]
+    assert len(lengths) == 24
+    assert sum(length_m > 9.0 for length_m in lengths) <= 2
+
+
 def test_it_works_without_positions():
     network = moving(radio="disc")
     for node in network.nodes.values():

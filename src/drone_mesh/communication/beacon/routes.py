@@ -9,6 +9,7 @@ import math
 from operator import itemgetter
 from typing import Callable, Iterator, NamedTuple, Tuple
 
+from drone_mesh.communication.beacon.losses import WRONG, Losses
 from drone_mesh.communication.beacon.packets import (
     ANCESTORS,
     NO_ANCESTORS,
@@ -29,7 +30,6 @@ FRESH = 2.5  # intervals: a neighbour that was silent for longer is none
 BACK = 2  # sequence numbers: a new neighbour that is further behind the others may lead nowhere
 STALE = 5.0  # intervals: a neighbour whose number was not a new one for longer leads nowhere
 REACH = 0.97  # of the range: two nodes further apart are expected to lose each other
-WRONG = 1.15  # of the range: a neighbour heard from further away, or this node, errs in its place
 LEAVES, GONE = 1.0, 3.0  # hops that a detour may cost around a link that will break, or should have
 ANOTHER_GATEWAY = 1.5  # hops that another gateway must be nearer
 OFFLINE = 256.0  # hops: any gateway with internet is nearer than one without
@@ -53,8 +53,8 @@ class Neighbour:
     """What is known of one neighbour."""
 
     __slots__ = (
-        "alive_s", "announced_s", "apart_m", "beacon", "failed_s", "heard_s", "listed_s", "motion",
-        "near_s", "node", "reported_s",
+        "alive_s", "announced_s", "apart_m", "beacon", "failed_s", "heard_s", "listed_s", "loss",
+        "motion", "near_s", "node", "reported_s",
     )  # fmt: skip
 
     def __init__(self, node: int) -> None:
@@ -64,6 +64,7 @@ class Neighbour:
         self.motion: Motion | None = None  # the last one that it reported
         self.reported_s = -math.inf
         self.apart_m = 0.0  # then
+        self.loss = 0.0  # of its link, in hops
         self.announced_s: dict[int, float] = {}  # the nodes below it, and since when
         self.listed_s: dict[int, float] = {}  # and when it listed them last
         self.near_s: dict[int, float] = {}  # its own neighbours, and when it showed them
@@ -133,6 +134,7 @@ class BeaconRoutes(IRoutes):
         self._new: set[int] = set()  # below, since this node has announced it last
         self._announced_last = self._shown_last = 0
         self._place_of = place_of
+        self._losses = Losses(range_m)
         self._below_s: dict[int, float] = {}  # the nodes below, and when they were last
 
     # What it learns ----------------------------------------------------------------------------
@@ -148,6 +150,10 @@ class BeaconRoutes(IRoutes):
                 self._new.add(node)
             self._new.update(beacon.below.new)
         neighbour.heard(beacon, self.motion, self.now_s)
+        if self.motion is not None and beacon.motion is not None:
+            neighbour.loss = self._losses.heard(
+                node, beacon.interval_s, self.motion.place, beacon.motion.place, self.now_s
+            )
         if beacon.gateway not in (NO_ROUTE, self._node_id):
             self._take_number(node, beacon)
         return is_new
@@ -302,7 +308,11 @@ class BeaconRoutes(IRoutes):
         return beacon.hops + ANOTHER_GATEWAY
 
     def risk(self, neighbour: Neighbour) -> float:
-        """What the expected end of the link to a neighbour costs, in hops (Su et al. 2001)."""
+        """What losses on the link to a neighbour, or its expected end, cost in hops."""
+        return max(neighbour.loss, self._end_of(neighbour))
+
+    def _end_of(self, neighbour: Neighbour) -> float:
+        """What the expected end of a link costs (Su et al. 2001)."""
         own, other = self.motion, neighbour.motion
         if own is None or other is None or neighbour.apart_m > WRONG * self._range_m:
             return 0.0

@@ -242,3 +242,23 @@ def test_a_node_is_looked_for_where_it_was_seen():
     assert ways(routes, 50) == [1]
     routes.now_s = 11.0
     assert ways(routes, 50) == []
+
+
+def test_a_way_over_a_link_that_loses_most_beacons_costs_more_than_a_hop(routes):
+    routes.motion = Motion(Location(0.0, 0.0, 0.0), STILL)
+    for interval in range(30):
+        routes.now_s = float(interval)
+        routes.heard(2, beacon(hops=2, parent=3, number=interval, x=5.0))
+        if interval % 4 == 0:
+            routes.heard(1, beacon(hops=1, number=interval, x=9.0))
+        routes.expired()
+        routes.choose()
+    assert routes.parent == 2
+
+
+def test_one_lucky_beacon_from_beyond_the_range_makes_no_parent(routes):
+    routes.motion = Motion(Location(0.0, 0.0, 0.0), STILL)
+    routes.heard(2, beacon(hops=2, parent=3, x=5.0))
+    routes.heard(1, beacon(hops=1, x=14.0))
+    routes.choose()
+    assert routes.parent == 2
