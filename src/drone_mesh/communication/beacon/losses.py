@@ -43,12 +43,14 @@ class Losses:
     ) -> float:
         """A beacon came; those that were due before it were lost. Returns the cost in hops."""
         before = self._heard.get(node)
-        if before is not None and now_s - before.at_s > FORGOTTEN * before.interval_s:
-            before = None
         self._heard[node] = _Heard(now_s, interval_s, own, place)
+        due = 1 if before is None else max(1, round((now_s - before.at_s) / before.interval_s))
+        if due == 1 and self._kept.get(node) == 1.0:
+            return 0.0  # wherever it is
+        if due > FORGOTTEN:
+            before = None
         is_far = WRONG < own.distance_m(place) / self._range_m <= LUCKY
         if before is not None and self._stood(before, own, place):
-            due = max(1, round((now_s - before.at_s) / before.interval_s))
             kept = self._kept[node] * (1.0 - WEIGHT) ** due + WEIGHT
         elif not is_far:
             kept = 1.0

@@ -238,8 +238,7 @@ class BeaconPlane(IControlPlane):
         """Schedule the next call of `on_time`."""
         due_s = self._trickle.due_s
         routes = self._routes
-        if routes.neighbours:
-            due_s = min(due_s, min([n.until_s() for n in routes.neighbours.values()]) + 1e-3)
+        due_s = min(due_s, routes.first_end_s() + 1e-3)
         parent = routes.neighbours.get(routes.parent)
         if parent is not None:
             again_s = self._probed_s + parent.beacon.interval_s + 1e-3

@@ -6,7 +6,7 @@ docs/protocol.md, "Beacons", describes the rules.
 from __future__ import annotations
 
 import math
-from operator import itemgetter
+from operator import attrgetter, itemgetter
 from typing import Callable, Iterator, NamedTuple, Tuple
 
 from drone_mesh.communication.beacon.losses import WRONG, Losses
@@ -25,6 +25,8 @@ from drone_mesh.communication.ways import IRoutes
 _WAY_UP = itemgetter(
     *map(Beacon._fields.index, ("gateway", "hops", "parent", "ancestors", "offline"))
 )
+
+_UNTIL_S = attrgetter("until_s")
 
 FRESH = 2.5  # intervals: a neighbour that was silent for longer is none
 BACK = 2  # sequence numbers: a new neighbour that is further behind the others may lead nowhere
@@ -54,13 +56,14 @@ class Neighbour:
 
     __slots__ = (
         "alive_s", "announced_s", "apart_m", "beacon", "failed_s", "heard_s", "listed_s", "loss",
-        "motion", "near_s", "node", "reported_s",
+        "motion", "near_s", "node", "reported_s", "until_s",
     )  # fmt: skip
 
     def __init__(self, node: int) -> None:
         self.node = node
         self.beacon: Beacon
         self.heard_s = self.alive_s = self.failed_s = -math.inf
+        self.until_s = -math.inf  # it counts as a neighbour without a further sign of life
         self.motion: Motion | None = None  # the last one that it reported
         self.reported_s = -math.inf
         self.apart_m = 0.0  # then
@@ -76,7 +79,8 @@ class Neighbour:
 
     def heard(self, beacon: Beacon, own: Motion | None, now_s: float) -> None:
         """Its beacon arrived, while this node was where `own` says."""
-        self.beacon, self.heard_s, self.alive_s = beacon, now_s, now_s
+        self.beacon, self.heard_s = beacon, now_s
+        self.alive(now_s)
         if beacon.motion is not None:
             self.motion, self.reported_s = beacon.motion, now_s
             self.apart_m = 0.0 if own is None else own.place.distance_m(beacon.motion.place)
@@ -94,9 +98,10 @@ class Neighbour:
             self.announced_s.update(dict.fromkeys(new, now_s))
             self.listed_s.update(dict.fromkeys(new, now_s))
 
-    def until_s(self) -> float:
-        """Until when it counts as a neighbour without a further sign of life."""
-        return self.alive_s + FRESH * self.beacon.interval_s
+    def alive(self, now_s: float) -> None:
+        """A sign of life."""
+        self.alive_s = now_s
+        self.until_s = now_s + FRESH * self.beacon.interval_s
 
 
 class BeaconRoutes(IRoutes):
@@ -171,7 +176,9 @@ class BeaconRoutes(IRoutes):
             by = newer(number, known[0])
             if by > 0 or (by < -BACK and self._is_stale(node, gateway)):  # perhaps a restart
                 self._numbers[node, gateway] = number, now_s
-        if ahead > 0 or now_s - newest_s > STALE * self._slowest_s():
+        age_s = now_s - newest_s  # mostly less than the neighbour's own interval allows
+        is_old = age_s > STALE * beacon.interval_s and age_s > STALE * self._slowest_s()
+        if ahead > 0 or is_old:
             self._newest[gateway] = number, now_s, beacon.offline
 
     def is_news(self, node: int, beacon: Beacon) -> bool:
@@ -192,7 +199,7 @@ class BeaconRoutes(IRoutes):
         """A sign of life of a node: a packet of it, or an acknowledgement."""
         neighbour = self.neighbours.get(node)
         if neighbour is not None:
-            neighbour.alive_s = self.now_s
+            neighbour.alive(self.now_s)
 
     def failed(self, node: int) -> None:
         """A neighbour did not take a packet."""
@@ -212,10 +219,16 @@ class BeaconRoutes(IRoutes):
 
     def expired(self) -> list[int]:
         """Forget the neighbours that were silent for too long; returns them."""
-        old = [n.node for n in self.neighbours.values() if self.now_s > n.until_s()]
+        if self.now_s <= self.first_end_s():
+            return []
+        old = [n.node for n in self.neighbours.values() if self.now_s > n.until_s]
         for node in old:
             del self.neighbours[node]
         return old
+
+    def first_end_s(self) -> float:
+        """When the first neighbour will have been silent for too long."""
+        return min(map(_UNTIL_S, self.neighbours.values()), default=math.inf)
 
     # The way up --------------------------------------------------------------------------------
 
@@ -229,8 +242,9 @@ class BeaconRoutes(IRoutes):
         if present is not None and self._leads_up(present):
             best = self._rank(present)
         for neighbour in self.neighbours.values():
-            # Most cannot be better, whatever the risk of their links.
-            least = self._hops_through(neighbour), neighbour is not present
+            if neighbour is present or (best is not None and neighbour.beacon.hops > best[0]):
+                continue  # most are not better, whatever the risk of their links
+            least = self._hops_through(neighbour), True
             if (best is None or least < best) and self._leads_up(neighbour):
                 rank = self._rank(neighbour)
                 best = rank if best is None else min(best, rank)
@@ -308,19 +322,16 @@ class BeaconRoutes(IRoutes):
         return beacon.hops + ANOTHER_GATEWAY
 
     def risk(self, neighbour: Neighbour) -> float:
-        """What losses on the link to a neighbour, or its expected end, cost in hops."""
-        return max(neighbour.loss, self._end_of(neighbour))
-
-    def _end_of(self, neighbour: Neighbour) -> float:
-        """What the expected end of a link costs (Su et al. 2001)."""
-        own, other = self.motion, neighbour.motion
+        """What losses on the link to a neighbour, or its expected end (Su et al. 2001), cost."""
+        own, other, loss = self.motion, neighbour.motion, neighbour.loss
         if own is None or other is None or neighbour.apart_m > WRONG * self._range_m:
-            return 0.0
+            return loss
         reach_m, age_s = REACH * self._range_m, self.now_s - neighbour.reported_s
         if own.apart_m(0.0, other, age_s) > reach_m:
-            return GONE
+            return max(loss, GONE)
         soon_s = neighbour.beacon.interval_s
-        return LEAVES if own.apart_m(soon_s, other, age_s + soon_s) > reach_m else 0.0
+        leaves = own.apart_m(soon_s, other, age_s + soon_s) > reach_m
+        return max(loss, LEAVES) if leaves else loss
 
     # Any way -----------------------------------------------------------------------------------
 
