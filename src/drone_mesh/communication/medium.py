@@ -13,6 +13,9 @@ FAST_HOP_S = 0.0026  # of an nRF24L01+ at 250 kbit/s; the times of the mesh suit
 class Medium:
     """Properties of a medium. The defaults are those of links that do not disturb each other.
 
+    A node that looks for a gateway searches again after `search_s`, and then after twice as long
+    each time (Trickle, RFC 6206), since broadcasts are not acknowledged.
+
     On a shared channel every packet costs all nodes in range airtime, and one lost packet says
     little. There the antenna queues packets and makes all attempts itself (the mesh adds none), and
     later reports what it could not deliver. The mesh sends fewer packets:
@@ -20,8 +23,6 @@ class Medium:
     * MISSING is one broadcast, and the same node is not announced again within `missing_quiet_s`;
     * a node that looks for a gateway is answered by one PRESENT for all, after a random part of
       `answer_spread_s`, unless another node answered first (Trickle, RFC 6206: suppression);
-    * a node that looks for a gateway searches again after `search_s`, and then after twice as long
-      each time (Trickle, RFC 6206), since broadcasts are not acknowledged;
     * a router asks one neighbour at a time for its gateway, for `answer_s`;
     * what is known to work is not probed in each round: a neighbour that was heard within
       `heard_periods` check periods, or longer on a busy channel (IWirelessCommunication.patience).
@@ -37,7 +38,7 @@ class Medium:
     answer_per_hop_s: float = 0.0  # additional time for each hop to the gateway
     heartbeats: int = 1
     answer_spread_s: float = 0.0
-    search_s: float = 0.0
+    search_s: float = 0.25
     missing_quiet_s: float = 0.0
     silence_s: float = 0.0  # a neighbour heard within this time survives one undelivered packet
     heard_periods: float = 0.0

@@ -46,6 +46,7 @@ class GatewayConnection:
         self._introduce = introduce
         self._heartbeat_sent_s = -math.inf
         self._answered_s = -math.inf
+        self.just_lost = False  # the last route failed since the last check
         self._shown_connected = False
         self._shortcut: Shortcut | None = None
         self._tried = NO_ROUTE  # the neighbour of the latest heartbeat's shortcut or detour
@@ -85,8 +86,9 @@ class GatewayConnection:
         heartbeat = self._parts.heartbeat(gateway, gateway, was_connected, gateway)
         if self._parts.delivery.send_own(heartbeat):
             return True
-        self._heartbeat_sent_s = -math.inf
-        self.answer_missed()
+        if self._states.awaiting:  # otherwise the loss of the route has been noticed
+            self._heartbeat_sent_s = -math.inf
+            self.answer_missed()
         return False
 
     def _sent_over_shortcut(self, connected: bool) -> bool:
@@ -144,17 +146,26 @@ class GatewayConnection:
         was_connected = self._states.connected
         self._states.happened(RouterEvent.ANSWER_MISSED)
         self._show()
-        if was_connected and self._parts.antenna.medium.shared:
+        if was_connected:
             self._introduce()  # neighbours that know another route answer
 
     def on_route_lost(self) -> None:
         """A route failed. If it was the only one to the gateway, look for another one at once.
 
-        First through the neighbour that presented itself as nearest to a gateway. On a medium that
-        is not shared, the next check is soon enough.
+        On a shared channel first through the neighbour that presented itself as nearest to a
+        gateway; elsewhere all neighbours are asked. One that led nowhere is given up at once.
         """
-        medium = self._parts.antenna.medium
-        if medium.shared and self._states.connected and self.next_hop() == NO_ROUTE:
+        connection = self._states.connection
+        if self.next_hop() != NO_ROUTE:
+            return
+        if not self._parts.antenna.medium.shared:
+            if connection is ConnectionState.CONNECTED:
+                self.end(RouterEvent.ROUTE_LOST)
+                self.just_lost = True
+                self._introduce()
+            elif connection is ConnectionState.AWAITING_FIRST_ANSWER:
+                self.end(RouterEvent.ROUTE_LOST)
+        elif self._states.connected:
             another = self.another_next_hop(NO_ROUTE)
             if another != NO_ROUTE:
                 self._parts.routing.other_can_communicate_with_node(another, self.gateway)
@@ -194,6 +205,7 @@ class GatewayConnection:
                 return False
             self._prefer(gateway)
         is_new = not self._states.connected
+        self.just_lost = False
         self._states.happened(RouterEvent.GATEWAY_ANSWERED)
         self.hops = min(hops, NO_ROUTE)
         self._answered_s = now_s

@@ -36,13 +36,14 @@ class Introduction:
         self._rng = parts.rng
         self._send_heartbeat = send_heartbeat
         self._medium = parts.antenna.medium
-        self._search_again_s = self._medium.search_s  # 0: no repetition before the next check
+        self._search_again_s = self._medium.search_s if self._medium.shared else math.inf
         self._is_answer = False  # the planned one answers a node that needs a gateway
 
     def broadcast(self) -> None:
         """Send PRESENT to each node in range.
 
-        On a shared channel a node without a gateway repeats it, less and less often.
+        A node without a gateway repeats it, less and less often; off a shared channel only if it
+        had one.
         """
         parts, node = self._parts, self._node
         hops, connected = node.get_hops_from_gateway_away(), node.get_connected_to_gateway()
@@ -56,7 +57,7 @@ class Introduction:
         parts.antenna.broadcast_message(payload)
         if connected:
             self._search_again_s = self._medium.search_s
-        elif self._search_again_s:
+        elif self._search_again_s < math.inf:
             wait_s = self._search_again_s * (0.5 + self._rng.random())
             self._search_again_s = min(2.0 * self._search_again_s, parts.timing.check_period_s)
             self._plan(wait_s)

@@ -65,12 +65,13 @@ class RouterHeartbeats(HeartbeatPlane):
         self._technique.maintain_routing()
         if was_connected:
             self._connection.check(self._antenna.patience())
-        elif before is not ConnectionState.SEARCHING:
-            pass  # a heartbeat is under way
+        elif self._connection.just_lost or before is not ConnectionState.SEARCHING:
+            pass  # a repair counts from the next check, or a heartbeat is under way
         elif self._connection.asks_gateway_that_resigned():
             pass  # it is in reach: a flight would repair nothing
         elif self._states.repair is not RepairState.FLYING:
             self._host.on_unconnected_check(due_s)
+        self._connection.just_lost = False
 
     def send_heartbeat(self, other: int) -> bool:
         """Send a heartbeat to `other`; the preferred gateway is expected to answer."""

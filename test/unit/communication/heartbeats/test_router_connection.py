@@ -557,6 +557,62 @@ def test_a_router_that_was_never_connected_knows_no_route_to_a_gateway():
     assert Rig().mesh.get_route_to_gateway() == NO_ROUTE
 
 
+# The last route fails between two checks -------------------------------------------------------
+
+
+def rig_that_loses_its_only_route():
+    """Neighbour 2 led to gateway 0 and reports at 1 s that it does not reach it any longer."""
+    rig = Rig()
+    rig.connect_through(2)
+    rig.wait_until(1.0)
+    rig.hear("02 02 05 01 01 00")
+    return rig
+
+
+def test_a_router_that_loses_its_only_route_asks_all_neighbours_at_once_and_less_and_less_often():
+    rig = rig_that_loses_its_only_route()
+    assert not rig.mesh.get_connected_to_gateway()
+    search = [packet("01 01 03 fe fe ff")]
+    assert rig.broadcasts() == search
+    for at_s in (1.25, 1.75, 2.75, 4.75):
+        rig.wait_until(at_s - 0.01)
+        assert rig.broadcasts() == []
+        rig.wait_until(at_s)
+        assert rig.broadcasts() == search
+
+
+def test_a_router_that_never_had_a_gateway_searches_at_its_checks():
+    rig = Rig()
+    rig.wait_until(14.9)
+    assert rig.broadcasts() == [packet("01 01 03 fe fe ff")]
+
+
+def test_a_router_with_another_route_remains_connected():
+    rig = Rig()
+    rig.connect_through(3)
+    rig.mesh.control.routes.other_can_communicate_with_node(2, 0)
+    rig.hear("02 02 05 01 01 00")
+    assert rig.mesh.get_connected_to_gateway()
+    assert rig.broadcasts() == []
+
+
+def test_a_loss_between_checks_makes_no_repair_hastier():
+    """The check at 5 s would have found it; the protocol of a lost connection starts at 15 s."""
+    rig = rig_that_loses_its_only_route()
+    rig.wait_until(44.9)
+    assert "EMERGENCY" not in rig.kinds()
+    rig.wait_until(45.0)
+    assert "EMERGENCY" in rig.kinds()
+
+
+def test_a_neighbour_that_led_nowhere_is_given_up_for_the_next_one_that_offers_a_gateway():
+    rig = rig_that_loses_its_only_route()
+    rig.hear("03 03 04 01 01 01 00 01")
+    assert rig.sent(HEARTBEAT)[-1] == packet("01 01 04 03 00 00 00 00")
+    rig.hear("03 03 05 01 01 00", "04 04 04 01 01 01 00 01")
+    assert rig.sent(HEARTBEAT)[-1] == packet("01 01 04 04 00 00 00 00")
+
+
 # A shared channel ----------------------------------------------------------------------------
 
 
