@@ -246,6 +246,8 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
             self._send_location(creator)
             return
         place, flies_there = asker
+        if flies_there:
+            self._neighbours.motion.flies_for_repair(creator, self._deadlines.now_s)
         self._neighbours.set_place(creator, place, self._deadlines.now_s)
         self._on_place_taken(place)
         self._send_location(creator)

@@ -44,6 +44,7 @@ from drone_mesh.communication.repair.status import NOTHING_TO_REPAIR, RepairStat
 from drone_mesh.communication.reports.node_reports import NodeReporter
 from drone_mesh.communication.router_states import RouterStates
 from drone_mesh.communication.routing.interfaces import IRoutingTechnique
+from drone_mesh.communication.seen_motion import SeenMotion
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.communication.ways import ITechnique
 from drone_mesh.drone.interfaces import IDroneEngine
@@ -91,9 +92,10 @@ class MeshNode(IMeshDebugInfo, IControlHost):
         self._options = options or RepairOptions()
         self._debug = debug
         self._deadlines = Deadlines()
-        self._neighbours = Neighbours(
-            self._timing.check_period_s, noticed_late=antenna.medium.shared
-        )
+        check_s, medium = self._timing.check_period_s, antenna.medium
+        asked_s = check_s * max(1.0, medium.place_periods)
+        motion = SeenMotion(self._options.range_m, asked_s)
+        self._neighbours = Neighbours(check_s, noticed_late=medium.shared, motion=motion)
         self._report = Reporter(node_id, self._deadlines, observer)
         self.complaints = Complaints(node_id)
         self._own_id = OwnId(rng)

@@ -6,6 +6,7 @@ import math
 from typing import NamedTuple
 
 from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.seen_motion import SeenMotion
 from drone_mesh.drone.location import Location
 
 
@@ -23,7 +24,7 @@ class Neighbours:
     gateway and place of a node are kept when it is no longer a neighbour.
     """
 
-    def __init__(self, check_period_s: float, noticed_late: bool) -> None:
+    def __init__(self, check_period_s: float, noticed_late: bool, motion: SeenMotion) -> None:
         """Neighbours that fall silent within a check period do so together.
 
         `noticed_late`: a loss may be noticed several checks later, as on a shared channel, so that
@@ -31,6 +32,7 @@ class Neighbours:
         """
         self._check_period_s = check_period_s
         self._noticed_late = noticed_late
+        self.motion = motion
         self._heard_s: dict[int, float] = {}
         self._fell_silent_s: dict[int, float] = {}  # when each of those lost did so
         self._stands_since_s = -math.inf  # infinity: this node flies
@@ -113,6 +115,7 @@ class Neighbours:
         known = self._places.get(node)
         if known is None or heard_s >= known.heard_s:
             self._places[node] = HeardPlace(place, heard_s)
+            self.motion.reported(node, place, heard_s)
 
     def place_of(self, node: int) -> HeardPlace | None:
         """The last reported place of `node`."""

@@ -21,6 +21,7 @@ from scenarios import (
 )
 
 from drone_mesh.inprocess import Network
+from drone_mesh.mobility import Area, Mobility, tracks_of
 
 TWO_MINUTES_S = 120.0
 
@@ -340,3 +341,35 @@ def test_a_drone_that_was_ordered_out_of_range_does_not_blame_its_medium():
     network.run_for(30.0)  # it has landed, and both its neighbours fell silent on the way
     assert network.location(1).latitude == 24.0
     assert run_until(network, lambda: network.connected(1), within_s=60.0)
+
+
+# Neighbours that others fly --------------------------------------------------------------------
+
+
+def with_a_relay_that_comes_and_goes():
+    """Gateway 0, router 2 at rest, and between them relay 1, out of reach for 62 s of 147 s."""
+    network = Network(seed=1)
+    network.add_gateway(0, 0.0, 0.0)
+    network.add_router(1, 6.0, -6.0)
+    network.add_router(2, 12.0, 0.0)
+    turns = [(73.3 * turn, 6.0, 16.0 if turn % 2 else -6.0, 0.0) for turn in range(6)]
+    mobility = Mobility("trace", knots={1: turns})
+    network.fly(tracks_of(mobility, {1: (6.0, -6.0, 0.0)}, [], Area(0.0, 0.0, 12.0, 12.0), seed=1))
+    return network
+
+
+def test_no_drone_flies_for_a_moving_neighbour_that_comes_back():
+    network = with_a_relay_that_comes_and_goes()
+    network.run_for(300.0)
+    assert len(events(network, "DISCONNECTED")) >= 4
+    assert flown(network) == set()
+
+
+def test_a_moving_neighbour_that_dies_is_replaced_all_the_same():
+    network = with_a_relay_that_comes_and_goes()
+    network.run_for(30.0)
+    network.power(1, False)
+    network.run_for(90.0)
+    assert flown(network) == set()
+    network.run_for(30.0)
+    assert flown(network) == {2}

@@ -31,6 +31,7 @@ from drone_mesh.communication.repair.views import RepairViews
 from drone_mesh.communication.router_states import RepairState, RouterEvent, RouterStates
 from drone_mesh.drone.location import Location
 
+MOVING_PATIENCE = 3.0  # our choice: while drones move by themselves, a lost link may come back
 ROUNDING_S = 1e-6  # sums of periods are not exact
 
 
@@ -64,7 +65,9 @@ class ConnectionRepair(RepairViews):
 
         Time is counted between due times, so that a late check does not cost a period.
         """
-        state = self._states.repair
+        state, here = self._states.repair, self._parts.pilot.place()
+        if here is not None:
+            self._parts.neighbours.motion.reported(self.node_id, here, due_s)
         if state is RepairState.AT_REST:
             self._notice_loss(due_s)
         elif state is RepairState.LOST:
@@ -317,6 +320,9 @@ class ConnectionRepair(RepairViews):
 
     def _plan_emergency(self) -> None:
         patience = self._strategy.patience(self.silent)
+        motion = self._parts.neighbours.motion
+        if motion.moved_since(self._lost_since_s - motion.within_s):
+            patience = max(patience, MOVING_PATIENCE)
         self._emergency_s = self._lost_since_s + self.connection_lost_after_s * patience
 
     def _notice_loss(self, due_s: float) -> None:
@@ -332,6 +338,7 @@ class ConnectionRepair(RepairViews):
         self._strategy.reason = ""
         self._strategy.on_stopped()
         self._parts.places.left_own_place(self._control.gateway)
+        self._parts.neighbours.motion.forget(self.node_id)
 
     def _clear(self) -> None:
         """Forget what was under way; not the end of a flight, which is due whatever happens."""

@@ -436,6 +436,17 @@ def test_a_router_without_neighbours_flies_to_the_place_to_step_back_to():
     assert rig.mesh.get_last_good_known_location_id() == 0
 
 
+def test_a_router_whose_neighbour_was_seen_to_move_waits_three_times_as_long():
+    rig = lone_rig()
+    rig.antenna.dead = set()
+    rig.hear(place(2, 9.5), place(2, 7.0))
+    rig.antenna.dead = {2}
+    rig.wait_until(104.0)
+    assert rig.engine.goals == []
+    rig.wait_until(106.0)
+    assert len(rig.engine.goals) == 1
+
+
 def test_a_router_that_knows_no_other_place_flies_to_the_gateway():
     rig = Rig()
     rig.engine.place = Location(12.0, 0.0, 0.0)
