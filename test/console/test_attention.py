@@ -125,4 +125,6 @@ def test_on_a_narrow_screen_nothing_sticks_out_or_overlaps(start_console, visit,
         assert page.page.evaluate(OVERLAPS) == []
     page.page.click("nav button[data-tab=nodes]")
     table = page.page.locator("#nodes-card .scroll")
+    longest = "(box) => { box.querySelector('.condition').textContent = 'disconnected' }"
+    table.evaluate(longest)
     assert table.evaluate("(box) => box.scrollWidth - box.clientWidth") == 0
