@@ -172,6 +172,13 @@ def test_with_a_key_beacons_are_sealed_and_everything_arrives():
     assert served >= 0.97
 
 
+def test_with_a_key_no_link_seems_to_lose_beacons_although_only_some_carry_a_place():
+    network = grid(side=4, radio="disc", rate=None, key=MeshKey(bytes(range(16))))
+    network.run_for(60.0)
+    routes = [node.component.control.routes for node in network.nodes.values()]
+    assert {neighbour.loss for known in routes for neighbour in known.neighbours.values()} == {0.0}
+
+
 def test_a_stranger_without_the_key_is_no_neighbour_of_those_who_have_it():
     key = MeshKey(bytes(range(16)))
     network = Network(seed=1, key=lambda node: None if node == 2 else key, **CHANNEL)

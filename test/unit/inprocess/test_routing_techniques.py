@@ -105,20 +105,21 @@ def share_on_losing_links(technique):
     return sum(shares) / len(shares)
 
 
-@pytest.fixture(scope="module")
-def share_of_tree():
-    return share_on_losing_links("child_table_tree")
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("technique", "lead"),
-    [("etx_tree", 0.25), ("babel", 0.25), ("batman", 0.0), (SHORTEST_PATH, 0.25)],
+    ("technique", "least"),
+    [
+        ("child_table_tree", 0.6),
+        ("batman", 0.6),
+        ("etx_tree", 0.85),
+        ("babel", 0.95),
+        (SHORTEST_PATH, 0.99),
+    ],
 )
-def test_on_links_that_lose_a_fifth_more_nodes_are_connected_than_with_the_tree(
-    technique, lead, share_of_tree
+def test_on_links_that_lose_a_fifth_etx_and_babel_connect_far_more_nodes_than_the_tree(
+    technique, least
 ):
-    assert share_on_losing_links(technique) > share_of_tree + lead
+    assert share_on_losing_links(technique) > least
 
 
 def test_flooding_survives_links_that_lose_a_fifth():

@@ -64,6 +64,8 @@ def test_without_a_key_a_stranger_sends_drones_kilometres_away(name):
         "far place and an outage",
         "requests for places jammed",
         "black hole",
+        "beacons of a black hole",
+        "beacons with numbers ahead",
     ],
 )
 def test_a_captured_node_neither_orders_nor_lures_nor_cuts_off(name):

@@ -155,9 +155,9 @@ class BeaconRoutes(IRoutes):
                 self._new.add(node)
             self._new.update(beacon.below.new)
         neighbour.heard(beacon, self.motion, self.now_s)
-        if self.motion is not None and beacon.motion is not None:
+        if self.motion is not None and neighbour.motion is not None:  # maybe of an earlier beacon
             neighbour.loss = self._losses.heard(
-                node, beacon.interval_s, self.motion.place, beacon.motion.place, self.now_s
+                node, beacon.interval_s, self.motion.place, neighbour.motion.place, self.now_s
             )
         if beacon.gateway not in (NO_ROUTE, self._node_id):
             self._take_number(node, beacon)

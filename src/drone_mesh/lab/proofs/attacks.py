@@ -228,8 +228,9 @@ def _replay(
     network = stranger.network
     stranger.listen()
     for place in (HERE, THERE):
-        network.order(1, place.longitude, place.latitude, allow_shared_place=True)
-        network.run_until(lambda at=place: network.location(1) == at, within_s=120.0)  # type: ignore[misc]
+        while network.location(1) != place:  # an order may get lost
+            network.order(1, place.longitude, place.latitude, allow_shared_place=True)
+            network.run_until(lambda at=place: network.location(1) == at, within_s=30.0)  # type: ignore[misc]
     network.run_for(15.0)
     meanwhile()
     orders = [r for r in stranger.record if r.payload[2] == MessageType.MOVE_TO_LOCATION]
