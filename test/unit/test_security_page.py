@@ -107,7 +107,7 @@ it costs only 2 bytes per message more
 
 256 messages earlier
 
-(by beacons 0 to 3, nonces 0 to 5), figures of 2026-11-22
+figures of 2026-11-23
 
 *A counter far ahead*: once in 2 s
 
