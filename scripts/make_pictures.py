@@ -145,9 +145,8 @@ def main() -> None:
     launch = ["roslaunch", "-p", MASTER_PORT, "drone_mesh"]
     with contextlib.ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        stack.enter_context(
-            running("Xvfb", SCREEN, "-screen", "0", f"{width}x{height}x24", "-nolisten", "tcp")
-        )
+        screen = f"-screen 0 {width}x{height}x24 -nolisten tcp -noreset"
+        stack.enter_context(running("Xvfb", SCREEN, *screen.split()))
         stack.enter_context(running(*launch, *factory))
         stack.enter_context(running(*launch, "--wait", *console))
         stack.enter_context(running(*launch, "--wait", "rviz.launch"))

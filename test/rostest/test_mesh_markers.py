@@ -141,8 +141,9 @@ class MeshMarkersTest(unittest.TestCase):
     def test_5_rviz_runs_with_the_shipped_configuration_and_looks_at_the_mesh(self) -> None:
         config = os.path.join(rospkg.RosPack().get_path("drone_mesh"), "config", "drone_mesh.rviz")
         read, write = os.pipe()
+        options = ["-screen", "0", "1000x700x24", "-nolisten", "tcp", "-noreset"]
         screen = subprocess.Popen(
-            ["Xvfb", "-displayfd", str(write), "-screen", "0", "1000x700x24", "-nolisten", "tcp"],
+            ["Xvfb", "-displayfd", str(write), *options],
             pass_fds=[write],
         )
         os.close(write)

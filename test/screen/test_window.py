@@ -38,10 +38,15 @@ needs_screen = pytest.mark.skipif(
 
 @pytest.fixture(scope="module")
 def display():
-    """A virtual screen of its own, with a number that the server chooses."""
+    """A virtual screen of its own, with a number that the server chooses.
+
+    Without ``-noreset`` the server starts over when its last client leaves, and refuses
+    whoever connects meanwhile: the window of the next test.
+    """
     read, write = os.pipe()
+    options = ["-screen", "0", "1300x820x24", "-nolisten", "tcp", "-noreset"]
     server = subprocess.Popen(
-        ["Xvfb", "-displayfd", str(write), "-screen", "0", "1300x820x24", "-nolisten", "tcp"],
+        ["Xvfb", "-displayfd", str(write), *options],
         pass_fds=[write],
         stderr=subprocess.DEVNULL,
     )
