@@ -56,6 +56,7 @@ class ConnectionRepair(RepairViews):
         self._was_silent = False
         self._flight: RepairFlight | None = None
         self._flies_to_place_of = NO_ROUTE
+        self._landed_unheard = False  # away from where it stood, and it has heard no node since
         strategy.start(self)
 
     # What the router reports -----------------------------------------------------------------
@@ -102,13 +103,20 @@ class ConnectionRepair(RepairViews):
         self._took_off()
 
     def on_neighbour_found(self, node: int) -> None:
-        """A new node is in reach. After a silence, give the mesh time to recover."""
+        """A new node is in reach. After a silence, give the mesh time to recover.
+
+        A drone that landed while no radio was heard may stand beside one that it never heard of.
+        """
         if self._was_silent:
             self._was_silent = False
             if self._states.repair is RepairState.LOST:
                 self._lost_since_s = self.now_s
                 self._plan_emergency()
         self._strategy.on_neighbour_found(node)
+        if self._landed_unheard:
+            self._landed_unheard = False
+            if not (self.connected or self._strategy.listens):
+                self._check_spot()
 
     def on_neighbour_lost(self, node: int) -> None:
         """A neighbour is out of reach."""
@@ -169,16 +177,7 @@ class ConnectionRepair(RepairViews):
     def fly(self, step: Step, until_connected: bool = False) -> None:
         """See IRepairActions; also for the functions below."""
         self._parts.report(MeshEventKind.FLIGHT_DECIDED, step.owner)
-        flight = RepairFlight(
-            self._parts,
-            self._control.introduce,
-            step.owner,
-            step.place,
-            self.goal_of(step),
-            self._options,
-            self._taken,
-            self._landing(step),
-        )
+        flight = self._new_flight(step, self.goal_of(step))
         flight.stops_when_connected = until_connected or step.home
         self._flies_to_place_of = step.owner if step in self.steps else NO_ROUTE
         if step.owner != self.node_id:
@@ -273,12 +272,40 @@ class ConnectionRepair(RepairViews):
 
     def on_landed(self) -> None:
         """The flight is over."""
-        was_repair, self._flight = self._flight is not None, None
+        flight, self._flight = self._flight, None
+        was_repair = flight is not None
+        self._landed_unheard = (
+            flight is not None and not flight.leads_back and not self._parts.neighbours.ids()
+        )
         if was_repair and self._flies_to_place_of == self._control.gateway and not self.connected:
             self._parts.places.gateway_not_found()
         self._control.end(RouterEvent.LANDED)
         if was_repair:
             self._strategy.on_landed()
+
+    def _check_spot(self) -> None:
+        """Ask who else is here, as after a flight, and step aside if anybody is too near."""
+        here = self.own_place()
+        if here is not None:
+            step = Step(here, self.node_id)
+            flight = self._new_flight(step, here)
+            self._flies_to_place_of = NO_ROUTE
+            self._took_off()
+            self._flight = flight
+            flight.ask_on_ground()
+            self.wait_until(self.now_s + self.medium.stretched(ASK_AGAIN_S))
+
+    def _new_flight(self, step: Step, goal: Location) -> RepairFlight:
+        return RepairFlight(
+            self._parts,
+            self._control.introduce,
+            step.owner,
+            step.place,
+            goal,
+            self._options,
+            self._taken,
+            self._landing(step),
+        )
 
     def _stands_clear(self, flight: RepairFlight) -> bool:
         if not flight.on_ground:
@@ -333,6 +360,7 @@ class ConnectionRepair(RepairViews):
         self._plan_emergency()
 
     def _took_off(self) -> None:
+        self._landed_unheard = False
         self._control.end(RouterEvent.TOOK_OFF)
         self._clear()
         self._strategy.reason = ""

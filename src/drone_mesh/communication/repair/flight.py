@@ -57,6 +57,11 @@ class RepairFlight:
         """Whether it has landed and checks that it is clear of others."""
         return self.asks_left > 0
 
+    @property
+    def leads_back(self) -> bool:
+        """Whether its goal is the place where this drone stood before."""
+        return self._owner == self._parts.node_id
+
     def start(self) -> None:
         """Take off."""
         self._fly_on()
@@ -69,7 +74,7 @@ class RepairFlight:
 
     def stop_when_connected(self) -> None:
         """Stop at the first connection, unless this flight leads back."""
-        self.stops_when_connected = self._owner != self._parts.node_id
+        self.stops_when_connected = not self.leads_back
 
     def stop_here(self, next_hop: int) -> None:
         """Land at the nearest free spot, in reach of `next_hop` if possible."""
@@ -103,9 +108,13 @@ class RepairFlight:
         if self._leg_is_short(here):
             self._fly_on()
             return False
+        self.ask_on_ground()
+        return True
+
+    def ask_on_ground(self) -> None:
+        """It is on the ground: begin to ask who else is there."""
         self.asks_left = ASKS_ON_GROUND
         ask_all_for_places(self._parts)
-        return True
 
     def ask_again(self) -> bool:
         """The time for answers is over. Returns False if it is clear and the flight is over."""

@@ -1447,6 +1447,31 @@ def test_on_the_ground_it_asks_again_and_moves_aside_for_a_drone_that_it_did_not
     assert rig.kinds().count("LANDED") == 1
 
 
+@pytest.mark.parametrize(("away_m", "steps_aside"), [(0.45, True), (1.2, False)])
+def test_after_a_landing_in_silence_it_asks_who_stands_there_before_it_connects(
+    away_m, steps_aside
+):
+    rig = lone_rig()
+    while rig.now_s < 150.0:  # one step and back, and at last to the gateway
+        rig.wait(1.0)
+        rig.engine.place = here = (rig.engine.goals or [HOME])[-1]
+    goals = len(rig.engine.goals)
+    assert "FLYING" not in rig.mesh.get_repair_status().state.name
+    rig.hear("09 09 03 01 fe 01 01")
+    rig.wait(0.2)
+    rig.hear(place(9, here.latitude, here.longitude + away_m))
+    rig.hear("00 09 04 01 01 01 00 01")
+    assert not rig.mesh.get_connected_to_gateway()
+    rig.wait(1.0)
+    assert len(rig.engine.goals) == goals + steps_aside
+    assert rig.engine.goals[-1].distance_m(here._replace(longitude=here.longitude + away_m)) >= 1.0
+    if steps_aside:
+        fly(rig, rig.engine.goals[-1])
+        rig.wait(1.0)
+    rig.hear("09 09 03 01 fe 01 01", "00 09 04 01 01 01 00 01")
+    assert rig.mesh.get_connected_to_gateway()
+
+
 # The place of the gateway --------------------------------------------------------------------
 
 
