@@ -11,7 +11,7 @@ from pathlib import Path
 
 from drone_mesh.air.reach import MAX_DISTANCE_M
 from drone_mesh.arguments import MOST, whole
-from drone_mesh.drone.fleet import MAX_DRONES
+from drone_mesh.drone.fleet import MAX_DRONES, plan_fleet
 from drone_mesh.inprocess.chip_air import ChipAir
 from drone_mesh.inprocess.load_benchmark import MESSAGE_BYTES, busiest_relay
 from drone_mesh.inprocess.network import Network
@@ -108,13 +108,6 @@ def _links(name: str, rng: random.Random, bits_per_s: int) -> LinkModel:
     return IdealDisc(MAX_DISTANCE_M)
 
 
-def _places(nodes: int, spacing_m: float) -> list[tuple[float, float]]:
-    """x, y of the gateway 0 and of the routers 1, 2, ..."""
-    columns = max(1, round((nodes - 1) ** 0.5))
-    grid = (divmod(index, columns) for index in range(nodes - 1))
-    return [(-1.0, 0.0), *((spacing_m * column, spacing_m * row) for row, column in grid)]
-
-
 @dataclass(frozen=True)
 class _Bench:
     """The mesh under test, in virtual or real time."""
@@ -129,15 +122,15 @@ def _bench(arguments: argparse.Namespace) -> _Bench:
     settings = RadioSettings(data_rate=DATA_RATES[arguments.rate])
     rng = random.Random(f"{arguments.seed} links")
     links = _links(arguments.links, rng, settings.data_rate.value)
-    places = _places(arguments.nodes, arguments.spacing)
+    routers = arguments.nodes - 1
+    fleet = (1, routers, max(1, round(routers**0.5)), arguments.spacing)
     if arguments.wall:
         wall = WallMesh(links, settings, arguments.seed)
-        for node, (x, y) in enumerate(places):
-            wall.add(node, x, y, gateway=node == 0)
+        for place in plan_fleet(*fleet):
+            wall.add(place.node_id, place.longitude, place.latitude, gateway=place.node_id == 0)
         return _Bench(wall, wall.air, wall.antennas, wall.chips)
     network = Network(arguments.seed, radio="chips", rate=arguments.rate, links=links)
-    for node, (x, y) in enumerate(places):
-        (network.add_router if node else network.add_gateway)(node, x, y)
+    network.add_fleet(*fleet)
     assert isinstance(network.air, ChipAir)
     antennas = list(network.air.antennas.values())
     return _Bench(network, network.air.air, list(antennas), [one.chip for one in antennas])

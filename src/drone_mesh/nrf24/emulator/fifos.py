@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 from drone_mesh.nrf24.emulator.frames import Frame, FrameFormat
 from drone_mesh.nrf24.registers import FIFO_DEPTH
@@ -38,13 +39,14 @@ class Incoming:
     reported_width: int
 
 
-class RxFifo:
-    """Received payloads that were not read yet."""
+Payload = TypeVar("Payload")
 
-    def __init__(self, partial_read_removes: bool) -> None:
-        self._partial_read_removes = partial_read_removes
-        self._payloads: list[Incoming] = []
-        self._last_byte = 0
+
+class _Fifo(Generic[Payload]):
+    """Up to FIFO_DEPTH payloads."""
+
+    def __init__(self) -> None:
+        self._payloads: list[Payload] = []
 
     def __len__(self) -> int:
         return len(self._payloads)
@@ -54,15 +56,24 @@ class RxFifo:
         return len(self._payloads) == FIFO_DEPTH
 
     @property
-    def oldest(self) -> Incoming | None:
+    def oldest(self) -> Payload | None:
         return self._payloads[0] if self._payloads else None
+
+    def flush(self) -> None:
+        self._payloads.clear()
+
+
+class RxFifo(_Fifo[Incoming]):
+    """Received payloads that were not read yet."""
+
+    def __init__(self, partial_read_removes: bool) -> None:
+        super().__init__()
+        self._partial_read_removes = partial_read_removes
+        self._last_byte = 0
 
     def push(self, incoming: Incoming) -> None:
         """The caller must check that it is not full."""
         self._payloads.append(incoming)
-
-    def flush(self) -> None:
-        self._payloads.clear()
 
     def read(self, count: int) -> bytes:
         """R_RX_PAYLOAD: the bytes that leave the chip while `count` bytes are clocked.
@@ -81,22 +92,8 @@ class RxFifo:
         return out + bytes((self._last_byte,)) * (count - len(out))
 
 
-class TxFifo:
+class TxFifo(_Fifo[TxPayload]):
     """Payloads to send: those of a transmitter, or ack payloads of a receiver."""
-
-    def __init__(self) -> None:
-        self._payloads: list[TxPayload] = []
-
-    def __len__(self) -> int:
-        return len(self._payloads)
-
-    @property
-    def full(self) -> bool:
-        return len(self._payloads) == FIFO_DEPTH
-
-    @property
-    def oldest(self) -> TxPayload | None:
-        return self._payloads[0] if self._payloads else None
 
     def push(self, outgoing: TxPayload) -> bool:
         """Add a payload. False: the FIFO is full, and the payload is lost."""
@@ -113,9 +110,6 @@ class TxFifo:
         """Remove a sent payload; ignored if it was flushed meanwhile."""
         if outgoing in self._payloads:
             self._payloads.remove(outgoing)
-
-    def flush(self) -> None:
-        self._payloads.clear()
 
     def for_pipe(self, pipe: int) -> TxPayload | None:
         """The oldest ack payload for a pipe, or None."""
