@@ -5,10 +5,9 @@ Python 3.8.
 """
 
 import asyncio
-import base64
 import json
 import time
-from typing import Any, AsyncIterator, Dict, Optional, Sequence
+from typing import AsyncIterator, Optional, Sequence
 
 from fastapi import FastAPI, Path, Query, Request, Response
 from fastapi.params import Depends
@@ -23,7 +22,7 @@ from drone_mesh.communication.data.transport import ReceivedMessage
 from drone_mesh.errors import MessageRefused, QueueFull
 from drone_mesh.internet.guarded_app import Responses
 from drone_mesh.internet.numbers import DecimalDigits, WholeDigits
-from drone_mesh.users.desk import HANDOVER_S, Sending, UsersDesk
+from drone_mesh.users.desk import HANDOVER_S, Sending, UsersDesk, in_json
 
 LONGEST_WAIT_S = 60.0  # our choice
 SIGN_OF_LIFE_S = 15.0  # our choice: a comment line for a client without messages
@@ -136,16 +135,6 @@ async def _events(users: UsersDesk, port: Optional[int]) -> AsyncIterator[str]:
             except asyncio.TimeoutError:
                 yield ": nothing came\n\n"
             else:
-                yield f"data: {json.dumps(_as_json(message))}\n\n"
+                yield f"data: {json.dumps(in_json(message))}\n\n"
     finally:
         end()
-
-
-def _as_json(message: ReceivedMessage) -> Dict[str, Any]:
-    return {
-        "sender": message.sender,
-        "port": message.port,
-        "to_all": message.to_all,
-        "reliable": message.reliable,
-        "payload": base64.b64encode(message.payload).decode(),
-    }

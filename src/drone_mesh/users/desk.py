@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import queue
 import threading
 from typing import Callable, Optional
@@ -17,6 +18,13 @@ MOST_UNREAD = 256  # messages that may wait for a slow listener; the oldest is d
 
 Submit = Callable[[Callable[[float], None]], None]
 """Runs a function, with the time, on the thread that owns the node. Any thread may call it."""
+
+
+def in_json(message: ReceivedMessage) -> dict[str, object]:
+    """A message as programs of users read it."""
+    fields = message._asdict()
+    del fields["received_s"]  # of a clock that other programs do not have
+    return {**fields, "payload": base64.b64encode(message.payload).decode()}
 
 
 WhenOver = Callable[[Optional[Ticket], Optional[MessageRefused]], None]

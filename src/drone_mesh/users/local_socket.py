@@ -26,7 +26,7 @@ from typing import Any, Mapping
 
 from drone_mesh.drone.fleet import ids_in_words
 from drone_mesh.errors import ConfigurationError, MessageRefused
-from drone_mesh.users.desk import UsersDesk
+from drone_mesh.users.desk import UsersDesk, in_json
 from drone_mesh.users.socket_path import is_served
 
 MOST_REQUEST_BYTES = 4096  # our choice: a message of 1,024 bytes in base64 takes 1,400
@@ -169,15 +169,7 @@ class _Client(socketserver.StreamRequestHandler):
             while not (self.server.stopping or self._is_gone()):
                 message = listener.next(_POLL_S)
                 if message is not None:
-                    self._say(
-                        {
-                            "sender": message.sender,
-                            "port": message.port,
-                            "to_all": message.to_all,
-                            "reliable": message.reliable,
-                            "payload": base64.b64encode(message.payload).decode(),
-                        }
-                    )
+                    self._say(in_json(message))
         finally:
             listener.close()
 
