@@ -1,4 +1,4 @@
-"""How programs end: StopRequest, and a reader that has closed the pipe."""
+"""How programs end: StopRequest, errors, Ctrl-C, and a reader that has closed the pipe."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ import sys
 from types import TracebackType
 from typing import Any, Callable, TypeVar, cast
 
-CLOSED_PIPE = 141  # exit status, as in a shell for SIGPIPE
+from drone_mesh.errors import MeshError
+
+INTERRUPTED = 130  # exit status, as in a shell for SIGINT
+CLOSED_PIPE = 141  # as in a shell for SIGPIPE
 
 Main = TypeVar("Main", bound=Callable[..., int])
 
@@ -62,19 +65,31 @@ class StopRequest:
         os.close(self._write_end)
 
 
-def quiet_on_closed_pipe(main: Main) -> Main:
-    """Decorates `main` of a program: it ends quietly when the reader of its output has ended."""
+def ends_as(program: str, failed: int = 1) -> Callable[[Main], Main]:
+    """Decorates `main` of a program, which returns its exit status.
 
-    @functools.wraps(main)
-    def quiet_main(*args: Any, **kwargs: Any) -> int:
-        try:
+    A MeshError becomes one line, and the status `failed`. The program ends quietly on Ctrl-C, and
+    when the reader of its output has ended.
+    """
+
+    def decorate(main: Main) -> Main:
+        @functools.wraps(main)
+        def ending_main(*args: Any, **kwargs: Any) -> int:
             try:
-                return main(*args, **kwargs)
-            finally:
-                sys.stdout.flush()
-        except BrokenPipeError:
-            # Or else the interpreter would try once more to write what is left, and complain.
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            return CLOSED_PIPE
+                try:
+                    return main(*args, **kwargs)
+                except MeshError as error:
+                    print(f"{program}: {error}", file=sys.stderr)
+                    return failed
+                except KeyboardInterrupt:
+                    return INTERRUPTED
+                finally:
+                    sys.stdout.flush()
+            except BrokenPipeError:
+                # Or else the interpreter would try once more to write what is left, and complain.
+                os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+                return CLOSED_PIPE
 
-    return cast(Main, quiet_main)
+        return cast(Main, ending_main)
+
+    return decorate

@@ -6,7 +6,6 @@ import argparse
 import logging
 import os
 import signal
-import sys
 import time
 from functools import partial
 from typing import Mapping, Sequence
@@ -21,8 +20,8 @@ from drone_mesh.console.real_mesh import events_of, origin_of, real_mesh
 from drone_mesh.console.runner import ConsoleRunner
 from drone_mesh.console.server import ConsoleServer
 from drone_mesh.console.tiles import Tiles, open_tiles
-from drone_mesh.errors import ConfigurationError, MeshError
-from drone_mesh.stopping import StopRequest
+from drone_mesh.errors import ConfigurationError
+from drone_mesh.stopping import StopRequest, ends_as
 from drone_mesh.web import LOOPBACK
 from drone_mesh.web.listening import MAX_PORT
 
@@ -69,6 +68,7 @@ class GatewayFeed:
         self._runner.in_loop(take)
 
 
+@ends_as("drone_mesh_console")
 def main(
     arguments: Sequence[str] | None = None, environment: Mapping[str, str] = os.environ
 ) -> int:
@@ -114,13 +114,9 @@ def main(
     with StopRequest() as stop:
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, lambda *_: stop.make())
-        try:
-            client = GatewayClient(options.gateway, environment.get(GATEWAY_TOKEN, ""))
-            tiles = open_tiles(options.tiles) if options.tiles else None
-            _serve(client, options.bind, options.port, token, stop, tiles)
-        except MeshError as error:
-            print(f"drone_mesh_console: {error}", file=sys.stderr)
-            return 1
+        client = GatewayClient(options.gateway, environment.get(GATEWAY_TOKEN, ""))
+        tiles = open_tiles(options.tiles) if options.tiles else None
+        _serve(client, options.bind, options.port, token, stop, tiles)
     return 0
 
 

@@ -20,7 +20,7 @@ from drone_mesh.lab.progress import as_duration
 from drone_mesh.lab.proofs.command import add_proofs
 from drone_mesh.lab.status import describe_folder
 from drone_mesh.lab.template import write_template
-from drone_mesh.stopping import quiet_on_closed_pipe
+from drone_mesh.stopping import ends_as
 from drone_mesh.web.listening import MAX_PORT
 
 PROGRAM = "lab"
@@ -28,7 +28,7 @@ CELLS_SHOWN = 30  # by `lab plan`
 _RESULTS = "results folder of the experiment"
 
 
-@quiet_on_closed_pipe
+@ends_as(PROGRAM)
 def main(argv: Sequence[str] | None = None) -> int:
     """Returns the exit status: 0 done, 1 some runs failed or an error, 2 usage, 130 Ctrl-C."""
     given = list(sys.argv[1:] if argv is None else argv)
@@ -42,12 +42,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     run: Callable[[argparse.Namespace], int] = options.run
     try:
         return run(options)
-    except MeshError as error:
-        print(f"{PROGRAM}: {error}", file=sys.stderr)
-        return 1
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
-        return 130
+        raise
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -13,17 +13,19 @@ from typing import Sequence
 
 from drone_mesh.arguments import whole
 from drone_mesh.drone.geodesy import Origin
-from drone_mesh.errors import ConfigurationError, MeshError
+from drone_mesh.errors import ConfigurationError
 from drone_mesh.nrf24.settings import DataRate
 from drone_mesh.raspberry.arducopter import ArduCopter, program_from_environment
 from drone_mesh.raspberry.emulated_air import column_place
 from drone_mesh.raspberry.emulated_fleet import DEMONSTRATION_ORIGIN
 from drone_mesh.raspberry.pilot_side import PilotSide
+from drone_mesh.stopping import ends_as
 
 MOST_COPTERS = 16  # our choice
 POLL_S = 0.5
 
 
+@ends_as("scripts/autopilots")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run them until Ctrl-C; the exit status is 1 if they do not start."""
     parser = argparse.ArgumentParser(
@@ -38,14 +40,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--origin", default="", metavar="LAT,LON,ALT", help="as for the nodes")
     parser.add_argument("--speedup", type=float, default=1.0, help="default: %(default)g")
     parsed = parser.parse_args(arguments)
-    try:
-        origin = Origin.parse(parsed.origin) if parsed.origin else DEMONSTRATION_ORIGIN
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
-        with contextlib.suppress(KeyboardInterrupt):
-            _run(parsed.copters, origin, parsed.speedup)
-    except MeshError as error:
-        print(f"scripts/autopilots: {error}", file=sys.stderr)
-        return 1
+    origin = Origin.parse(parsed.origin) if parsed.origin else DEMONSTRATION_ORIGIN
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    with contextlib.suppress(KeyboardInterrupt):
+        _run(parsed.copters, origin, parsed.speedup)
     return 0
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import secrets
-import sys
 from pathlib import Path
 from typing import Sequence
 
@@ -13,10 +12,10 @@ from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.communication.seals.key_file import read_key_file, write_key_file
 from drone_mesh.communication.seals.keys import KEY_BYTES, MeshKey
 from drone_mesh.errors import ConfigurationError, naming_argument
-from drone_mesh.stopping import quiet_on_closed_pipe
+from drone_mesh.stopping import ends_as
 
 
-@quiet_on_closed_pipe
+@ends_as("raspberry_key")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Create a key file; the exit status is 1 if that is not possible."""
     parser = argparse.ArgumentParser(
@@ -37,21 +36,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     node.add_argument("file", type=Path, help="file to make; it must not exist")
     parsed = parser.parse_args(arguments)
-    try:
-        if parsed.command == "new":
-            write_key_file(parsed.file, MeshKey(secrets.token_bytes(KEY_BYTES)))
-            print(f"raspberry_key: new mesh key in {parsed.file}")
-        else:
-            with naming_argument("mesh_key ", parsed.mesh_key):
-                keys = read_key_file(parsed.mesh_key)
-                if not isinstance(keys, MeshKey):
-                    raise ConfigurationError(
-                        f"{parsed.mesh_key}: not a mesh key but the keys of node {keys.node}; "
-                        "use the file that 'raspberry_key new' made"
-                    )
-            write_key_file(parsed.file, keys.for_node(parsed.id))
-            print(f"raspberry_key: keys of node {parsed.id} in {parsed.file}")
-    except ConfigurationError as error:
-        print(f"raspberry_key: {error}", file=sys.stderr)
-        return 1
+    if parsed.command == "new":
+        write_key_file(parsed.file, MeshKey(secrets.token_bytes(KEY_BYTES)))
+        print(f"raspberry_key: new mesh key in {parsed.file}")
+    else:
+        with naming_argument("mesh_key ", parsed.mesh_key):
+            keys = read_key_file(parsed.mesh_key)
+            if not isinstance(keys, MeshKey):
+                raise ConfigurationError(
+                    f"{parsed.mesh_key}: not a mesh key but the keys of node {keys.node}; "
+                    "use the file that 'raspberry_key new' made"
+                )
+        write_key_file(parsed.file, keys.for_node(parsed.id))
+        print(f"raspberry_key: keys of node {parsed.id} in {parsed.file}")
     return 0

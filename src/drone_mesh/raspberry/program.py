@@ -6,7 +6,6 @@ import contextlib
 import dataclasses
 import logging
 import signal
-import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from types import FrameType
@@ -14,7 +13,6 @@ from typing import TYPE_CHECKING, Callable, Iterator, Sequence
 
 from drone_mesh.communication.interfaces import IInternetConnection
 from drone_mesh.drone.engines import create_engine
-from drone_mesh.errors import MeshError
 from drone_mesh.internet.http_settings import HttpSettings
 from drone_mesh.internet.on_demand import http_internet, mqtt_internet, status_server
 from drone_mesh.internet.several import SeveralInternets
@@ -47,18 +45,14 @@ END_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _log = logging.getLogger(__name__)
 
 
-def run(program: str, parse: Callable[[], Options]) -> int:
+def run(parse: Callable[[], Options]) -> int:
     """Run until a signal ends it; returns the exit status."""
     with _signals() as request:
-        try:
-            options = parse()
-            logging.basicConfig(
-                format="%(asctime)s %(levelname)s %(message)s", level=options.log_level.upper()
-            )
-            _run(options, request)
-        except MeshError as error:
-            print(f"{program}: {error}", file=sys.stderr)
-            return 1
+        options = parse()
+        logging.basicConfig(
+            format="%(asctime)s %(levelname)s %(message)s", level=options.log_level.upper()
+        )
+        _run(options, request)
     return 0
 
 

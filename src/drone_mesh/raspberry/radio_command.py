@@ -25,14 +25,14 @@ from drone_mesh.raspberry.emulated_partner import PARTNER_ID, EmulatedPartner
 from drone_mesh.raspberry.field_radio import FieldRadio
 from drone_mesh.raspberry.node_status import version
 from drone_mesh.raspberry.wiring_options import add_channel_options, add_wiring_options
-from drone_mesh.stopping import quiet_on_closed_pipe
+from drone_mesh.stopping import ends_as
 
 REPORT_ROUNDS = 20
 USUAL_NODES = 17  # our choice: the field case
 DISSECTOR = Path(__file__).with_name("drone_mesh.lua")
 
 
-@quiet_on_closed_pipe
+@ends_as("raspberry_radio")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one tool; the exit status is 0, 1 if the radio failed, 2 for a wrong option."""
     options = _parser().parse_args(arguments)

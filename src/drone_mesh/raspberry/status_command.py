@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import argparse
 import os
-import sys
 from typing import Sequence
 
 from drone_mesh.internet import DEFAULT_PORT
 from drone_mesh.raspberry.http_options import TOKEN_VARIABLE
 from drone_mesh.raspberry.node_status import table
-from drone_mesh.stopping import quiet_on_closed_pipe
+from drone_mesh.stopping import ends_as
 from drone_mesh.web import LOOPBACK
 from drone_mesh.web.json_client import NoAnswer, ask_json
 
 ANSWER_WITHIN_S = 10.0
 
 
-@quiet_on_closed_pipe
+@ends_as("raspberry_status")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print it; the exit status is 1 if the gateway does not answer properly."""
     parser = argparse.ArgumentParser(
@@ -37,13 +36,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     token = os.environ.get(TOKEN_VARIABLE, "")
     try:
         print(table(ask_json(f"{url}/status", ANSWER_WITHIN_S, token)))
-    except NoAnswer as error:
-        print(f"raspberry_status: {error}", file=sys.stderr)
-        return 1
-    except (AttributeError, KeyError, TypeError):
-        print(
-            f"raspberry_status: {url}: the answer is not from a mesh node; check the address",
-            file=sys.stderr,
-        )
-        return 1
+    except (AttributeError, KeyError, TypeError) as error:
+        raise NoAnswer(f"{url}: the answer is not from a mesh node; check the address") from error
     return 0

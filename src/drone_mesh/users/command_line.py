@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
-from typing import Callable
 
 from drone_mesh.arguments import MOST, decimal, whole
 from drone_mesh.communication.data.packets import MAX_DATA_PORT, MAX_MESSAGE_BYTES
 from drone_mesh.communication.data.ticket import TO_ALL, TO_GATEWAY
 from drone_mesh.communication.interfaces import MAX_NODE_ID
-from drone_mesh.errors import MeshError
 from drone_mesh.users.local_client import NODE_VARIABLE, LocalClient, node_here
 
 MOST_SECONDS = 86400.0  # our choice: a day
@@ -69,14 +66,3 @@ def destination(text: str) -> int:
 def client(parsed: argparse.Namespace) -> LocalClient:
     """The node that the options select. Raises MeshError."""
     return node_here(parsed.node) if parsed.socket is None else LocalClient(parsed.socket)
-
-
-def run(command: str, work: Callable[[], int]) -> int:
-    """The exit status of `work`; errors are one line, Ctrl-C ends it quietly."""
-    try:
-        return work()
-    except MeshError as error:
-        print(f"{command}: {error}", file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        return 130

@@ -7,11 +7,11 @@ import json
 import sys
 from typing import Any, Sequence
 
-from drone_mesh.stopping import quiet_on_closed_pipe
+from drone_mesh.stopping import ends_as
 from drone_mesh.users import command_line
 
 
-@quiet_on_closed_pipe
+@ends_as("mesh_listen")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the messages that arrive, one line each, until Ctrl-C."""
     parser = command_line.parser_for("mesh_listen", "Prints the messages that a node receives.")
@@ -28,17 +28,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         help="print one JSON object per line, with the payload in base64",
     )
     parsed = parser.parse_args(arguments)
-
-    def work() -> int:
-        messages = command_line.client(parsed).listen(parsed.port)
-        for number, message in enumerate(messages, start=1):
-            print(_as_json(message) if parsed.json else _as_text(message), flush=True)
-            if number == parsed.count:
-                return 0
-        print("mesh_listen: the node has stopped", file=sys.stderr)
-        return 1
-
-    return command_line.run("mesh_listen", work)
+    messages = command_line.client(parsed).listen(parsed.port)
+    for number, message in enumerate(messages, start=1):
+        print(_as_json(message) if parsed.json else _as_text(message), flush=True)
+        if number == parsed.count:
+            return 0
+    print("mesh_listen: the node has stopped", file=sys.stderr)
+    return 1
 
 
 def _as_json(message: dict[str, Any]) -> str:

@@ -8,12 +8,12 @@ from typing import Sequence
 
 from drone_mesh.communication.data.packets import MAX_DATA_PORT
 from drone_mesh.communication.observer import in_hops
-from drone_mesh.stopping import quiet_on_closed_pipe
+from drone_mesh.stopping import ends_as
 from drone_mesh.users import command_line
 from drone_mesh.users.local_client import LocalClient, Refused
 
 
-@quiet_on_closed_pipe
+@ends_as("mesh_ping")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Send echo requests to a node; the exit status is 1 if none was answered."""
     parser = command_line.parser_for(
@@ -46,6 +46,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     round_trips_s: list[float] = []
     asked = 0
 
+    @ends_as("mesh_ping")
     def work() -> int:
         nonlocal asked
         node = command_line.client(parsed)
@@ -57,7 +58,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             asked += 1
         return 0 if round_trips_s else 1
 
-    status = command_line.run("mesh_ping", work)
+    status = work()
     if asked:
         print(_summary(asked, round_trips_s))
         status = 0 if round_trips_s else 1

@@ -7,11 +7,11 @@ import sys
 from typing import Sequence
 
 from drone_mesh.communication.data.packets import MAX_DATA_PORT, MAX_MESSAGE_BYTES, check_size
-from drone_mesh.stopping import quiet_on_closed_pipe
+from drone_mesh.stopping import ends_as
 from drone_mesh.users import command_line
 
 
-@quiet_on_closed_pipe
+@ends_as("mesh_send")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Send one message; the exit status is 1 if it was not delivered."""
     parser = command_line.parser_for(
@@ -41,15 +41,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "(default: %(default)g)",
     )
     parsed = parser.parse_args(arguments)
-
-    def work() -> int:
-        text = parsed.text
-        payload = sys.stdin.buffer.read() if text is None else os.fsencode(text)
-        check_size(payload)
-        arrived, ticket = command_line.client(parsed).send(
-            parsed.to, payload, port=parsed.port, reliable=not parsed.no_ack, wait_s=parsed.wait
-        )
-        print(ticket)
-        return 0 if arrived else 1
-
-    return command_line.run("mesh_send", work)
+    text = parsed.text
+    payload = sys.stdin.buffer.read() if text is None else os.fsencode(text)
+    check_size(payload)
+    arrived, ticket = command_line.client(parsed).send(
+        parsed.to, payload, port=parsed.port, reliable=not parsed.no_ack, wait_s=parsed.wait
+    )
+    print(ticket)
+    return 0 if arrived else 1

@@ -21,6 +21,7 @@ from drone_mesh.nrf24.emulator.states import State
 from drone_mesh.nrf24.emulator.wall_clock import WallClock
 from drone_mesh.raspberry import program
 from drone_mesh.raspberry.options import parse_gateway, parse_router
+from drone_mesh.stopping import ends_as
 
 pytestmark = pytest.mark.slow
 
@@ -75,7 +76,7 @@ def run_until(condition, parse, line, number=signal.SIGINT):
 
     sender = threading.Thread(target=end)
     sender.start()
-    status = program.run("the program", partial(parse, line.split(), {}))
+    status = ends_as("the program")(program.run)(partial(parse, line.split(), {}))
     running.clear()
     sender.join()
     return status

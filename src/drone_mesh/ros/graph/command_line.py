@@ -17,7 +17,7 @@ import rospy
 
 from drone_mesh.errors import MeshError
 from drone_mesh.ros.graph import names
-from drone_mesh.stopping import quiet_on_closed_pipe
+from drone_mesh.stopping import ends_as
 
 SPEAKER_VARIABLE = "DRONE_MESH_SPEAKER"  # the node of a launch file that says why it cannot start
 ANSWER_TIMEOUT_S = 5.0  # wall; our choice: a node that is silent for longer is dead
@@ -112,11 +112,4 @@ def start_node(about: str | None, name: str, *, disable_signals: bool = False) -
 
 def run_tool(name: str, work: Callable[[], int]) -> None:
     """Run a tool and exit with its code. A MeshError becomes one line; Ctrl-C is silent."""
-    try:
-        code = quiet_on_closed_pipe(work)()
-    except MeshError as error:
-        print(f"{name}: {error}", file=sys.stderr)
-        code = FAILED
-    except KeyboardInterrupt:
-        code = 130  # as in a shell for SIGINT
-    sys.exit(code)
+    sys.exit(ends_as(name, FAILED)(work)())
