@@ -12,7 +12,6 @@ from types import FrameType
 from typing import TYPE_CHECKING, Callable, Iterator, Sequence
 
 from drone_mesh.communication.interfaces import IInternetConnection
-from drone_mesh.drone.engines import create_engine
 from drone_mesh.internet.http_settings import HttpSettings
 from drone_mesh.internet.on_demand import http_internet, mqtt_internet, status_server
 from drone_mesh.internet.several import SeveralInternets
@@ -27,7 +26,7 @@ from drone_mesh.raspberry.mesh_record import MeshRecord
 from drone_mesh.raspberry.node import MakeInternet, RadioNode
 from drone_mesh.raspberry.node_status import one_line
 from drone_mesh.raspberry.options import Hardware, Options
-from drone_mesh.raspberry.served_air import MoveRadio, joining_node, serving_node
+from drone_mesh.raspberry.served_air import MoveRadio, joining_node, node_with_drone, serving_node
 from drone_mesh.raspberry.service_manager import ServiceManager
 from drone_mesh.stopping import StopRequest
 from drone_mesh.users.local_socket import warn_of_unreachable
@@ -152,12 +151,7 @@ def _stop(nodes: Sequence[RadioNode]) -> None:
 
 def _real_node(options: Options) -> RadioNode:
     radio = _open_radio(options.node_id, options.hardware, options.radio)
-    with contextlib.ExitStack() as opened:
-        opened.callback(radio.close)
-        engine = create_engine(options.node_id, options.location, options.flight)
-        opened.callback(engine.close)
-        node = RadioNode(radio, engine, options, _orders(options))
-        opened.pop_all()
+    node = node_with_drone(radio, options, options.location, _orders(options))
     hardware = options.hardware
     _log.info(
         "node %d: nRF24L01+ on SPI %d.%d, CE on GPIO%d, %s; channel %d, %d kbit/s, CRC %d bit",

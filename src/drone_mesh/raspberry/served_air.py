@@ -39,7 +39,7 @@ def joining_node(
     radio = NRF24LowLevelInterface(
         chip.spi, chip.ce, chip.irq, node_id=options.node_id, settings=options.radio
     )
-    node = _node(radio, options, place, make_internet)
+    node = node_with_drone(radio, options, place, make_internet)
     return node, lambda: _follow(node.engine, lambda here: chip.move(here.to_vector()))
 
 
@@ -57,7 +57,7 @@ def serving_node(
         )
     place = _place(options)
     radio = air.radio(options.node_id, options.radio, place)
-    node = _node(radio, options, place, make_internet)
+    node = node_with_drone(radio, options, place, make_internet)
     return node, lambda: _follow(node.engine, lambda here: air.move(options.node_id, here))
 
 
@@ -65,12 +65,13 @@ def _place(options: Options) -> Location:
     return options.location or column_place(options.node_id, options.radio.data_rate)
 
 
-def _node(
+def node_with_drone(
     radio: NRF24LowLevelInterface,
     options: Options,
-    place: Location,
+    place: Location | None,
     make_internet: MakeInternet | None,
 ) -> RadioNode:
+    """A node with this radio, and the drone of the options. Raises ConfigurationError."""
     with contextlib.ExitStack() as opened:
         opened.callback(radio.close)
         engine = create_engine(options.node_id, place, options.flight)
