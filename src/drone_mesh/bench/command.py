@@ -9,7 +9,7 @@ import signal
 import sys
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, Sequence
+from typing import Any, Iterator, Sequence
 
 from drone_mesh.arguments import MOST, whole
 from drone_mesh.bench import cases, inprocess, overload, report, soak
@@ -202,10 +202,7 @@ class Benchmark:
 
     def _run_soak(self) -> None:
         options = self._options
-        check_environment()
-        case = options.sizes[0] if options.sizes else cases.SOAK
-        self._progress.begin(f"{case}: {options.hours:g} h of simulated time")
-        try:
+        with self._one_fleet(cases.SOAK, f"{options.hours:g} h of simulated time") as case:
             self._soak = soak.soak(
                 case,
                 options.hours,
@@ -214,20 +211,15 @@ class Benchmark:
                 self._progress,
                 lambda sample: print(report.sample_line(sample), flush=True),
             )
-        except BenchmarkError as error:
-            self._fail(case, error)
 
     def _run_overload(self) -> None:
         options = self._options
-        check_environment()
-        case = options.sizes[0] if options.sizes else cases.OVERLOAD
-        self._progress.begin(f"{case}, busy loops")
 
         def show(result: overload.OverloadResult) -> None:
             self._overload.append(result)
             print(report.overload_line(result), flush=True)
 
-        try:
+        with self._one_fleet(cases.OVERLOAD, "busy loops") as case:
             overload.overload(
                 case,
                 options.busy,
@@ -237,6 +229,14 @@ class Benchmark:
                 show,
                 options.seconds or overload.SIMULATED_S,
             )
+
+    @contextlib.contextmanager
+    def _one_fleet(self, usual: Case, what: str) -> Iterator[Case]:
+        check_environment()
+        case = self._options.sizes[0] if self._options.sizes else usual
+        self._progress.begin(f"{case}: {what}")
+        try:
+            yield case
         except BenchmarkError as error:
             self._fail(case, error)
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from dataclasses import dataclass
+from typing import Iterator
 
 from drone_mesh.bench.cases import Case
-from drone_mesh.bench.observation import REST, TAKE_OFF, WATCH, StateSample, Watch
+from drone_mesh.bench.observation import REST, TAKE_OFF, WATCH, StateSample
 from drone_mesh.bench.processes import Use, cores_between
 from drone_mesh.bench.progress import ProgressLine
 from drone_mesh.bench.system import BenchmarkError, System
@@ -66,18 +68,8 @@ def measure(
 
     Raises BenchmarkError when it does not start or ends by itself.
     """
-    with System(case.drones, [*case.launch_args(), *launch_args], port) as system:
-        watch = system.watch
-        await_all_on(system, case, progress)
-        assert watch.all_on is not None
-        connected = system.wait_for(
-            lambda: watch.all_connected is not None,
-            CONNECTED_WITHIN_S,
-            lambda: progress.say(f"{_connected(watch)} of {case.routers} routers connected"),
-        )
-        if connected and watch.all_connected is not None:
-            after_s = watch.all_connected.wall_s - watch.all_on.wall_s
-            progress.say(f"all connected after {after_s:.1f} s")
+    with running_fleet(case, launch_args, port, progress) as system:
+        await_connected(system, case, progress)
         _sleep(system, SETTLE_S, progress, "waiting for the start to settle")
         if case.flying:
             system.order(TAKE_OFF)
@@ -89,21 +81,42 @@ def measure(
         last = _take_moment(system)
         result = _result(case, system, first, last)
         progress.say("stopping")
-    progress.clear()
     return result
 
 
-def await_all_on(system: System, case: Case, progress: ProgressLine) -> None:
-    """Wait until all nodes of the fleet are on. Raises BenchmarkError after a time limit."""
+@contextlib.contextmanager
+def running_fleet(
+    case: Case, launch_args: list[str], port: int, progress: ProgressLine
+) -> Iterator[System]:
+    """A fleet whose nodes are all on. Raises BenchmarkError after a time limit."""
+    with System(case.drones, [*case.launch_args(), *launch_args], port) as system:
+        watch = system.watch
+
+        def on() -> str:
+            return f"{watch.last.on if watch.last else 0} of {case.drones} nodes"
+
+        def say() -> None:
+            progress.say(f"{on()} on, {time.monotonic() - system.launched_s:.0f} s")
+
+        if not system.wait_for(lambda: watch.all_on is not None, ON_WITHIN_S, say):
+            raise BenchmarkError(f"only {on()} are on after {ON_WITHIN_S:g} s")
+        yield system
+    progress.clear()
+
+
+def await_connected(system: System, case: Case, progress: ProgressLine) -> bool:
+    """Whether all routers are connected within a time limit."""
     watch = system.watch
 
     def say() -> None:
-        on = watch.last.on if watch.last else 0
-        progress.say(f"{on} of {case.drones} nodes on, {_since(system.launched_s):.0f} s")
+        connected = watch.last.connected if watch.last else 0
+        progress.say(f"{connected} of {case.routers} routers connected")
 
-    if not system.wait_for(lambda: watch.all_on is not None, ON_WITHIN_S, say):
-        on = watch.last.on if watch.last else 0
-        raise BenchmarkError(f"only {on} of {case.drones} nodes are on after {ON_WITHIN_S:g} s")
+    connected = system.wait_for(lambda: watch.all_connected is not None, CONNECTED_WITHIN_S, say)
+    if watch.all_on and watch.all_connected:
+        after_s = watch.all_connected.wall_s - watch.all_on.wall_s
+        progress.say(f"all connected after {after_s:.1f} s")
+    return connected
 
 
 def _take_moment(system: System) -> _Moment:
@@ -130,7 +143,8 @@ def _result(case: Case, system: System, first: _Moment, last: _Moment) -> RosRes
     messages = last.sample.messages - first.sample.messages
     delivered = _increase(first.delivered, last.delivered)
     lost = _increase(first.lost, last.lost)
-    cores = cores_between(first.use, last.use)
+    cores, links = cores_between(first.use, last.use), last.sample.links
+    cpu_ms = 1000.0 * sum(cores.values()) * wall_s
     connected = watch.all_connected
     return RosResult(
         drones=case.drones,
@@ -148,10 +162,10 @@ def _result(case: Case, system: System, first: _Moment, last: _Moment) -> RosRes
         deliveries_per_wall_s=_rate(delivered, last.delivered_s - first.delivered_s),
         lost_share=_share(lost, delivered),
         lost_before=first.lost,
-        cpu_ms_per_message=1000 * sum(cores.values()) * wall_s / messages if messages else None,
+        cpu_ms_per_message=cpu_ms / messages if messages else None,
         cores=cores,
-        links=last.sample.links,
-        cpu_ms_per_sim_s_and_link=_per_link(sum(cores.values()) * wall_s, sim_s, last.sample.links),
+        links=links,
+        cpu_ms_per_sim_s_and_link=cpu_ms / sim_s / links if sim_s and links else None,
         pss_mb=last.use.pss_bytes / MEGABYTE,
         rss_mb=last.use.rss_bytes / MEGABYTE,
         threads=last.use.threads,
@@ -159,10 +173,6 @@ def _result(case: Case, system: System, first: _Moment, last: _Moment) -> RosRes
         reached_real_time_factor=sim_s / wall_s,
         worst_timer_lag_s=watch.worst.get(WORST_LAG),
     )
-
-
-def _per_link(cpu_s: float, sim_s: float, links: int) -> float | None:
-    return 1000.0 * cpu_s / sim_s / links if sim_s and links else None
 
 
 def _increase(before: float | None, after: float | None) -> float | None:
@@ -186,11 +196,3 @@ def _sleep(system: System, seconds: float, progress: ProgressLine, what: str) ->
         seconds + 1.0,
         lambda: progress.say(f"{what}: {max(0.0, until_s - time.monotonic()):.0f} s"),
     )
-
-
-def _connected(watch: Watch) -> int:
-    return watch.last.connected if watch.last else 0
-
-
-def _since(then_s: float) -> float:
-    return time.monotonic() - then_s

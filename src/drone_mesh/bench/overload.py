@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Callable, Iterator, Sequence
 
 from drone_mesh.bench.cases import Case
-from drone_mesh.bench.measurement import CONNECTED_WITHIN_S, await_all_on
+from drone_mesh.bench.measurement import CONNECTED_WITHIN_S, await_connected, running_fleet
 from drone_mesh.bench.progress import ProgressLine
 from drone_mesh.bench.system import BenchmarkError, System
 
@@ -68,21 +68,14 @@ def overload(
 
     Raises BenchmarkError if the fleet does not start or connect, ends by itself or stops.
     """
-    with System(case.drones, [*case.launch_args(), *launch_args], port) as system:
-        await_all_on(system, case, progress)
-        watch = system.watch
-        if not system.wait_for(
-            lambda: watch.all_connected is not None,
-            CONNECTED_WITHIN_S,
-            lambda: progress.say("waiting until all are connected"),
-        ):
+    with running_fleet(case, launch_args, port, progress) as system:
+        if not await_connected(system, case, progress):
             raise BenchmarkError(f"not all connected after {CONNECTED_WITHIN_S:g} s")
         for count in counts:
             with busy_loops(count):
                 result = _run(system, case, count, simulated_s, progress)
             progress.clear()
             on_result(result)
-    progress.clear()
 
 
 def _run(

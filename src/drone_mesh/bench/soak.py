@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from typing import Callable, Sequence
 
 from drone_mesh.bench.cases import Case
-from drone_mesh.bench.measurement import MEGABYTE, await_all_on
+from drone_mesh.bench.measurement import MEGABYTE, running_fleet
 from drone_mesh.bench.observation import StateSample
 from drone_mesh.bench.progress import ProgressLine
 from drone_mesh.bench.system import System
@@ -115,8 +115,7 @@ def soak(
     Raises BenchmarkError if the fleet does not start, ends by itself or stops.
     """
     result = SoakResult(case.drones, case.spacing_m, [])
-    with System(case.drones, [*case.launch_args(), *launch_args], port) as system:
-        await_all_on(system, case, progress)
+    with running_fleet(case, launch_args, port, progress) as system:
         watch = system.watch
         assert watch.all_on is not None
         next_s = watch.all_on.sim_s
@@ -133,7 +132,6 @@ def soak(
             progress.clear()
             on_sample(sample)
             next_s += SAMPLE_PERIOD_S
-    progress.clear()
     return result
 
 
