@@ -105,13 +105,7 @@ def measure(
     )
 
 
-def seal_cost(
-    drones: int,
-    runs: int,
-    say: Callable[[str], None],
-    key: Keys,
-    simulated_s: float = SIMULATED_S,
-) -> SealCost:
+def seal_cost(drones: int, runs: int, say: Callable[[str], None], key: Keys) -> SealCost:
     """The pace of a running network without and with a key, `runs` times each."""
     case = Case(drones, SPACING_M)
     without_key, with_key = 0.0, 0.0
@@ -120,10 +114,10 @@ def seal_cost(
         for keys in (None, key):
             network = Network(seed=run, key=keys)
             network.add_fleet(1, case.routers, case.gridsize, SPACING_M)
-            network.run_for(simulated_s)
-            pace = _pace(network, simulated_s).packets_per_cpu_s
+            network.run_for(SIMULATED_S)
+            pace = _pace(network, SIMULATED_S).packets_per_cpu_s
             if keys is None:
                 without_key = max(without_key, pace)
             else:
                 with_key = max(with_key, pace)
-    return SealCost(drones, SPACING_M, runs, simulated_s, without_key, with_key)
+    return SealCost(drones, SPACING_M, runs, SIMULATED_S, without_key, with_key)
