@@ -151,14 +151,7 @@ class DroneManager:
         except GoalRefused as error:
             raise rospy.ServiceException(str(error)) from None
         answer = self._carry_out(request.name, orders, request.at_once)
-        return OrderFormationResponse(
-            answer.id,
-            answer.sent,
-            answer.later,
-            answer.no_route,
-            answer.not_in_fleet,
-            answer.message,
-        )
+        return OrderFormationResponse(**{name: getattr(answer, name) for name in answer.__slots__})
 
     def _preview_layout(self, request: PreviewLayoutRequest) -> PreviewLayoutResponse:
         known, missing = _in_fleet(self._orders_of(request.caseID), drones_if_known())

@@ -53,6 +53,7 @@ class MarkerMaker:
 
     def __init__(self) -> None:
         self._shown: dict[tuple[str, int], object] = {}
+        self._made: list[Marker] = []  # in this call
         self._lost = LostLinks()
         self._forecast = LinkForecast()
 
@@ -67,51 +68,44 @@ class MarkerMaker:
         known = known_links(nodes)
         lost = self._lost.update(known, wall_s)
         soon = self._forecast.update(known, nodes, state.header.stamp.to_sec(), state.max_distance)
-        array = MarkerArray()
-        self._add_obstacles(array, state.obstacles)
+        self._made = []
+        self._add_obstacles(state.obstacles)
         if shape_named(state.shape) is Shape.BOX:
             for role in Role:
                 of_role = [node for node in nodes if node.role == role]
-                self._add_boxes(array, of_role, role, positions)
+                self._add_boxes(of_role, role, positions)
         else:
-            self._add_drones(array, nodes, positions)
-            self._add_rotors(array, nodes, positions, state.header.stamp.to_sec())
+            self._add_drones(nodes, positions)
+            self._add_rotors(nodes, positions, state.header.stamp.to_sec())
         for use, links in links_by_use(nodes, lost).items():
             lines = [(positions[a], positions[b]) for a, b in shortest(links, nodes, MOST_LINKS)]
             colour = _colour(DARK.of_link(use), LINK_OPACITY[use])
-            self._add_lines(array, f"links: {use.name.lower()}", lines, colour, LINK_WIDTH_M[use])
+            self._add_lines(f"links: {use.name.lower()}", lines, colour, LINK_WIDTH_M[use])
         breaking = [(positions[a], positions[b]) for a, b in shortest(set(soon), nodes, MOST_LINKS)]
-        self._add_lines(
-            array, "links: soon", breaking, _colour(DARK.flying), LINK_WIDTH_M[LinkUse.ROUTE]
-        )
-        self._add_lines(
-            array, "flight paths", _path_lines(nodes, positions), _colour(DARK.path), PATH_WIDTH_M
-        )
-        self._add_lines(
-            array, "headings", _heading_lines(nodes, positions), _colour(DARK.muted), PATH_WIDTH_M
-        )
-        self._add_ids(array, nodes, positions)
-        self._add_legend(array, positions)
-        for marker in array.markers:
+        self._add_lines("links: soon", breaking, _colour(DARK.flying), LINK_WIDTH_M[LinkUse.ROUTE])
+        for name, lines, colour in (
+            ("flight paths", _path_lines(nodes, positions), DARK.path),
+            ("headings", _heading_lines(nodes, positions), DARK.muted),
+        ):
+            self._add_lines(name, lines, _colour(colour), PATH_WIDTH_M)
+        self._add_ids(nodes, positions)
+        self._add_legend(positions)
+        for marker in self._made:
             marker.header.stamp, marker.header.frame_id = state.header.stamp, names.MAP_FRAME
-        return array
+        return MarkerArray(self._made)
 
-    def _add_boxes(
-        self, array: MarkerArray, nodes: Sequence[NodeStatus], role: Role, positions: _Positions
-    ) -> None:
+    def _add_boxes(self, nodes: Sequence[NodeStatus], role: Role, positions: _Positions) -> None:
         x_m, y_m, z_m = (TIMES_LARGER * edge_m for edge_m in role.size_m)
         colours = [DARK.of_node(role, condition_of(node)) for node in nodes]
         content = [(positions[node.id], colour) for node, colour in zip(nodes, colours)]
-        marker = self._changed(array, f"{role.word}s", 0, content)
+        marker = self._changed(f"{role.word}s", 0, content)
         if marker:
             marker.type = Marker.CUBE_LIST
             marker.scale.x, marker.scale.y, marker.scale.z = x_m, y_m, z_m
             marker.points = [_point(positions[node.id], up=z_m / 2) for node in nodes]
             marker.colors = [_colour(colour) for colour in colours]
 
-    def _add_drones(
-        self, array: MarkerArray, nodes: Sequence[NodeStatus], positions: _Positions
-    ) -> None:
+    def _add_drones(self, nodes: Sequence[NodeStatus], positions: _Positions) -> None:
         """Add two markers per drone, frame and lamp, because a mesh in rviz has one colour."""
         for node in nodes:
             colour = DARK.of_node(node.role, condition_of(node))
@@ -121,21 +115,21 @@ class MarkerMaker:
             looks = (("frames", frame, FRAME_COLOUR), ("lamps", lamp, colour))
             for name, mesh, tint in looks:
                 content = [positions[node.id], mesh, tint]
-                marker = self._changed(array, name, node.id, content)
+                marker = self._changed(name, node.id, content)
                 if marker:
                     marker.type = Marker.MESH_RESOURCE
                     marker.mesh_resource = mesh
                     marker.scale.x = marker.scale.y = marker.scale.z = TIMES_LARGER
                     marker.color = _colour(tint)
                     marker.pose.position = _point(positions[node.id], up=0.0)
-        self._delete_gone(array, ("frames", "lamps"), nodes)
+        self._delete_gone(("frames", "lamps"), nodes)
 
     def _add_rotors(
-        self, array: MarkerArray, nodes: Sequence[NodeStatus], positions: _Positions, time_s: float
+        self, nodes: Sequence[NodeStatus], positions: _Positions, time_s: float
     ) -> None:
         """The blades of all drones in flight, as one marker; they turn in simulated time."""
         flying = [positions[node.id] for node in nodes if _is_in_flight(node)]
-        marker = self._changed(array, "rotors", 0, [time_s, *flying] if flying else [])
+        marker = self._changed("rotors", 0, [time_s, *flying] if flying else [])
         if marker:
             marker.type = Marker.LINE_LIST
             marker.scale.x = TIMES_LARGER * BLADE_WIDTH_M
@@ -150,9 +144,9 @@ class MarkerMaker:
                 Point(x + dx, y + dy, z + up) for x, y, z in flying for dx, dy in blades
             ]
 
-    def _add_obstacles(self, array: MarkerArray, boxes: Sequence[ObstacleStatus]) -> None:
+    def _add_obstacles(self, boxes: Sequence[ObstacleStatus]) -> None:
         for number, box in enumerate(boxes):
-            marker = self._changed(array, "obstacles", number, [tuple(box.center)])
+            marker = self._changed("obstacles", number, [tuple(box.center)])
             if marker:
                 marker.type = Marker.CUBE
                 marker.scale.x, marker.scale.y, marker.scale.z = box.size
@@ -162,21 +156,19 @@ class MarkerMaker:
                 marker.pose.orientation.w = math.cos(box.yaw / 2)
 
     def _add_lines(
-        self, array: MarkerArray, name: str, lines: Sequence[tuple[Sequence[float], ...]],
+        self, name: str, lines: Sequence[tuple[Sequence[float], ...]],
         colour: ColorRGBA, width_m: float,
     ) -> None:  # fmt: skip
-        marker = self._changed(array, name, 0, lines)
+        marker = self._changed(name, 0, lines)
         if marker:
             marker.type = Marker.LINE_LIST
             marker.scale.x = width_m
             marker.color = colour
             marker.points = [_point(end, up=0.05) for line in lines for end in line]
 
-    def _add_ids(
-        self, array: MarkerArray, nodes: Sequence[NodeStatus], positions: _Positions
-    ) -> None:
+    def _add_ids(self, nodes: Sequence[NodeStatus], positions: _Positions) -> None:
         for node in nodes:
-            marker = self._changed(array, "ids", node.id, [positions[node.id]])
+            marker = self._changed("ids", node.id, [positions[node.id]])
             if marker:
                 marker.type = Marker.TEXT_VIEW_FACING
                 marker.scale.z = LABEL_M
@@ -184,19 +176,19 @@ class MarkerMaker:
                 marker.text = str(node.id)
                 height_m = TIMES_LARGER * Role(node.role).size_m[2]
                 marker.pose.position = _point(positions[node.id], up=height_m + 1.2 * LABEL_M)
-        self._delete_gone(array, ("ids",), nodes)
+        self._delete_gone(("ids",), nodes)
 
-    def _add_legend(self, array: MarkerArray, positions: _Positions) -> None:
+    def _add_legend(self, positions: _Positions) -> None:
         rows = legend_rows(positions.values()) if positions else []
         for number, row in enumerate(rows):
-            swatch = self._changed(array, "legend colours", number, [row])
+            swatch = self._changed("legend colours", number, [row])
             if swatch:
                 swatch.type = Marker.CUBE
                 swatch.scale.x, swatch.scale.y = row.height_m, row.height_m * row.thickness
                 swatch.scale.z = 0.02
                 swatch.color = _colour(row.colour)
                 swatch.pose.position = _point(row.place, up=0.0)
-            text = self._changed(array, "legend", number, [row])
+            text = self._changed("legend", number, [row])
             if text:
                 text.type = Marker.TEXT_VIEW_FACING
                 text.scale.z = row.height_m
@@ -204,17 +196,13 @@ class MarkerMaker:
                 text.text = row.text
                 text.pose.position = _point(row.text_place, up=0.0)
 
-    def _delete_gone(
-        self, array: MarkerArray, names: Sequence[str], nodes: Sequence[NodeStatus]
-    ) -> None:
+    def _delete_gone(self, names: Sequence[str], nodes: Sequence[NodeStatus]) -> None:
         present = {node.id for node in nodes}
         for name, number in list(self._shown):
             if name in names and number not in present:
-                self._changed(array, name, number, [])
+                self._changed(name, number, [])
 
-    def _changed(
-        self, array: MarkerArray, name: str, number: int, content: Sequence[object]
-    ) -> Marker | None:
+    def _changed(self, name: str, number: int, content: Sequence[object]) -> Marker | None:
         """A marker to fill in, or None: unchanged, or deleted because `content` is empty."""
         key = (name, number)
         if self._shown.get(key, []) == content:
@@ -222,7 +210,7 @@ class MarkerMaker:
         self._shown[key] = content
         marker = Marker(ns=name, id=number)
         marker.pose.orientation.w = 1.0
-        array.markers.append(marker)
+        self._made.append(marker)
         if not content:
             del self._shown[key]
             marker.action = Marker.DELETE
