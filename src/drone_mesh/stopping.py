@@ -6,7 +6,6 @@ import functools
 import os
 import select
 import sys
-from types import TracebackType
 from typing import Any, Callable, TypeVar, cast
 
 from drone_mesh.errors import MeshError
@@ -32,12 +31,7 @@ class StopRequest:
     def __enter__(self) -> StopRequest:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         self.close()
 
     def make(self) -> None:

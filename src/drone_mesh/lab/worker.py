@@ -9,7 +9,6 @@ import math
 import threading
 import time
 import traceback
-from types import TracebackType
 from typing import NamedTuple
 
 from drone_mesh.lab import extensions
@@ -140,12 +139,7 @@ class _Alarm:
         self._timer.daemon = True
         self._timer.start()
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         with self._lock:
             self._over = True
         self._timer.cancel()
