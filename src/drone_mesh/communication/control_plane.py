@@ -61,6 +61,9 @@ class IControlPlane(abc.ABC):
     delivery: IDelivery
     routes: IRoutes
 
+    bids_within_s: float
+    """For so long a bid for a repair counts and is awaited: by then a group has noticed a loss."""
+
     # Attributes that hold functions, because each packet calls one of them.
     learn: Learn
     """(creator, from, type, payload): a packet of another node came in. False: drop it."""

@@ -303,6 +303,31 @@ def test_a_repair_brings_back_a_group_behind_a_dead_relay():
     assert network.run_until(lambda: network.connected(2) and network.connected(3), within_s=60.0)
 
 
+def test_each_round_of_a_cut_off_chain_follows_soon_after_the_flight_before():
+    """The flight that the others see is no motion, and nobody waits for those who have left."""
+    network = Network(seed=2, routing="beacon")
+    network.add_gateway(0, 0.0, 0.0)
+    for node in (1, 2, 3, 4):
+        network.add_router(node, 8.0 * node, 0.0)
+    network.run_for(10.0)
+    network.power(1, False)
+    network.run_for(5.0)
+    assert network.run_until(lambda: all(map(network.connected, (2, 3, 4))), within_s=30.0)
+
+
+def test_those_who_lost_one_parent_remember_its_place_and_not_that_of_each_other():
+    network = Network(seed=1, routing="beacon")
+    network.add_gateway(0, 0.0, 0.0)
+    network.add_router(1, 8.0, 0.0)
+    for node, y in ((2, -3.0), (3, 0.0), (4, 3.0)):
+        network.add_router(node, 14.0, y)
+    network.run_for(10.0)
+    network.power(1, False)
+    network.run_for(8.0)
+    assert not any(map(network.connected, (2, 3, 4)))
+    assert {network.nodes[node].component.places.good_id for node in (2, 3, 4)} == {1}
+
+
 def test_a_repair_begins_ten_seconds_after_the_loss():
     network = Network(seed=1, routing="beacon")
     network.add_gateway(0, 0.0, 0.0)

@@ -6,7 +6,14 @@ import math
 
 from drone_mesh.communication import messages
 from drone_mesh.communication.beacon.own_motion import OwnMotion
-from drone_mesh.communication.beacon.packets import Beacon, Found, Motion, Search, names_gateway
+from drone_mesh.communication.beacon.packets import (
+    Beacon,
+    Found,
+    Motion,
+    Search,
+    names_gateway,
+    newer,
+)
 from drone_mesh.communication.beacon.routes import BeaconRoutes, Neighbour
 from drone_mesh.communication.beacon.search import HOPS_AROUND, MOST_HOPS, Searches
 from drone_mesh.communication.beacon.trickle import Trickle
@@ -24,6 +31,7 @@ HELD_S = 2.5  # our choice: a packet without a next hop waits this long
 RETRY_S = 0.15  # our choice: so often it asks again, beside each beacon that arrives
 LOOK_S = 0.2  # our choice: links change that slowly
 CHECK_S = 1.0  # our choice: how often a router without a gateway considers its repair
+BIDS_WITHIN_S = 3.0  # our choice: routers that lose one parent notice it within two intervals
 LATE = 1.25  # intervals, with their jitter: then a beacon of the parent was lost, or it is dead
 TURN_HOPS = 8  # for each neighbour: children ask one after the other, and the answer is for all
 LATE_S = 2.0  # our choice: one lost beacon of a frequent sender says little
@@ -45,6 +53,7 @@ class BeaconPlane(IControlPlane):
         self._basics, self._host, self._states = basics, host, states
         self._me, self._antenna = basics.node_id, basics.antenna
         self._deadlines = basics.deadlines
+        self.bids_within_s = self._antenna.medium.stretched(BIDS_WITHIN_S)
         room = self._room = messages.BODY_BYTES - basics.seals.reserved_bytes(MessageType.BEACON)
         self._body = slice(messages.HEADER_BYTES, messages.HEADER_BYTES + room)
         self._routes = self.routes = BeaconRoutes(
@@ -73,6 +82,7 @@ class BeaconPlane(IControlPlane):
         self._turn = basics.rng.random()  # among the children of its parent
         self._asks = True  # whether its next beacon asks for those of the neighbours
         self._was_connected = self._told = False
+        self._unproven: int | None = None  # the gateway's newest number when the parent was chosen
         self.learn = self._learn
         self.forward = self._courier.forward
 
@@ -176,11 +186,14 @@ class BeaconPlane(IControlPlane):
 
     def _choose(self) -> None:
         before = self._routes.gateway, self._routes.hops, self._routes.offline
+        parent = self._routes.parent
         if not self._routes.choose():
             if not self._told and self._was_connected:
                 self._tell()
             return
         now_s, gateway = self._routes.now_s, self._routes.gateway
+        if self._routes.parent != parent:
+            self._unproven = self._routes.newest_number
         if (gateway, self._routes.hops, self._routes.offline) != before:
             self._trickle.hurry(now_s)
         else:
@@ -196,7 +209,9 @@ class BeaconPlane(IControlPlane):
         connected = parent != NO_ROUTE and not self._routes.offline
         if states is None:
             return
-        if parent != NO_ROUTE:
+        if self._unproven is not None and newer(self._routes.number, self._unproven) > 0:
+            self._unproven = None
+        if parent != NO_ROUTE and self._unproven is None:  # not one that lost the same parent
             neighbour = self._routes.neighbours[parent]
             if neighbour.motion is not None:
                 place, seen_s = neighbour.motion.place, neighbour.reported_s

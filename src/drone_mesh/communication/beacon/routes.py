@@ -232,6 +232,11 @@ class BeaconRoutes(IRoutes):
 
     # The way up --------------------------------------------------------------------------------
 
+    @property
+    def newest_number(self) -> int:
+        """The newest number of its gateway that this node knows."""
+        return self._newest.get(self.gateway, (self.number,))[0]
+
     def choose(self) -> bool:
         """Choose the parent; returns whether anything has changed."""
         if self._has_internet:

@@ -31,6 +31,7 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         self._host = host
         self._technique = self.routes = technique
         self._antenna = basics.antenna
+        self.bids_within_s = basics.timing.check_period_s
         self._deadlines = basics.deadlines
         self._neighbours = basics.neighbours
         self._delivery = self.delivery = Delivery(

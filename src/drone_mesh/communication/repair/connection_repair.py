@@ -20,7 +20,7 @@ from drone_mesh.communication.messages import (
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.parts import NodeParts
 from drone_mesh.communication.place_requests import ask_all_for_places, ask_for_place
-from drone_mesh.communication.repair.election import NO_BID
+from drone_mesh.communication.repair.election import NO_BID, TOOK_OFF, TOOK_OFF_HOME
 from drone_mesh.communication.repair.flight import ASK_AGAIN_S, RepairFlight
 from drone_mesh.communication.repair.interfaces import IRepairStrategy, Step
 from drone_mesh.communication.repair.options import RepairOptions
@@ -136,6 +136,8 @@ class ConnectionRepair(RepairViews):
 
     def on_bid(self, node: int, score: float, from_: int, about: Location | None) -> None:
         """A node of the group bids; `from_` sent or relayed that bid (see IRepairStrategy)."""
+        if score in (TOOK_OFF, TOOK_OFF_HOME):
+            self._parts.neighbours.motion.flies_for_repair(node, self.now_s)
         self._strategy.on_bid(node, score, from_, about)
 
     def on_due(self) -> bool:

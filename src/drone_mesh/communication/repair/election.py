@@ -64,6 +64,10 @@ class Election:
         is_news = before is None or before.score != score
         return is_news and score >= 0 and self.winner() == node
 
+    def knows(self, node: int) -> bool:
+        """Whether `node` has bid."""
+        return node in self._bids
+
     def due_s(self, neighbours: AbstractSet[int]) -> float:
         """When the election is decided unless another bid arrives."""
         if neighbours <= self._bids.keys() | self._passed_over:

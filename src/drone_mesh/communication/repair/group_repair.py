@@ -43,7 +43,7 @@ class GroupRepair(LoneRepair):
     def start(self, mesh: IRepairActions) -> None:
         """Called once, before any other call."""
         super().start(mesh)
-        self._election = Election(mesh.check_period_s)
+        self._election = Election(mesh.bids_within_s)
         self._news = FlightNews()
         self._credit = BidCredit()
         self._asked_s = -math.inf
@@ -60,9 +60,16 @@ class GroupRepair(LoneRepair):
         return LATER_ROUNDS if may_fly and not silent and patience == 1.0 else patience
 
     def on_emergency(self) -> None:
-        """With neighbours: start an election. Alone: fly."""
-        if self.mesh.neighbours():
-            self._ask_for_places()
+        """With neighbours: start an election. Alone: fly.
+
+        Those who wait for a drone in flight do not bid meanwhile, so an election that would be over
+        before they do does not start.
+        """
+        mesh = self.mesh
+        if mesh.neighbours():
+            is_brief = mesh.bids_within_s < TAKE_OFF_WITHIN_S
+            if not (is_brief and self._news.is_quiet(mesh.now_s)):
+                self._ask_for_places()
         else:
             self.on_emergency_alone()
 
@@ -214,6 +221,8 @@ class GroupRepair(LoneRepair):
             score = NO_BID
         most = highest_plausible(mesh.own_place(), mesh.gateway_place, mesh.range_m)
         if not self._credit.believes(node, score, from_, most):
+            if self._election.knows(node):
+                return  # another neighbour may bring the bid itself; in turns, both would be news
             score = NO_BID
         is_best = self._election.heard(node, score, mesh.now_s)
         if mesh.connected or mesh.state is RepairState.FLYING or self._news.is_quiet(mesh.now_s):

@@ -74,6 +74,11 @@ class IRepairActions(abc.ABC):
 
     @property
     @abc.abstractmethod
+    def bids_within_s(self) -> float:
+        """For so long a bid counts, and the bids of neighbours are awaited."""
+
+    @property
+    @abc.abstractmethod
     def connection_lost_after_s(self) -> float:
         """The time without a gateway until the emergency."""
 

@@ -61,6 +61,10 @@ class RepairViews(IRepairActions):
         return self._parts.timing.check_period_s
 
     @property
+    def bids_within_s(self) -> float:  # noqa: D102
+        return self._control.bids_within_s
+
+    @property
     def connection_lost_after_s(self) -> float:  # noqa: D102
         return self._parts.timing.connection_lost_after_s
 

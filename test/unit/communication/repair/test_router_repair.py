@@ -855,6 +855,16 @@ def test_a_late_bid_does_not_start_the_same_negotiation_again():
     assert rig.engine.goals == []
 
 
+def test_a_bid_that_one_neighbour_brings_and_another_distorts_is_passed_on_once():
+    rig = group_rig(3, 4, 5)
+    rig.wait_until(BIDS_S)
+    rig.forget()
+    for _ in range(3):
+        for through, score in ((4, 99.0), (3, 1e6)):  # no node of the group is that far away
+            rig.hear(bytes((9, through, BID, 1, 1)).hex() + struct.pack("<f", score).hex())
+    assert sorted(sent[3] for sent in rig.sent(BID) if sent[0] == 9) == [3, 5]
+
+
 def test_an_emergency_flight_forgets_the_routes_when_it_starts():
     rig = group_rig(3)
     rig.wait_until(BIDS_S)
