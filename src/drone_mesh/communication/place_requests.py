@@ -12,13 +12,14 @@ def ask_for_place(parts: NodeParts, node: int) -> None:
     parts.delivery.send_own(_request(parts, node))
 
 
-def ask_all_for_places(parts: NodeParts) -> None:
-    """Ask every node in range for its place."""
-    parts.antenna.broadcast_message(_request(parts, BROADCAST))
+def ask_all_for_places(parts: NodeParts, may_fly_on: bool = False) -> None:
+    """Ask every node in range for its place. `may_fly_on`: and for those of others, as in flight."""
+    parts.antenna.broadcast_message(_request(parts, BROADCAST, may_fly_on))
 
 
-def _request(parts: NodeParts, to: int) -> bytes:
+def _request(parts: NodeParts, to: int, may_fly_on: bool = False) -> bytes:
     """A request with the place of this node: its destination, if it flies."""
     goal = parts.pilot.goal
     place = goal or parts.pilot.place()
-    return request_for_place(parts.node_id, to, place, flies_there=goal is not None)
+    flies_there = may_fly_on or goal is not None
+    return request_for_place(parts.node_id, to, place, flies_there=flies_there)

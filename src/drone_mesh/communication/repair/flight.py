@@ -114,13 +114,13 @@ class RepairFlight:
     def ask_on_ground(self) -> None:
         """It is on the ground: begin to ask who else is there."""
         self.asks_left = ASKS_ON_GROUND
-        ask_all_for_places(self._parts)
+        ask_all_for_places(self._parts, may_fly_on=True)
 
     def ask_again(self) -> bool:
         """The time for answers is over. Returns False if it is clear and the flight is over."""
         self.asks_left -= 1
         if self.on_ground:
-            ask_all_for_places(self._parts)
+            ask_all_for_places(self._parts, may_fly_on=True)
         return self.on_ground
 
     def _go_to(self, goal: Location) -> None:

@@ -104,6 +104,8 @@ class LoneRepair(IRepairStrategy):
                     mesh.wait_until(settled_s)
                 else:
                     mesh.present()
+            else:
+                return False  # it stays: the timer may be that of an election
         else:
             return False
         return True

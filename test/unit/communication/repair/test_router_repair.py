@@ -1334,6 +1334,17 @@ def test_a_strategy_is_asked_for_its_patience_at_the_checks_and_at_no_other_time
     assert rig.kinds().count("EMERGENCY") == 1
 
 
+def test_a_drone_that_stays_where_it_looked_around_ends_its_elections_in_time():
+    rig = lone_rig()
+    rig.wait_until(46.0)
+    (there,) = rig.engine.goals
+    for _ in range(3):
+        fly(rig, there)
+        rig.know_neighbour(5)  # it has no gateway either, and never bids
+    rig.wait(50.0)
+    assert rig.kinds()[-2:] == ["NEGOTIATION_ENDED", "FLIGHT_DECIDED"]
+
+
 # In flight -----------------------------------------------------------------------------------
 
 
@@ -1455,6 +1466,15 @@ def test_on_the_ground_it_asks_again_and_moves_aside_for_a_drone_that_it_did_not
     fly(rig, rig.engine.goals[-1])
     rig.wait(1.0)
     assert rig.kinds().count("LANDED") == 1
+
+
+def test_on_the_ground_it_asks_for_the_places_of_drones_that_it_cannot_hear():
+    rig = flying_rig()
+    fly(rig, rig.engine.goals[-1])
+    requests = [request for request in rig.broadcasts() if request[2] == REQUEST]
+    assert [request[13:15].hex(" ") for request in requests] == ["01 80"] * len(requests)
+    rig.hear("05 05 45 01 01 00 00 09 00 00 00 41 00 00 c0 bf 00 00")  # 9 was last at (8, -1.5)
+    assert rig.engine.goals[-1].distance_m(Location(8.0, -1.5, 0.0)) >= 1.0
 
 
 @pytest.mark.parametrize(("away_m", "steps_aside"), [(0.45, True), (1.2, False)])
