@@ -115,7 +115,8 @@ class Neighbours:
         known = self._places.get(node)
         if known is None or heard_s >= known.heard_s:
             self._places[node] = HeardPlace(place, heard_s)
-            self.motion.reported(node, place, heard_s)
+            if known is None or known.place != place:  # most nodes stand
+                self.motion.reported(node, place, heard_s)
 
     def place_of(self, node: int) -> HeardPlace | None:
         """The last reported place of `node`."""
