@@ -13,7 +13,7 @@ def ask_for_place(parts: NodeParts, node: int) -> None:
 
 
 def ask_all_for_places(parts: NodeParts, may_fly_on: bool = False) -> None:
-    """Ask every node in range for its place. `may_fly_on`: and for those of others, as in flight."""
+    """Ask every node in range for its place; `may_fly_on`: also of others near, as in flight."""
     parts.antenna.broadcast_message(_request(parts, BROADCAST, may_fly_on))
 
 

@@ -61,25 +61,29 @@ class Motion(NamedTuple):
         return math.sqrt(north * north + east * east + up * up)
 
 
+NO_LIST = 255
+
+
 class Below(NamedTuple):
     """Some of the nodes that a node leads to, in circular order of their ids.
 
     None of those between `after` and the last of `listed` is left out. So who hears a part of the
-    list also learns who is no longer in it.
+    list also learns who is no longer in it. An empty list says that there is none but the new ones.
     """
 
-    after: int  # the last one of the part before
+    after: int  # the last one of the part before; NO_LIST: this beacon has no room for any
     listed: tuple[int, ...]
     new: tuple[int, ...] = ()  # since the last beacon, wherever their turn is
 
     def covers(self, node: int) -> bool:
         """Whether `node` would be listed if it were below."""
         if not self.listed:
-            return False
+            return self.after != NO_LIST
         return (node - self.after - 1) % 256 <= (self.listed[-1] - self.after - 1) % 256
 
 
 NONE_BELOW = Below(0, ())
+NOT_LISTED = Below(NO_LIST, ())
 
 
 class Beacon(NamedTuple):

@@ -13,6 +13,7 @@ from drone_mesh.communication.beacon.losses import WRONG, Losses
 from drone_mesh.communication.beacon.packets import (
     ANCESTORS,
     NO_ANCESTORS,
+    NOT_LISTED,
     Beacon,
     Below,
     Motion,
@@ -87,15 +88,16 @@ class Neighbour:
         if beacon.near:
             self.near_s.update(dict.fromkeys(beacon.near, now_s))
         _after, listed, new = below = beacon.below
-        if listed:
-            announced_s = self.announced_s
+        announced_s = self.announced_s
+        if announced_s:
             for node in [n for n in announced_s if n not in listed and below.covers(n)]:
                 del announced_s[node]
+        if listed:
             for node in listed:
                 announced_s.setdefault(node, now_s)
             self.listed_s.update(dict.fromkeys(listed, now_s))
         if new:
-            self.announced_s.update(dict.fromkeys(new, now_s))
+            announced_s.update(dict.fromkeys(new, now_s))
             self.listed_s.update(dict.fromkeys(new, now_s))
 
     def alive(self, now_s: float) -> None:
@@ -432,6 +434,8 @@ class BeaconRoutes(IRoutes):
     def to_announce(self, most: int) -> Below:
         """The next part of the nodes below, at most so many, and those that came to it."""
         below, after = self.below(), self._announced_last
+        if most < 1:
+            return NOT_LISTED
         self._announced &= below
         self._new = self._new & below | below - self._announced
         new = sorted(self._new)[: max(0, most - 1)]

@@ -7,6 +7,7 @@ import pytest
 from drone_mesh.communication.beacon.packets import (
     NO_ANCESTORS,
     NONE_BELOW,
+    NOT_LISTED,
     Beacon,
     Below,
     Found,
@@ -91,7 +92,11 @@ def test_a_part_of_the_list_covers_all_ids_since_the_part_before():
 
 def test_a_complete_list_covers_every_id():
     assert all(Below(8, (2, 8)).covers(node) for node in range(256))
-    assert not NONE_BELOW.covers(0)
+
+
+def test_an_empty_list_covers_every_id_unless_there_was_no_room_for_any():
+    assert NONE_BELOW.covers(0)
+    assert not NOT_LISTED.covers(0)
 
 
 def test_a_search_and_its_answer_have_these_bytes():

@@ -7,6 +7,7 @@ import pytest
 from drone_mesh.communication.beacon.packets import (
     NO_ANCESTORS,
     NONE_BELOW,
+    NOT_LISTED,
     Beacon,
     Below,
     Motion,
@@ -158,6 +159,20 @@ def test_a_node_that_its_child_lists_no_longer_is_soon_not_below(routes):
     assert routes.below() == {1, 20, 30}
     routes.now_s = 1.1
     assert 20 not in routes.below()
+
+
+def test_a_neighbour_that_lists_nobody_leads_to_nobody_unless_its_beacon_had_no_room(routes):
+    routes.heard(1, beacon(hops=3, parent=8, below=Below(20, (20,))))
+    routes.heard(1, beacon(hops=3, parent=8, below=NOT_LISTED))
+    assert ways(routes, 20) == [1]
+    routes.heard(1, beacon(hops=3, parent=8, below=NONE_BELOW))
+    assert ways(routes, 20) == []
+
+
+def test_a_beacon_without_room_says_so(routes):
+    routes.heard(1, beacon(hops=3, parent=9))
+    assert routes.to_announce(0) == NOT_LISTED
+    assert routes.to_announce(4).new == (1,)
 
 
 def test_announcements_go_round_and_new_nodes_do_not_wait(routes):
