@@ -328,6 +328,23 @@ def test_those_who_lost_one_parent_remember_its_place_and_not_that_of_each_other
     assert {network.nodes[node].component.places.good_id for node in (2, 3, 4)} == {1}
 
 
+def test_in_flight_it_learns_no_place_to_step_back_to():
+    """Beside its start it was connected through 1, and flies on from there."""
+    network = Network(seed=1, routing="beacon")
+    network.add_gateway(0, 0.0, 0.0)
+    network.add_router(1, 6.0, 0.0)
+    network.add_router(2, 12.0, 0.0)
+    network.run_for(10.0)
+    places = network.nodes[2].component.places
+    assert places.good_id == 1
+    network.order(2, 12.0, 6.0)
+    network.run_for(2.0)
+    assert network.connected(2)
+    assert places.good_id == 0
+    network.run_for(10.0)
+    assert places.good_id == 1
+
+
 def test_a_repair_begins_ten_seconds_after_the_loss():
     network = Network(seed=1, routing="beacon")
     network.add_gateway(0, 0.0, 0.0)

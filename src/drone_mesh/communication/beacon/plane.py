@@ -211,7 +211,8 @@ class BeaconPlane(IControlPlane):
             return
         if self._unproven is not None and newer(self._routes.number, self._unproven) > 0:
             self._unproven = None
-        if parent != NO_ROUTE and self._unproven is None:  # not one that lost the same parent
+        flies = states.repair is RepairState.FLYING  # over links that it leaves behind
+        if parent != NO_ROUTE and self._unproven is None and not flies:
             neighbour = self._routes.neighbours[parent]
             if neighbour.motion is not None:
                 place, seen_s = neighbour.motion.place, neighbour.reported_s

@@ -83,11 +83,9 @@ class MarkerMaker:
             self._add_lines(f"links: {use.name.lower()}", lines, colour, LINK_WIDTH_M[use])
         breaking = [(positions[a], positions[b]) for a, b in shortest(set(soon), nodes, MOST_LINKS)]
         self._add_lines("links: soon", breaking, _colour(DARK.flying), LINK_WIDTH_M[LinkUse.ROUTE])
-        for name, lines, colour in (
-            ("flight paths", _path_lines(nodes, positions), DARK.path),
-            ("headings", _heading_lines(nodes, positions), DARK.muted),
-        ):
-            self._add_lines(name, lines, _colour(colour), PATH_WIDTH_M)
+        flown, ahead = _path_lines(nodes, positions), _heading_lines(nodes, positions)
+        self._add_lines("flight paths", flown, _colour(DARK.path), PATH_WIDTH_M)
+        self._add_lines("headings", ahead, _colour(DARK.muted), PATH_WIDTH_M)
         self._add_ids(nodes, positions)
         self._add_legend(positions)
         for marker in self._made:
