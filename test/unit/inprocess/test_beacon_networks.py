@@ -328,6 +328,20 @@ def test_those_who_lost_one_parent_remember_its_place_and_not_that_of_each_other
     assert {network.nodes[node].component.places.good_id for node in (2, 3, 4)} == {1}
 
 
+def test_a_mesh_that_has_just_come_up_knows_the_places_that_a_repair_needs():
+    network = Network(seed=1, routing="beacon")
+    network.add_gateway(0, 1.0, 2.0)
+    for node in range(1, 8):
+        network.add_router(node, 1.0 + 8.0 * node, 2.0)
+    network.run_for(1.0)
+    for node in range(1, 8):
+        places = network.nodes[node].component.places
+        assert places.gateway == pytest.approx(network.location(0))
+        assert places.good == pytest.approx(network.location(node - 1))
+    network.power(3, False)
+    assert network.run_until(lambda: network.connected(4), within_s=40.0)
+
+
 def test_in_flight_it_learns_no_place_to_step_back_to():
     """Beside its start it was connected through 1, and flies on from there."""
     network = Network(seed=1, routing="beacon")

@@ -82,6 +82,7 @@ class BeaconPlane(IControlPlane):
         self._turn = basics.rng.random()  # among the children of its parent
         self._asks = True  # whether its next beacon asks for those of the neighbours
         self._was_connected = self._told = False
+        self._told_place: Location | None = None  # of the gateway
         self._unproven: int | None = None  # the gateway's newest number when the parent was chosen
         self.learn = self._learn
         self.forward = self._courier.forward
@@ -212,11 +213,13 @@ class BeaconPlane(IControlPlane):
         if self._unproven is not None and newer(self._routes.number, self._unproven) > 0:
             self._unproven = None
         flies = states.repair is RepairState.FLYING  # over links that it leaves behind
-        if parent != NO_ROUTE and self._unproven is None and not flies:
+        places = self._basics.places
+        is_proven = self._unproven is None or places.good is None
+        if parent != NO_ROUTE and is_proven and not flies:
             neighbour = self._routes.neighbours[parent]
             if neighbour.motion is not None:
                 place, seen_s = neighbour.motion.place, neighbour.reported_s
-                self._basics.places.update_next_hop(parent, place, seen_s)
+                places.update_next_hop(parent, place, seen_s)
         if connected == self._was_connected:
             return
         self._was_connected = connected
@@ -302,9 +305,11 @@ class BeaconPlane(IControlPlane):
 
     def _gateway_place(self) -> Location | None:
         """The gateway's place, if it is this beacon's turn to spread it."""
-        if self._routes.is_root or self._sent % GATEWAY_PLACE_EVERY:
+        place = self._basics.places.gateway
+        is_news, self._told_place = place != self._told_place, place
+        if self._routes.is_root or not is_news and self._sent % GATEWAY_PLACE_EVERY:
             return None
-        return self._basics.places.gateway
+        return place
 
     def _broadcast(self, kind: int, creator: int, body: bytes) -> None:
         self._antenna.broadcast_message(
@@ -330,9 +335,14 @@ class BeaconPlane(IControlPlane):
             beacon = beacon._replace(motion=None, gateway_place=None)
         is_quiet = now_s < self._look_s and not routes.is_news(creator, beacon)
         is_new = routes.heard(creator, beacon)
-        self._take_places(creator, beacon)
-        if is_quiet and not self._courier.holds:
-            return  # most beacons
+        self._take_place(creator, beacon)
+        if self._courier.holds or not is_quiet:  # few beacons
+            self._consider(creator, beacon, is_new)
+        self._take_gateway_place(creator, beacon)
+
+    def _consider(self, creator: int, beacon: Beacon, is_new: bool) -> None:
+        """What a neighbour's beacon changes."""
+        routes, now_s = self._routes, self._routes.now_s
         self._look_s = now_s + LOOK_S
         if is_new:
             self._trickle.reset(now_s)
@@ -347,15 +357,18 @@ class BeaconPlane(IControlPlane):
             self._courier.retry()
         self._plan()
 
-    def _take_places(self, node: int, beacon: Beacon) -> None:
-        neighbours, places, now_s = self._basics.neighbours, self._basics.places, self._routes.now_s
+    def _take_place(self, node: int, beacon: Beacon) -> None:
+        neighbours = self._basics.neighbours
         neighbours.set_hops(node, beacon.hops)
         if beacon.gateway <= MAX_NODE_ID:
             neighbours.set_gateway(node, beacon.gateway)
         if beacon.motion is not None:
-            neighbours.set_place(node, beacon.motion.place, now_s)
-            if node == self._routes.gateway:
-                places.update_gateway(beacon.motion.place, now_s)
+            neighbours.set_place(node, beacon.motion.place, self._routes.now_s)
+
+    def _take_gateway_place(self, node: int, beacon: Beacon) -> None:
+        places, now_s = self._basics.places, self._routes.now_s
+        if node == self._routes.gateway and beacon.motion is not None:
+            places.update_gateway(beacon.motion.place, now_s)
         here, place = self._routes.motion, beacon.gateway_place
         if here is not None and place is not None and node == self._routes.parent:
             farthest_m = (beacon.hops + 1) * self._basics.range_m
