@@ -17,6 +17,7 @@ from drone_mesh.communication.repair.interfaces import (
     IRepairStrategy,
     Step,
 )
+from drone_mesh.communication.router_states import RepairState
 from drone_mesh.drone.location import Location
 
 LISTENS_S = 1.0  # our choice: an answer takes some milliseconds
@@ -88,6 +89,8 @@ class LoneRepair(IRepairStrategy):
 
     def on_time_alone(self) -> bool:
         """The timer has expired. Returns whether it was that of a drone alone."""
+        if self.mesh.state is not RepairState.LOST:
+            self._samples = None  # an election has begun meanwhile
         if self.mesh.neighbours() and self._stood_at is None:
             self._samples = None
             return False

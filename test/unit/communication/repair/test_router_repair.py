@@ -1191,6 +1191,17 @@ def test_power_in_a_few_samples_is_a_frame_of_strangers_and_no_jammer():
     assert len(rig.engine.goals) == 1
 
 
+def test_an_election_that_begins_while_it_measures_the_power_ends_the_measurement():
+    rig = lone_rig()
+    rig.antenna.power = lambda: False
+    rig.wait_until(EMERGENCY_S + 0.2)
+    rig.know_neighbour(3)
+    rig.antenna.dead = {2, 3}  # its own bid finds nobody any more
+    rig.hear(bid(3, 1.0), place(3, 13.0))
+    rig.wait(5.0)
+    assert len(rig.engine.goals) == 1
+
+
 def test_a_drone_that_hears_nodes_does_not_ask_about_power():
     rig = group_rig(3)
     rig.antenna.power = None  # an error if it is called
