@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import math
 import struct
-from typing import NamedTuple, Tuple
+from typing import NamedTuple, Sequence, Tuple
 
 from drone_mesh.communication.interfaces import MAX_NODE_ID, NO_ROUTE
 from drone_mesh.communication.messages import HEADER_BYTES
@@ -21,6 +21,8 @@ _WRAP = 2**16
 _FASTEST_M_S = 50.0  # a velocity is coded by its square root, so slow ones are precise
 
 _END = b"\xff"  # of the new nodes below and of the neighbours, if they do not fill the packet
+_AS_BITS = 255  # no node's id; first in a list of nodes below: it consists of bits
+_BITS_AT = 2  # in such a list, behind the first id
 _COUNT, _HAS_PLACE, _HAS_DIGEST, _HAS_GATEWAY_PLACE, _LOOKS = 0x0F, 0x10, 0x20, 0x40, 0x80
 _LONGEST, _OFFLINE = 0x7F, 0x80  # in the byte of the interval
 _PLACE = struct.Struct("<3H3b")
@@ -81,6 +83,29 @@ class Below(NamedTuple):
             return self.after != NO_LIST
         return (node - self.after - 1) % 256 <= (self.listed[-1] - self.after - 1) % 256
 
+    def list_bytes(self) -> bytes:
+        """`listed` as ids, or as the first id and a bit for each one from there on, if shorter."""
+        ids = bytes(self.listed)
+        if len(ids) <= _BITS_AT:
+            return ids
+        bits = sum(1 << (node - ids[0]) % 256 for node in ids)
+        as_bits = bytes((_AS_BITS, ids[0])) + bits.to_bytes((bits.bit_length() + 7) // 8, "little")
+        return min(ids, as_bits, key=len)
+
+
+def ids_that_fit(ids: Sequence[int], room: int) -> tuple[int, ...]:
+    """The longest beginning of `ids`, in circular order, that a list of `room` bytes can hold."""
+    as_bits = [node for node in ids if (node - ids[0]) % 256 < 8 * (room - _BITS_AT)]
+    return tuple(max(ids[:room], as_bits, key=len))
+
+
+def _listed(data: bytes) -> tuple[int, ...]:
+    """The inverse of `Below.list_bytes`."""
+    if len(data) <= _BITS_AT or data[0] != _AS_BITS:
+        return tuple(data)
+    bits = int.from_bytes(data[_BITS_AT:], "little")
+    return tuple((data[1] + at) % 256 for at in range(bits.bit_length()) if bits >> at & 1)
+
 
 NONE_BELOW = Below(0, ())
 NOT_LISTED = Below(NO_LIST, ())
@@ -116,9 +141,10 @@ class Beacon(NamedTuple):
         if self.gateway_place is not None:
             flags |= _HAS_GATEWAY_PLACE
             body += _GATEWAY_PLACE.pack(*_units(self.gateway_place))
+        listed = self.below.list_bytes()
         interval = max(1, min(_LONGEST, math.ceil(self.interval_s / _INTERVAL_S)))
         head = _HEAD.pack(
-            flags | len(self.below.listed),
+            flags | len(listed),
             interval | _OFFLINE if self.offline else interval,
             self.gateway,
             self.number,
@@ -126,16 +152,16 @@ class Beacon(NamedTuple):
             self.parent,
             bytes(self.ancestors),
         )
-        body += bytes((self.below.after, *self.below.listed, *self.below.new))
+        body += bytes((self.below.after, *listed, *self.below.new))
         return (head + body + _END + bytes(self.near))[:room].ljust(room, _END)
 
     def room_below(self, room: int) -> int:
-        """How many nodes below fit into `room` bytes with the rest; negative: that does not fit."""
+        """How many of `room` bytes the nodes below may take; negative: the rest does not fit."""
         return min(_COUNT, self._room(room))
 
     def room_near(self, room: int) -> int:
         """How many neighbours fit behind the nodes below."""
-        return self._room(room) - len(self.below.listed) - len(self.below.new) - len(_END)
+        return self._room(room) - len(self.below.list_bytes()) - len(self.below.new) - len(_END)
 
     def _room(self, room: int) -> int:
         used = _HEAD.size + 1
@@ -185,7 +211,7 @@ class Beacon(NamedTuple):
             gateway_place,
             digest,
             bool(flags & _LOOKS),
-            Below(body[after], tuple(body[after + 1 : end]), tuple(new)),
+            Below(body[after], _listed(body[after + 1 : end]), tuple(new)),
             tuple(near),
             bool(interval & _OFFLINE),
         )

@@ -17,6 +17,7 @@ from drone_mesh.communication.beacon.packets import (
     Beacon,
     Below,
     Motion,
+    ids_that_fit,
     newer,
 )
 from drone_mesh.communication.interfaces import NO_ROUTE
@@ -432,16 +433,21 @@ class BeaconRoutes(IRoutes):
         return set(below_s)
 
     def to_announce(self, most: int) -> Below:
-        """The next part of the nodes below, at most so many, and those that came to it."""
+        """The next part of the nodes below, and those that came to it, in at most so many bytes."""
         below, after = self.below(), self._announced_last
         if most < 1:
             return NOT_LISTED
         self._announced &= below
         self._new = self._new & below | below - self._announced
+        turn = sorted(below, key=lambda node: (node - after - 1) % 256)
         new = sorted(self._new)[: max(0, most - 1)]
-        self._new.difference_update(new)
-        turn = sorted(below.difference(new), key=lambda node: (node - after - 1) % 256)
-        listed = tuple(turn[: most - len(new)])
+        listed = ids_that_fit(turn, most)
+        if len(self._new.intersection(listed)) > len(new):
+            new = []  # many came at once, such as a whole subtree
+        else:
+            turn = [node for node in turn if node not in new]
+            listed = ids_that_fit(turn, most - len(new))
+        self._new.difference_update(new, listed)
         if listed:
             self._announced_last = listed[-1]
         if len(listed) == len(turn):

@@ -13,6 +13,7 @@ from drone_mesh.communication.beacon.packets import (
     Found,
     Motion,
     Search,
+    ids_that_fit,
     newer,
 )
 from drone_mesh.drone.location import Location
@@ -97,6 +98,46 @@ def test_a_complete_list_covers_every_id():
 def test_an_empty_list_covers_every_id_unless_there_was_no_room_for_any():
     assert NONE_BELOW.covers(0)
     assert not NOT_LISTED.covers(0)
+
+
+def test_many_nodes_below_stand_as_the_first_id_and_a_bit_for_each():
+    crowd = ROUTER._replace(below=Below(5, (6, 8, 9, 11, 28, 29), (12,)))
+    body = bytes.fromhex(FULL[: 18 * 3] + "05 ff 06 2d 00 c0 0c ff ff")
+    body = bytes((body[0] + 2, *body[1:]))
+    assert crowd.to_body(27) == body
+    assert crowd.room_near(27) == 1
+    assert Beacon.from_body(body, HERE).below == crowd.below
+
+
+@pytest.mark.parametrize(
+    "ids", [(), (7,), (7, 8, 9), (250, 253, 0, 1, 2), tuple(range(1, 100)), (0, 60, 120, 180)]
+)
+def test_a_list_of_nodes_below_is_decoded_as_it_was(ids):
+    fitting = ids_that_fit(ids, 8)
+    body = ROUTER._replace(below=Below(5, fitting)).to_body(27)
+    assert Beacon.from_body(body, HERE).below == Below(5, fitting)
+    assert fitting == ids[: len(fitting)]
+
+
+@pytest.mark.parametrize(
+    ("ids", "room", "fit"),
+    [
+        (range(1, 100), 8, 48),  # 6 bytes of bits
+        (range(1, 100), 3, 8),
+        (range(1, 100), 2, 2),  # no room for any bit
+        (range(0, 200, 20), 8, 8),  # far apart: as ids
+        (range(250, 252), 8, 2),
+    ],
+)
+def test_so_many_nodes_below_fit(ids, room, fit):
+    assert ids_that_fit(ids, room) == tuple(ids[:fit])
+
+
+@pytest.mark.parametrize("listed", ["ff", "ff 07", "ff ff ff"])
+def test_a_list_of_bits_that_is_cut_off_or_names_nobody_does_no_harm(listed):
+    count = len(bytes.fromhex(listed))
+    body = bytes.fromhex(f"0{count} 14 00 07 02 04 09 00 ff 05 {listed}").ljust(27, b"\xff")
+    assert len(Beacon.from_body(body, HERE).below.listed) in (1, 2, 8)
 
 
 def test_a_search_and_its_answer_have_these_bytes():

@@ -187,6 +187,13 @@ def test_announcements_go_round_and_new_nodes_do_not_wait(routes):
     assert 99 in routes.to_announce(4).new
 
 
+def test_a_whole_subtree_that_comes_at_once_is_announced_in_one_list(routes):
+    ids = tuple(range(20, 60))
+    routes.heard(20, beacon(hops=3, parent=9, below=Below(59, ids[1:])))
+    assert routes.to_announce(8) == Below(59, ids)
+    assert not routes.has_news
+
+
 def test_a_packet_down_follows_the_child_that_announced_the_node_last(routes):
     routes.heard(1, beacon(hops=3, parent=9, below=Below(20, (20,))))
     routes.now_s = 0.5
