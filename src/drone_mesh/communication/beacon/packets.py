@@ -95,8 +95,8 @@ class Below(NamedTuple):
 
 def ids_that_fit(ids: Sequence[int], room: int) -> tuple[int, ...]:
     """The longest beginning of `ids`, in circular order, that a list of `room` bytes can hold."""
-    as_bits = [node for node in ids if (node - ids[0]) % 256 < 8 * (room - _BITS_AT)]
-    return tuple(max(ids[:room], as_bits, key=len))
+    as_bits = tuple(node for node in ids if (node - ids[0]) % 256 < 8 * (room - _BITS_AT))
+    return max(tuple(ids[:room]), as_bits, key=len)
 
 
 def _listed(data: bytes) -> tuple[int, ...]:
