@@ -198,7 +198,10 @@ class Beacon(NamedTuple):
             if here is not None:
                 gateway_place = _place(units, here)
         after, end = at, at + 1 + (flags & _COUNT)
+        listed = _listed(body[after + 1 : end])
         new, _end, rest = body[end:].partition(_END)
+        if max((*listed, *new), default=0) > MAX_NODE_ID:  # announced further, it would spoil lists
+            return None
         near = rest.split(_END, 1)[0]
         return cls(
             gateway,
@@ -211,7 +214,7 @@ class Beacon(NamedTuple):
             gateway_place,
             digest,
             bool(flags & _LOOKS),
-            Below(body[after], _listed(body[after + 1 : end]), tuple(new)),
+            Below(body[after], listed, tuple(new)),
             tuple(near),
             bool(interval & _OFFLINE),
         )

@@ -442,11 +442,11 @@ class BeaconRoutes(IRoutes):
         turn = sorted(below, key=lambda node: (node - after - 1) % 256)
         new = sorted(self._new)[: max(0, most - 1)]
         listed = ids_that_fit(turn, most)
-        if len(self._new.intersection(listed)) > len(new):
-            new = []  # many came at once, such as a whole subtree
-        else:
+        if new and len(new) >= len(self._new.intersection(listed)):
             turn = [node for node in turn if node not in new]
             listed = ids_that_fit(turn, most - len(new))
+        else:  # none, or many at once, such as a whole subtree
+            new = []
         self._new.difference_update(new, listed)
         if listed:
             self._announced_last = listed[-1]

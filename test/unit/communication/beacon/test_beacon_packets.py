@@ -133,11 +133,19 @@ def test_so_many_nodes_below_fit(ids, room, fit):
     assert ids_that_fit(ids, room) == tuple(ids[:fit])
 
 
-@pytest.mark.parametrize("listed", ["ff", "ff 07", "ff ff ff"])
-def test_a_list_of_bits_that_is_cut_off_or_names_nobody_does_no_harm(listed):
-    count = len(bytes.fromhex(listed))
-    body = bytes.fromhex(f"0{count} 14 00 07 02 04 09 00 ff 05 {listed}").ljust(27, b"\xff")
-    assert len(Beacon.from_body(body, HERE).below.listed) in (1, 2, 8)
+@pytest.mark.parametrize(
+    "below",
+    ["ff", "ff 07", "ff ff 01", "ff fc 04", "fe", "07 08 ff"],  # cut off, 255, 254, ids 254 and 255
+)
+def test_a_list_that_names_an_id_that_no_node_has_is_damaged(below):
+    ids = bytes.fromhex(below)
+    head = bytes.fromhex(f"0{len(ids)} 14 00 07 02 04 09 00 ff 05")
+    assert Beacon.from_body((head + ids).ljust(27, b"\xff"), HERE) is None
+
+
+def test_a_new_node_below_with_an_id_that_no_node_has_is_damage():
+    body = bytes.fromhex(FULL).replace(b"\x0c\xff", b"\xfe\xff")
+    assert Beacon.from_body(body, HERE) is None
 
 
 def test_a_search_and_its_answer_have_these_bytes():
