@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
 from typing import Any
@@ -26,13 +27,15 @@ SUITES = sorted({path.stem for path in EXPERIMENTS.glob("*.yaml")} - {BOXES})
 
 @pytest.mark.parametrize("name", SUITES)
 def test_each_suite_is_a_valid_experiment_whose_runs_do_not_fail(name: str) -> None:
-    loaded = load_experiment(
-        EXPERIMENTS / f"{name}.yaml",
-        [] if name in ("published", "air") else ["base.duration_s=70", "base.sample_s=5"],
-    )
+    loaded = load_experiment(EXPERIMENTS / f"{name}.yaml")
     assert loaded.experiment.name == name
-    first = next(iter(Plan(loaded)))
-    assert execute(first.spec).message == ""
+    spec = next(iter(Plan(loaded))).spec
+    scenario = json.loads(spec.scenario)  # a cell may set the duration
+    if name not in ("published", "air"):
+        longest_s = 30 if scenario["radio"]["kind"] == "chips" else 70
+        scenario["duration_s"] = min(scenario["duration_s"], longest_s)
+        scenario["sample_s"] = 5
+    assert execute(spec._replace(scenario=json.dumps(scenario))).message == ""
 
 
 def test_the_template_of_lab_new_is_a_valid_experiment(
