@@ -10,24 +10,17 @@ import math
 
 from drone_mesh.communication.control_plane import IControlPlane
 from drone_mesh.communication.deadlines import Due
-from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE
-from drone_mesh.communication.messages import (
-    GatewayPlace,
-    MovementNegotiationMessage,
-    addressed,
-    location,
-)
+from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.parts import NodeParts
-from drone_mesh.communication.place_requests import ask_all_for_places, ask_for_place
+from drone_mesh.communication.repair.actions import RepairActions, Step
 from drone_mesh.communication.repair.election import NO_BID, TOOK_OFF, TOOK_OFF_HOME
 from drone_mesh.communication.repair.flight import ASK_AGAIN_S, RepairFlight
-from drone_mesh.communication.repair.interfaces import IRepairStrategy, Step
+from drone_mesh.communication.repair.interfaces import IRepairStrategy
 from drone_mesh.communication.repair.options import RepairOptions
 from drone_mesh.communication.repair.spots import PITCH, Landing, own_spot
 from drone_mesh.communication.repair.status import NOTHING_TO_REPAIR, RepairStatus
 from drone_mesh.communication.repair.taken_places import TakenPlaces
-from drone_mesh.communication.repair.views import RepairViews
 from drone_mesh.communication.router_states import RepairState, RouterEvent, RouterStates
 from drone_mesh.drone.location import Location
 
@@ -35,7 +28,7 @@ MOVING_PATIENCE = 3.0  # our choice: while drones move by themselves, a lost lin
 ROUNDING_S = 1e-6  # sums of periods are not exact
 
 
-class ConnectionRepair(RepairViews):
+class ConnectionRepair(RepairActions):
     """The repair of one router. It drives the `RepairState` of the router's states."""
 
     def __init__(
@@ -177,7 +170,7 @@ class ConnectionRepair(RepairViews):
     # Actions of the strategy -----------------------------------------------------------------
 
     def fly(self, step: Step, until_connected: bool = False) -> None:
-        """See IRepairActions; also for the functions below."""
+        """See RepairActions; also for the functions below."""
         self._parts.report(MeshEventKind.FLIGHT_DECIDED, step.owner)
         flight = self._new_flight(step, self.goal_of(step))
         flight.stops_when_connected = until_connected or step.home
@@ -196,52 +189,12 @@ class ConnectionRepair(RepairViews):
         self._took_off()
         self._flight = flight
 
-    def bid(  # noqa: D102
-        self,
-        score: float,
-        node: int | None = None,
-        but_not_to: int = NO_ROUTE,
-        about: Location | None = None,
-    ) -> None:
-        me = self.node_id
-        creator = me if node is None else node
-        packet = MovementNegotiationMessage(creator, me, me, me, score).to_payload()
-        if about is not None:
-            packet = GatewayPlace(self._control.gateway, about, 0.0).appended_to(packet)
-        for neighbour in sorted(self._parts.routing.get_set_of_children() - {creator, but_not_to}):
-            self._parts.delivery.send_own(addressed(packet, neighbour))
-
-    def ask_places(self) -> None:  # noqa: D102
-        ask_all_for_places(self._parts)
-
-    def ask_place(self, node: int) -> None:  # noqa: D102
-        ask_for_place(self._parts, node)
-
-    def announce_place(self, place: Location) -> None:  # noqa: D102
-        me = self.node_id
-        packet = location(place, self.now_s, me, me, BROADCAST, BROADCAST)
-        self._parts.antenna.broadcast_message(packet)
-
-    def present(self) -> None:  # noqa: D102
-        self._control.introduce()
-
-    def wait_until(self, at_s: float) -> None:  # noqa: D102
-        self._parts.deadlines.set(Due.REPAIR, at_s)
-
-    def happened(self, event: RouterEvent) -> None:  # noqa: D102
-        self._states.happened(event)
-
     def end_round(self) -> None:  # noqa: D102
         checked_s = self._checked_s
         self._states.happened(RouterEvent.ROUND_OVER)
         self._clear()
         if checked_s is not None:
             self._notice_loss(checked_s)
-
-    def report(  # noqa: D102
-        self, kind: MeshEventKind, peer: int = NO_ROUTE, detail: str = ""
-    ) -> None:
-        self._parts.report(kind, peer, detail)
 
     # Flight ----------------------------------------------------------------------------------
 

@@ -10,6 +10,7 @@ import math
 
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.communication.repair.actions import RepairActions, Step
 from drone_mesh.communication.repair.bid_credit import BidCredit, highest_plausible
 from drone_mesh.communication.repair.election import (
     HOME_FAILED,
@@ -20,7 +21,6 @@ from drone_mesh.communication.repair.election import (
     as_on_the_air,
 )
 from drone_mesh.communication.repair.flight_news import FlightNews
-from drone_mesh.communication.repair.interfaces import IRepairActions, Step
 from drone_mesh.communication.repair.lone_repair import LoneRepair
 from drone_mesh.communication.repair.spots import NEAR, PITCH
 from drone_mesh.communication.router_states import RepairState, RouterEvent
@@ -40,7 +40,7 @@ IN_A_ROUND = (RepairState.ASKING, RepairState.NEGOTIATING, RepairState.WATCHING)
 class GroupRepair(LoneRepair):
     """Asks for places, elects, flies one step back; the gateway's place is the second choice."""
 
-    def start(self, mesh: IRepairActions) -> None:
+    def start(self, mesh: RepairActions) -> None:
         """Called once, before any other call."""
         super().start(mesh)
         self._election = Election(mesh.bids_within_s)
