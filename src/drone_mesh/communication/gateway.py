@@ -25,7 +25,7 @@ from drone_mesh.communication.messages import (
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.order_record import OrderRecord
 from drone_mesh.communication.orders.book import OrderBook
-from drone_mesh.communication.orders.final_places import FinalPlaces
+from drone_mesh.communication.orders.final_places import check_place
 from drone_mesh.communication.orders.messages import OrderReply
 from drone_mesh.communication.reports.node_reports import ReportBook, ReportedNode
 from drone_mesh.communication.ways import ITechnique
@@ -61,9 +61,6 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         self._reports = ReportBook()
         self._book = OrderBook(self._parts, self._may_find, self.control.search)
         self._orders.on_own_reply = self._book.on_outcome
-        self._final_places = FinalPlaces(
-            self._parts, self._book.records, self._reports.nodes, self._options.clearance_m
-        )
 
     def stop(self) -> None:
         """Stop the internet connection, the antenna and debugging."""
@@ -124,7 +121,8 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
             raise GoalRefused(f"invalid height {height} m: must be in whole metres")
         goal = Location(latitude, longitude, height)
         if not allow_shared_place:
-            self._final_places.check(node_id, goal)
+            orders, reports = self._book.records(), self._reports.nodes()
+            check_place(self._parts, orders, reports, node_id, goal, self._options.clearance_m)
         number = self._book.enter(node_id, goal)
         if node_id != self._node_id:
             return self._book.send(number)

@@ -10,7 +10,6 @@ import abc
 import random
 from typing import TypedDict
 
-from drone_mesh.communication import messages
 from drone_mesh.communication.complaints import Complaints
 from drone_mesh.communication.control_plane import (
     IControlHost,
@@ -36,7 +35,6 @@ from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.observer import MeshObserver, Reporter, ignore_events
 from drone_mesh.communication.orders.intake import OrderIntake
 from drone_mesh.communication.own_id import OwnId
-from drone_mesh.communication.packet_types import DATA_TYPES
 from drone_mesh.communication.parts import NodeBasics, NodeParts
 from drone_mesh.communication.places import KnownPlaces
 from drone_mesh.communication.repair.options import RepairOptions
@@ -120,7 +118,7 @@ class MeshNode(IMeshDebugInfo, IControlHost):
         self.control = control = self._control_plane(basics, routing, states)
         self._learn, self._forward = control.learn, control.forward  # called for each packet
         self._parts = NodeParts(**vars(basics), routing=control.routes, delivery=control.delivery)
-        self._orders = OrderIntake(self._parts, self.complaints, self._took_off)
+        self._orders = OrderIntake(self._parts, self._took_off)
         self._reporter = NodeReporter(self._parts, self)
         room = messages.BODY_BYTES - seals.reserved_bytes(DATA_TYPES.start)
         self.data = Transport(self._parts, self.complaints, rng, self, room)

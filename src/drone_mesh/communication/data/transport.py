@@ -8,11 +8,9 @@ sender.
 from __future__ import annotations
 
 import hmac
-import random
 from typing import Callable, NamedTuple
 
 from drone_mesh.communication import messages
-from drone_mesh.communication.complaints import Complaints
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.echo import Echoes, OnEchoAnswer
 from drone_mesh.communication.data.flood import Flood
@@ -61,23 +59,13 @@ class DataFigures(NamedTuple):
 class Transport:
     """Sends and receives the messages of one node. Belongs to the component's thread."""
 
-    def __init__(
-        self,
-        parts: NodeParts,
-        complaints: Complaints,
-        rng: random.Random,
-        node: IMeshDebugInfo,
-        room: int = messages.BODY_BYTES,
-    ) -> None:
-        """`node` knows its connection; `room`: free bytes in a packet's body."""
-        if not packets.LEAST_ROOM <= room <= messages.BODY_BYTES:
-            raise ValueError(
-                f"invalid room {room}: must be {packets.LEAST_ROOM}..{messages.BODY_BYTES}"
-            )
+    def __init__(self, parts: NodeParts, node: IMeshDebugInfo) -> None:
+        """`node` knows its connection."""
+        room = messages.BODY_BYTES - parts.seals.reserved_bytes(packets.FRAGMENTS.start)
+        assert room >= packets.LEAST_ROOM, "a seal leaves too little room for users' data"
         self._parts = parts
-        self._complaints = complaints
         self._my_gateway = node.get_preferred_gateway
-        self._outboxes = Outboxes(parts, rng, node, room, self._send_packet, self._ended, self.hint)
+        self._outboxes = Outboxes(parts, node, room, self._send_packet, self._ended, self.hint)
         self._inboxes = Inboxes(parts, room, self._send_packet, self._arrived)
         self._flood = Flood(parts)
         self._echoes = Echoes(self._send_packet, room)
@@ -132,7 +120,7 @@ class Transport:
     def hint(self) -> str:
         """Text to append to an error: that a neighbour has another key or none. Otherwise empty."""
         foreign = self._parts.seals.foreign_neighbour()
-        foreign = foreign or self._complaints.foreign_neighbour(self._parts.now_s)
+        foreign = foreign or self._parts.complaints.foreign_neighbour(self._parts.now_s)
         return f"; {foreign}" if foreign else ""
 
     def figures(self) -> DataFigures:
@@ -157,7 +145,9 @@ class Transport:
                 if self._is_authentic(body, creator):
                     self._outboxes.answered(creator, packets.ack_of(body))
                 else:
-                    self._complaints.dropped("an acknowledgement without proof", payload, now_s)
+                    self._parts.complaints.dropped(
+                        "an acknowledgement without proof", payload, now_s
+                    )
             elif kind == packets.POLL:
                 self._inboxes.poll(creator, packets.poll_of(body))
             elif kind == packets.ECHO:
@@ -165,9 +155,9 @@ class Transport:
             elif kind == packets.ECHO_ANSWER:
                 self._echoes.answered(creator, body, now_s)
             else:
-                self._complaints.dropped("data of an unknown type", payload, now_s)
+                self._parts.complaints.dropped("data of an unknown type", payload, now_s)
         except PacketError as error:
-            self._complaints.dropped(f"invalid data: {error}", payload, now_s)
+            self._parts.complaints.dropped(f"invalid data: {error}", payload, now_s)
         self._work()
 
     def on_due(self) -> None:

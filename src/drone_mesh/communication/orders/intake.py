@@ -10,7 +10,6 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Callable
 
-from drone_mesh.communication.complaints import Complaints
 from drone_mesh.communication.deadlines import Due
 from drone_mesh.communication.messages import GoToLocationMessage
 from drone_mesh.communication.observer import MeshEventKind
@@ -42,12 +41,9 @@ class _KnownOrder:
 class OrderIntake:
     """Checks the orders for one drone, starts its flights, and replies to numbered orders."""
 
-    def __init__(
-        self, parts: NodeParts, complaints: Complaints, took_off: Callable[[], None]
-    ) -> None:
+    def __init__(self, parts: NodeParts, took_off: Callable[[], None]) -> None:
         """`took_off` is called when an order has started a flight."""
         self._parts = parts
-        self._complaints = complaints
         self._took_off = took_off
         self._known: deque[_KnownOrder] = deque(maxlen=ORDERS_KEPT)
         self.on_own_reply: OwnReply = _ignore
@@ -57,7 +53,7 @@ class OrderIntake:
         try:
             self.take(order.creator, order.location, number)
         except GoalRefused as error:
-            self._complaints.add("order refused", str(error), self._parts.now_s)
+            self._parts.complaints.add("order refused", str(error), self._parts.now_s)
 
     def take(self, gateway: int, goal: Location, number: int = 0) -> None:
         """Fly to `goal`, unless the drone already does: two gateways may order the same flight.
