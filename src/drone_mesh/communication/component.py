@@ -195,22 +195,15 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
     # Implemented by router and gateway -------------------------------------------------------
 
     @property
-    @abc.abstractmethod
     def _served(self) -> bool:
         """Whether the mesh knows this node, so that another one with its id gives way to it."""
+        return True  # a gateway is looked for as soon as it starts
 
     def _begin(self) -> None:
         """Start this kind of node, before routing starts."""
 
-    @abc.abstractmethod
     def _antenna_is_off(self) -> None:
-        """The antenna was switched off, or a check finds it off."""
-
-    @abc.abstractmethod
-    def _on_negotiation(
-        self, bid: messages.MovementNegotiationMessage, gateway: messages.GatewayPlace | None
-    ) -> None:
-        """A neighbour bids for the flight; `gateway`: the gateway's place in the announcement."""
+        """The antenna was switched off, or a check finds it off; a gateway remains one."""
 
     def _on_passing_location(self, creator: int, payload: bytes) -> None:
         """A LOCATION for another node is about to be forwarded."""
@@ -220,9 +213,6 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
         self, node: int, location: Location, gateway: messages.GatewayPlace | None
     ) -> None:
         """`node` reports its place, and perhaps that of a gateway."""
-
-    def _on_gateway_place(self, gateway: messages.GatewayPlace) -> None:
-        """A node reports where a gateway was."""
 
     def _on_goal(self, neighbour: int, goal: Location) -> None:
         """A neighbour announces where it is about to fly."""
@@ -261,20 +251,15 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
             self._on_last_place(last)
 
     def receive_gateway_place(self, payload: bytes, _creator: int, _from: int) -> None:
-        """Where a gateway was, in a mesh with a key."""
-        gateway = messages.GatewayPlace.from_payload(payload)
-        if gateway is not None:
-            self._on_gateway_place(gateway)
+        """Where a gateway was: for those who may fly there."""
 
     def receive_move_to_location(self, payload: bytes, _creator: int, _from: int) -> None:
         """An order to fly."""
         order = messages.GoToLocationMessage.from_payload(payload)
         self._orders.on_order(order, messages.order_number(payload))
 
-    def receive_movement_negotiation(self, payload: bytes, _creator: int, _from: int) -> None:
-        """A neighbour bids for the flight."""
-        bid = messages.MovementNegotiationMessage.from_payload(payload)
-        self._on_negotiation(bid, messages.GatewayPlace.from_payload(payload))
+    def receive_movement_negotiation(self, payload: bytes, creator: int, from_: int) -> None:
+        """A neighbour bids for the flight: for those who may fly for the mesh."""
 
     def receive_data(self, payload: bytes, _creator: int, _from: int) -> None:
         """Users' data."""

@@ -17,11 +17,7 @@ from drone_mesh.communication.interfaces import (
     KnownNode,
 )
 from drone_mesh.communication.mesh_node import NodeSettings
-from drone_mesh.communication.messages import (
-    GatewayPlace,
-    MovementNegotiationMessage,
-    type_of,
-)
+from drone_mesh.communication.messages import GatewayPlace, type_of
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.order_record import OrderRecord
 from drone_mesh.communication.orders.book import OrderBook
@@ -89,14 +85,6 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
     def get_connected_to_gateway(self) -> bool:
         """True while its internet works; otherwise whether it reaches another gateway."""
         return self.control.hops != NO_ROUTE
-
-    def get_preferred_gateway(self) -> int:
-        """Itself while its internet works, otherwise another gateway."""
-        return self.control.gateway
-
-    def get_hops_from_gateway_away(self) -> int:
-        """0 while its internet works, otherwise as for a router."""
-        return self.control.hops
 
     def send_goal_request_to_drone(
         self,
@@ -187,25 +175,9 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
     def _begin(self) -> None:
         self._internet.connect(self)
 
-    @property
-    def _served(self) -> bool:
-        """Always true: a gateway is looked for as soon as it starts."""
-        return True
-
-    def _antenna_is_off(self) -> None:
-        """Nothing changes: without an antenna it is still a gateway."""
-
-    def _on_negotiation(
-        self, bid: MovementNegotiationMessage, gateway: GatewayPlace | None
-    ) -> None:
-        """Ignored: a gateway does not fly for the mesh."""
-
     def _on_location(self, node: int, location: Location, gateway: GatewayPlace | None) -> None:
         now_s = self._deadlines.now_s
         self._neighbours.set_place(node, location, now_s)
         if node == self.control.gateway:
             self.places.update_gateway(location, now_s)
             self.control.gateway_sent_place()
-
-    def _took_off(self) -> None:
-        """Nothing changes: a gateway is connected wherever it is."""

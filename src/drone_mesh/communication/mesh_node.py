@@ -6,7 +6,6 @@ the component.
 
 from __future__ import annotations
 
-import abc
 import random
 from typing import TypedDict
 
@@ -120,8 +119,7 @@ class MeshNode(IMeshDebugInfo, IControlHost):
         self._parts = NodeParts(**vars(basics), routing=control.routes, delivery=control.delivery)
         self._orders = OrderIntake(self._parts, self._took_off)
         self._reporter = NodeReporter(self._parts, self)
-        room = messages.BODY_BYTES - seals.reserved_bytes(DATA_TYPES.start)
-        self.data = Transport(self._parts, self.complaints, rng, self, room)
+        self.data = Transport(self._parts, self)
 
     def _control_plane(
         self,
@@ -142,6 +140,14 @@ class MeshNode(IMeshDebugInfo, IControlHost):
     def get_node_id(self) -> int:
         """This node's id, 0..253."""
         return self._node_id
+
+    def get_preferred_gateway(self) -> int:
+        """Id of the gateway that this node uses, perhaps itself; NO_ROUTE while it knows none."""
+        return self.control.gateway
+
+    def get_hops_from_gateway_away(self) -> int:
+        """Hops to that gateway, 0 for a gateway with internet; 255 while unknown."""
+        return self.control.hops
 
     def get_total_message_sent(self) -> int:
         """Packets sent successfully, own and forwarded ones, broadcasts not counted."""
@@ -187,6 +193,5 @@ class MeshNode(IMeshDebugInfo, IControlHost):
 
     # For the parts ---------------------------------------------------------------------------
 
-    @abc.abstractmethod
     def _took_off(self) -> None:
-        """The drone leaves its place because of an order."""
+        """The drone leaves its place because of an order; a gateway is connected anywhere."""
