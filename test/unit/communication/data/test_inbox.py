@@ -11,6 +11,7 @@ from drone_mesh.communication.data.ordering import PortOrder
 from drone_mesh.communication.data.outgoing import LIFETIME_S
 from drone_mesh.communication.data.packets import Head
 from drone_mesh.communication.data.reassembly import Whole
+from drone_mesh.communication.medium import UNDISTURBED
 
 ROOM = 27
 OLD, NEW = 7, 8  # sessions of the sender
@@ -21,7 +22,12 @@ class Receiver:
 
     def __init__(self):
         self.acks = []
-        self.inbox = Inbox(ROOM, lambda ack: self.acks.append(round(self.now_s, 3)))
+        self.inbox = Inbox(
+            ROOM,
+            lambda ack: self.acks.append(round(self.now_s, 3)),
+            lambda _place, sealed: sealed,
+            UNDISTURBED,
+        )
         self.now_s = 0.0
 
     def first(self, number, now_s, session=OLD, size=4):

@@ -12,7 +12,14 @@ from drone_mesh.communication.data.ticket import Ticket, TicketState
 
 
 def outbox_with(count, relayed):
-    outbox = Outbox(to=0, session=7, room=27, ended=lambda _state: None)
+    outbox = Outbox(
+        to=0,
+        session=7,
+        room=27,
+        ended=lambda _state: None,
+        seal=lambda _place, payload: payload,
+        hint=str,
+    )
     outbox.set_relayed(relayed)
     tickets = [Ticket(number, to=0, port=5, size=16, reliable=True) for number in range(count)]
     for ticket in tickets:
