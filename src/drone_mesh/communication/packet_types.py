@@ -153,26 +153,17 @@ class MessageType(enum.IntEnum):
     SEAL_ANSWER = 127, PacketType(PacketKind.OTHER, _SEAL, made_of="HopSeal")
 
 
-def _about(number: int) -> PacketType:
-    if number in MessageType.__members__.values():
-        return MessageType(number).about
-    if number in DATA_TYPES:
-        return _DATA
-    return _TECHNIQUE if number in TECHNIQUE_TYPES else _UNKNOWN
+_ABOUT_AND_HANDLER = {
+    **dict.fromkeys(range(256), (_UNKNOWN, "")),
+    **dict.fromkeys(TECHNIQUE_TYPES, (_TECHNIQUE, "receive_of_technique")),
+    **dict.fromkeys(DATA_TYPES, (_DATA, "receive_data")),
+    **{int(kind): (kind.about, f"receive_{kind.name.lower()}") for kind in MessageType},
+}
 
-
-def _handler_name(number: int) -> str:
-    if number in MessageType.__members__.values():
-        return f"receive_{MessageType(number).name.lower()}"
-    if number in DATA_TYPES:
-        return "receive_data"
-    return "receive_of_technique" if number in TECHNIQUE_TYPES else ""
-
-
-ABOUT = tuple(map(_about, range(256)))
+ABOUT = tuple(about for about, _handler in _ABOUT_AND_HANDLER.values())
 """What is declared about each number, also about those that are no MessageType."""
 
-HANDLER_NAMES = tuple(map(_handler_name, range(256)))
+HANDLER_NAMES = tuple(handler for _about, handler in _ABOUT_AND_HANDLER.values())
 """The method that handles packets with this number; empty: no node handles them."""
 
 TYPES_WITH_FLOATS = {number: ABOUT[number].floats for number in range(256) if ABOUT[number].floats}
