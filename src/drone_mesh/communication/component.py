@@ -22,7 +22,6 @@ from drone_mesh.communication.interfaces import (
 from drone_mesh.communication.last_places import LastPlace, tell_last_places
 from drone_mesh.communication.mesh_node import MeshNode
 from drone_mesh.communication.observer import MeshEventKind
-from drone_mesh.communication.orders.messages import OrderQuery
 from drone_mesh.communication.packet_types import (
     TYPES_WITH_FLOATS,
     TYPES_WITH_PLACES,
@@ -44,7 +43,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
     def start(self, now_s: float) -> None:
         """Start the antenna, and debugging if configured; schedule the first check; introduce."""
         self._deadlines.now_s = now_s
-        self._receivers = receivers(self._drop_unknown, self, self.control)
+        self._receivers = receivers(self._drop_unknown, self, self.control, self.data, self._orders)
         self._antenna.start_antenna(self)
         if self._debug:
             self._antenna.debugging_mode(self, True)
@@ -220,7 +219,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
     def _on_neighbour_found(self, node: int) -> None:
         """A packet arrived from a node that was not a neighbour."""
 
-    # Receiving: a method for each type that every node handles -----------------------------------
+    # Receiving: methods for types that every node handles, beside those of its parts -------------
 
     def receive_location(self, payload: bytes, creator: int, from_: int) -> None:
         """A node's place, and perhaps that of a gateway."""
@@ -253,21 +252,8 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
     def receive_gateway_place(self, payload: bytes, _creator: int, _from: int) -> None:
         """Where a gateway was: for those who may fly there."""
 
-    def receive_move_to_location(self, payload: bytes, _creator: int, _from: int) -> None:
-        """An order to fly."""
-        order = messages.GoToLocationMessage.from_payload(payload)
-        self._orders.on_order(order, messages.order_number(payload))
-
     def receive_movement_negotiation(self, payload: bytes, creator: int, from_: int) -> None:
         """A neighbour bids for the flight: for those who may fly for the mesh."""
-
-    def receive_data(self, payload: bytes, _creator: int, _from: int) -> None:
-        """Users' data."""
-        self.data.on_packet(payload)
-
-    def receive_order_query(self, payload: bytes, creator: int, _from: int) -> None:
-        """A gateway asks for the state of an order."""
-        self._orders.on_query(creator, OrderQuery.number_in(payload))
 
     def receive_seal_challenge(self, payload: bytes, creator: int, _from: int) -> None:
         """A neighbour has a key; with one, the antenna would have answered."""

@@ -25,7 +25,6 @@ from drone_mesh.communication.interfaces import (
     MAX_NODE_ID,
     NO_ROUTE,
     NO_SEALS,
-    IMeshDebugInfo,
     IMeshSeals,
     IWirelessCommunication,
 )
@@ -56,7 +55,7 @@ class NodeSettings(TypedDict, total=False):
     options: RepairOptions | None
 
 
-class MeshNode(IMeshDebugInfo, IControlHost):
+class MeshNode(IControlHost):
     """Owns the parts; MeshnetworkComponent passes them packets and deadlines."""
 
     def __init__(

@@ -129,16 +129,15 @@ class Transport:
 
     # For the component -------------------------------------------------------------------------
 
-    def on_packet(self, payload: bytes) -> None:
+    def receive_data(self, payload: bytes, creator: int, _from: int) -> None:
         """Process a packet of a user's type, for this node or for all."""
-        creator, _from, kind, _to, forward = messages.header(payload)
-        body = messages.body(payload)
+        kind, body = messages.type_of(payload), messages.body(payload)
         if creator == self._parts.node_id:
             return  # it came back
         now_s = self._parts.now_s
         try:
             if kind in packets.FRAGMENTS:
-                to_all = forward == TO_ALL
+                to_all = messages.addressee(payload) == TO_ALL
                 if not to_all or self._flood.repeat(payload):
                     self._inboxes.fragment(creator, to_all, kind - packets.FRAGMENTS.start, body)
             elif kind == packets.ACK:

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from typing import Callable
 
 from drone_mesh.communication.deadlines import Due
-from drone_mesh.communication.messages import GoToLocationMessage
+from drone_mesh.communication.messages import GoToLocationMessage, order_number
 from drone_mesh.communication.observer import MeshEventKind
-from drone_mesh.communication.orders.messages import OrderOutcome, reply_packets
+from drone_mesh.communication.orders.messages import OrderOutcome, OrderQuery, reply_packets
 from drone_mesh.communication.parts import NodeParts
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.location import Location
@@ -48,10 +48,11 @@ class OrderIntake:
         self._known: deque[_KnownOrder] = deque(maxlen=ORDERS_KEPT)
         self.on_own_reply: OwnReply = _ignore
 
-    def on_order(self, order: GoToLocationMessage, number: int) -> None:
+    def receive_move_to_location(self, payload: bytes, creator: int, _from: int) -> None:
         """An order from the air: accepted, or refused with a log line."""
+        order = GoToLocationMessage.from_payload(payload)
         try:
-            self.take(order.creator, order.location, number)
+            self.take(creator, order.location, order_number(payload))
         except GoalRefused as error:
             self._parts.complaints.add("order refused", str(error), self._parts.now_s)
 
@@ -97,8 +98,9 @@ class OrderIntake:
             for packet in reply_packets(number, OrderOutcome.REFUSED, reason, me, gateway):
                 self._parts.delivery.send_own(packet)
 
-    def on_query(self, gateway: int, number: int) -> None:
+    def receive_order_query(self, payload: bytes, gateway: int, _from: int) -> None:
         """A gateway queries the state of an order."""
+        number = OrderQuery.number_in(payload)
         known = self._find(gateway, number)
         if known is not None:
             self._reply(known, known.outcome, known.reason)
