@@ -265,7 +265,7 @@ class GatewayConnection:
 
     def gateway_sent_place(self) -> None:
         """The preferred gateway itself reported its place."""
-        self._relay_check.gateway_sent_place()
+        self._relay_check.swallowing.answered()
 
     def _ask_for_places(self, fresh_s: float = 0.0, gateway_asked: bool = False) -> None:
         """Ask the next hop where it is, and the gateway if that is unknown or may have moved.
@@ -298,11 +298,6 @@ class GatewayConnection:
         self._heartbeat_sent_s = self._answered_s = -math.inf
         self._show()
 
-    def give_up_routes(self) -> None:
-        """Forget every route to the gateway and inform the neighbours."""
-        if self.gateway != NO_ROUTE:
-            self._parts.delivery.gateway_lost(self.gateway)
-
     def _answer_window_s(self) -> float:
         medium = self._parts.antenna.medium
         hops = self.hops if self.hops != NO_ROUTE else _HOPS_UNTIL_KNOWN
@@ -323,7 +318,7 @@ class GatewayConnection:
             self.gateway = gateway
             self._resigned_s = -math.inf
             self._parts.places.forget_gateway()
-            self._relay_check.gateway_changed()
+            self._relay_check.swallowing.give_up()  # this one may not know its own place
 
     def _show(self) -> None:
         """Report a change of the connection; cancel the wait for an answer that is not expected."""

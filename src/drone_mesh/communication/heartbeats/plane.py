@@ -74,7 +74,7 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
     def neighbour_leaves(self, neighbour: int) -> None:
         """On a shared medium, look for other routes; otherwise the next packet shows it."""
         if self._antenna.medium.shared:
-            self._delivery.neighbour_leaves(neighbour)
+            self._delivery.neighbour_lost(neighbour)
 
     # Packets ---------------------------------------------------------------------------------
 
