@@ -105,6 +105,7 @@ class MeshNode(IControlHost):
             self._report,
             self._neighbours,
             self.places,
+            engine,
             self._pilot,
             antenna,
             seals,

@@ -113,9 +113,9 @@ class OrderIntake:
         orders = self._under_way()
         if not orders:
             return
-        pilot = self._parts.pilot
+        pilot, engine = self._parts.pilot, self._parts.engine
         here = pilot.location()
-        why = pilot.why_ended() or pilot.why_not_fly() or pilot.flight_end
+        why = engine.why_ended() or engine.why_not_fly() or pilot.flight_end
         for order in orders:
             if here is None:
                 self._reply(order, OrderOutcome.GIVEN_UP, f"{why}; its place is not known")
@@ -137,7 +137,7 @@ class OrderIntake:
         """Start the flight; returns False if the drone already flies there."""
         check_goal(*goal)
         pilot = self._parts.pilot
-        why_not = pilot.why_not_fly()
+        why_not = self._parts.engine.why_not_fly()
         if why_not:
             raise GoalRefused(f"drone {self._parts.node_id} cannot fly: {why_not}")
         if pilot.goal == goal:

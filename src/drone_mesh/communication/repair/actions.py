@@ -144,7 +144,7 @@ class RepairActions(abc.ABC):
 
     def why_not_fly(self) -> str:
         """Why the drone cannot fly for a repair; empty if it can."""
-        return self._parts.pilot.why_not_repair()
+        return self._parts.engine.why_not_repair()
 
     @abc.abstractmethod
     def goal_of(self, step: Step) -> Location:
