@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 
 from drone_mesh.communication.control_plane import IControlPlane
-from drone_mesh.communication.deadlines import Due
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.parts import NodeParts
@@ -135,11 +134,17 @@ class ConnectionRepair(RepairActions):
 
     def on_due(self) -> bool:
         """The repair's timer has expired. Returns whether a flight is over."""
-        self._parts.deadlines.set(Due.REPAIR, math.inf)
-        if self._flight is not None:
-            return self._stands_clear(self._flight)
-        self._strategy.on_time()
-        return False
+        self.wait_until(math.inf)
+        flight = self._flight
+        if flight is None:
+            self._strategy.on_time()
+            return False
+        if not flight.on_ground:
+            return False
+        is_over = not flight.ask_again()
+        if not is_over:
+            self._await_answers()
+        return is_over
 
     def status(self) -> RepairStatus:
         """The current activity of the repair, and its reason."""
@@ -184,7 +189,7 @@ class ConnectionRepair(RepairActions):
         self._parts.neighbours.forget_all()
         self._parts.neighbours.takes_off(by_order=False)
         self._parts.routing.node_moved_location()
-        flight.start()
+        flight.fly_on()
         self._flight = None
         self._took_off()
         self._flight = flight
@@ -222,7 +227,7 @@ class ConnectionRepair(RepairActions):
         if self._flight is None:
             return True
         if self._flight.arrived():
-            self.wait_until(self.now_s + self.medium.stretched(ASK_AGAIN_S))
+            self._await_answers()
         return False
 
     def on_landed(self) -> None:
@@ -248,27 +253,21 @@ class ConnectionRepair(RepairActions):
             self._took_off()
             self._flight = flight
             flight.ask_on_ground()
-            self.wait_until(self.now_s + self.medium.stretched(ASK_AGAIN_S))
+            self._await_answers()
 
     def _new_flight(self, step: Step, goal: Location) -> RepairFlight:
         return RepairFlight(
             self._parts,
-            self._control.introduce,
-            step.owner,
-            step.place,
+            self.present,
+            step,
             goal,
             self._options,
             self._taken,
             self._landing(step),
         )
 
-    def _stands_clear(self, flight: RepairFlight) -> bool:
-        if not flight.on_ground:
-            return False
-        if flight.ask_again():
-            self.wait_until(self.now_s + self.medium.stretched(ASK_AGAIN_S))
-            return False
-        return True
+    def _await_answers(self) -> None:
+        self.wait_until(self.now_s + self.medium.stretched(ASK_AGAIN_S))
 
     def goal_of(self, step: Step) -> Location:  # noqa: D102
         if step.owner == self.node_id:
