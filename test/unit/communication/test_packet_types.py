@@ -74,6 +74,8 @@ def test_each_handler_is_for_a_declared_type():
             MeshnetworkGateway,
             MeshnetworkRouter,
             HeartbeatPlane,
+            RouterHeartbeats,
+            GatewayHeartbeats,
             BeaconPlane,
             OrderIntake,
             Transport,

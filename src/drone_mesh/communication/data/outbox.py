@@ -15,11 +15,10 @@ from collections import deque
 from typing import Callable, Iterator
 
 from drone_mesh.communication.data import packets
-from drone_mesh.communication.data.congestion_window import CongestionWindow
 from drone_mesh.communication.data.fragmentation import Fragmentation, Seal
 from drone_mesh.communication.data.outgoing import LIFETIME_S, DataPacket, OutgoingMessage
+from drone_mesh.communication.data.pacing import CongestionWindow, RoundTrip
 from drone_mesh.communication.data.packets import COMPLETE, NO_ANSWER, Ack, Poll
-from drone_mesh.communication.data.round_trip import RoundTrip
 from drone_mesh.communication.data.ticket import TicketState, destination_in_words
 from drone_mesh.communication.data.train import Train
 
@@ -246,7 +245,7 @@ class Outbox:
         messages = [message for message in self if message.ticket.to == to]
         for message in messages:
             self._remove(message)
-            message.begin_again()
+            message.begin()
         if messages:
             self._train = None
         return messages

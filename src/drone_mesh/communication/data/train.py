@@ -6,7 +6,7 @@ import math
 
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.fragmentation import MOST_OPEN
-from drone_mesh.communication.data.round_trip import FIRST_TIMEOUT_S, RoundTrip
+from drone_mesh.communication.data.pacing import FIRST_TIMEOUT_S, RoundTrip
 
 FIRST_LENGTH = 32  # our choice, in fragments
 LEAST_LENGTH = 8  # our choice

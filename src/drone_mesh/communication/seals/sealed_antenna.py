@@ -232,7 +232,7 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
     def _on_challenge(self, challenge: bytes, from_: int, now_s: float) -> None:
         if messages.addressee(challenge) != self._node_id:
             return
-        if not self._seal.is_challenge(challenge):
+        if not self._seal.is_proven(challenge):
             self._complain(challenge, from_, now_s)
             return
         answer = self._seal.answer(challenge, now_s)

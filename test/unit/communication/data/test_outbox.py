@@ -7,7 +7,7 @@ import pytest
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.outbox import Outbox
 from drone_mesh.communication.data.outgoing import OutgoingMessage
-from drone_mesh.communication.data.round_trip import FIRST_TIMEOUT_S, MOST_TIMEOUT_S, RoundTrip
+from drone_mesh.communication.data.pacing import FIRST_TIMEOUT_S, MOST_TIMEOUT_S, RoundTrip
 from drone_mesh.communication.data.ticket import Ticket, TicketState
 
 

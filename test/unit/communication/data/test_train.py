@@ -9,7 +9,7 @@ import pytest
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.outbox import Outbox
 from drone_mesh.communication.data.outgoing import OutgoingMessage
-from drone_mesh.communication.data.round_trip import RoundTrip
+from drone_mesh.communication.data.pacing import RoundTrip
 from drone_mesh.communication.data.ticket import Ticket
 from drone_mesh.communication.data.train import FIRST_LENGTH, LEAST_LENGTH, MOST_LENGTH, Train
 from drone_mesh.inprocess import Network
