@@ -19,7 +19,6 @@ from drone_mesh.communication.interfaces import (
     PAYLOAD_BYTES,
     IMeshNetwork,
 )
-from drone_mesh.communication.last_places import LastPlace, tell_last_places
 from drone_mesh.communication.mesh_node import MeshNode
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.packet_types import (
@@ -28,6 +27,7 @@ from drone_mesh.communication.packet_types import (
     MessageType,
     receivers,
 )
+from drone_mesh.communication.place_requests import LastPlace, tell_last_places
 from drone_mesh.drone.location import Location
 
 _PRESENT = int(MessageType.PRESENT)

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 from drone_mesh.communication.component import MeshnetworkComponent
 from drone_mesh.communication.deadlines import Due
 from drone_mesh.communication.interfaces import IWirelessCommunication
-from drone_mesh.communication.last_places import LastPlace
 from drone_mesh.communication.mesh_node import NodeSettings
 from drone_mesh.communication.messages import (
     GatewayPlace,
@@ -21,6 +20,7 @@ from drone_mesh.communication.messages import (
 )
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.packet_types import MessageType
+from drone_mesh.communication.place_requests import LastPlace
 from drone_mesh.communication.repair.connection_repair import ConnectionRepair
 from drone_mesh.communication.repair.interfaces import IRepairStrategy
 from drone_mesh.communication.repair.status import RepairStatus

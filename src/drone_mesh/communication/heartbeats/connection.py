@@ -131,19 +131,17 @@ class GatewayConnection:
         the route in use may still work. The neighbour that led to no answer is avoided for a while.
         """
         tried, self._tried = self._tried, NO_ROUTE
-        if tried != NO_ROUTE:
+        was_connected = self._states.connected
+        if tried == NO_ROUTE:
+            self._unanswered += 1
+        else:
             self._detours.avoid(tried, self._parts.now_s + AVOIDED_S)
-            if self._states.connected:
-                self._heartbeat_sent_s = -math.inf
-                self.send_heartbeat()
-                return
-        self._unanswered += 1
-        if self._states.connected and self._unanswered < self._parts.antenna.medium.heartbeats:
+        may_answer = tried != NO_ROUTE or self._unanswered < self._parts.antenna.medium.heartbeats
+        if was_connected and may_answer:
             self._heartbeat_sent_s = -math.inf
             self.send_heartbeat()
             return
         self._unanswered = 0
-        was_connected = self._states.connected
         self._states.happened(RouterEvent.ANSWER_MISSED)
         self._show()
         if was_connected:

@@ -47,6 +47,7 @@ class GroupRepair(LoneRepair):
         self._news = FlightNews()
         self._credit = BidCredit()
         self._asked_s = -math.inf
+        self._places_within_s = mesh.medium.stretched(PLACES_WITHIN_S)
         self._rounds_without_flier = 0
 
     @abc.abstractmethod
@@ -123,7 +124,7 @@ class GroupRepair(LoneRepair):
             return
         state = self.mesh.state
         if state is RepairState.ASKING:
-            until_s = self._asked_s + self._places_within_s()
+            until_s = self._asked_s + self._places_within_s
             if self._all_answered() or self.mesh.now_s >= until_s:
                 self._negotiate()
             else:
@@ -189,14 +190,11 @@ class GroupRepair(LoneRepair):
         mesh = self.mesh
         mesh.happened(RouterEvent.ASKED_FOR_PLACES)
         self._asked_s = mesh.now_s
-        mesh.wait_until(self._asked_s + self._places_within_s())
+        mesh.wait_until(self._asked_s + self._places_within_s)
         mesh.ask_places()
         owner = mesh.lost_next_hop
         if mesh.reaches(owner) and owner not in mesh.neighbours():
             mesh.ask_place(owner)
-
-    def _places_within_s(self) -> float:
-        return self.mesh.medium.stretched(PLACES_WITHIN_S)
 
     def _all_answered(self) -> bool:
         """Whether all neighbours, and the node whose place it wants, have sent their places."""
@@ -246,7 +244,7 @@ class GroupRepair(LoneRepair):
     def _begin_election(self) -> None:
         mesh = self.mesh
         score = as_on_the_air(self.own_bid)
-        settled_s = max(mesh.now_s, self._asked_s + self._places_within_s())
+        settled_s = max(mesh.now_s, self._asked_s + self._places_within_s)
         settled_s += mesh.medium.stretched(SETTLE_S)
         self._election.start(mesh.node_id, score, mesh.now_s, settled_s)
         tried = self._was_home() if score < 0 else None
