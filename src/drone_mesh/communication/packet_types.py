@@ -8,10 +8,12 @@ docs/wire.md and the Wireshark dissector.
 from __future__ import annotations
 
 import enum
+import struct
 from typing import Callable, NamedTuple, Sequence
 
 TECHNIQUE_TYPES = range(8, 64)
 DATA_TYPES = range(128, 256)  # users' data; data/packets.py describes their bodies
+_CODES = {"bool": "?", "uint8": "B", "int16": "h", "uint16": "H", "uint32": "I", "float32": "f"}
 
 
 class PacketKind(enum.Enum):
@@ -56,6 +58,13 @@ class PacketType(NamedTuple):
     priority: Priority = Priority.CONTROL
     answered: bool = True  # whether a broadcast of it makes several nodes send
     jittered: bool = True  # whether many nodes would broadcast it at the same moment
+
+    @property
+    def layout(self) -> struct.Struct:
+        """Packs and unpacks the body."""
+        forms = [field.split()[0] for field in self.body.split(", ")]
+        # a number, or bytes[10]
+        return struct.Struct("<" + "".join(_CODES.get(form) or f"{form[6:-1]}s" for form in forms))
 
     @property
     def floats(self) -> int:

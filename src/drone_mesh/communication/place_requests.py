@@ -8,7 +8,6 @@ drones").
 from __future__ import annotations
 
 import math
-import struct
 from typing import NamedTuple
 
 from drone_mesh.communication import messages
@@ -19,7 +18,7 @@ from drone_mesh.drone.location import Location
 
 NEAR_CLEARANCES = 3.0  # our choice: a drone that moves aside once is still within that
 MOST_TOLD = 4  # our choice: more drones do not stand that near to one place
-_BODY = struct.Struct("<HBffh")  # age in seconds, id, latitude, longitude, height
+_BODY = MessageType.LAST_PLACE.about.layout
 _OLDEST_AGE_S = 2**16 - 1
 
 

@@ -28,7 +28,7 @@ class NodeReport:
     """NODE_REPORT: the state of its creator in figures."""
 
     TYPE: ClassVar[MessageType] = MessageType.NODE_REPORT
-    BODY: ClassVar[struct.Struct] = struct.Struct("<BBBhhhBBB")
+    BODY: ClassVar[struct.Struct] = TYPE.about.layout
 
     neighbours: int
     hops: int  # to its gateway; 255: not known
@@ -79,7 +79,7 @@ class NodeWords:
     """NODE_WORDS: why its creator cannot fly, in one or more packets."""
 
     TYPE: ClassVar[MessageType] = MessageType.NODE_WORDS
-    BODY: ClassVar[struct.Struct] = struct.Struct(f"<B{WORDS_BYTES}s")
+    BODY: ClassVar[struct.Struct] = TYPE.about.layout
 
     @classmethod
     def packets(cls, words: str, creator: int, gateway: int) -> list[bytes]:
