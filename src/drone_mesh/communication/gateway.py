@@ -95,11 +95,9 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         now_s: float,
         allow_shared_place: bool = False,
     ) -> bool:
-        """Send a drone to a place (metres).
+        """See IGatewayCommands; its own drone is asked at once.
 
-        True: a next hop took the order, a search for the drone has begun, or it is its own drone.
-        Raises GoalRefused for an invalid node id or place, or if its own drone cannot fly, and
-        PlaceTaken for the place of another drone, unless `allow_shared_place`.
+        True also for that one. GoalRefused: an invalid node id or place, or it cannot fly.
         """
         self._deadlines.now_s = now_s
         if not 0 <= node_id <= MAX_NODE_ID:
