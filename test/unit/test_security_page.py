@@ -9,7 +9,7 @@ import pytest
 
 from drone_mesh.communication import complaints, limits
 from drone_mesh.communication.data import packets as data
-from drone_mesh.communication.heartbeats import detours, swallowing
+from drone_mesh.communication.heartbeats import detours, relay_check
 from drone_mesh.communication.interfaces import BROADCAST, MAX_NODE_ID, PAYLOAD_BYTES
 from drone_mesh.communication.messages import TO_AT
 from drone_mesh.communication.packet_types import MessageType
@@ -50,8 +50,8 @@ SENTENCES = [
     f"at most every {end_to_end.NEW_NONCE_AFTER_S:g} s",
     f"Its last {WORDS[end_to_end.NONCES]} nonces are valid",
     f"in the {message_seal.ACK_TAG_BYTES} bytes that are left",
-    f"every {WORDS[int(swallowing.ASK_PERIODS)]} check periods",
-    f"(at least {WORDS[swallowing.LEAST_UNANSWERED]}) bring no answer",
+    f"every {WORDS[int(relay_check.ASK_PERIODS)]} check periods",
+    f"(at least {WORDS[relay_check.LEAST_UNANSWERED]}) bring no answer",
     f"that next hop for {'ten' if detours.SWALLOWER_AVOIDED_S == 600 else '?'} minutes",
     f"brings no answer for {'a minute' if detours.AVOIDED_S == 60 else '?'}",
     f"one stranger next to the gateway of {damage.NODES} nodes, {damage.SPACING_M:g} m apart",

@@ -19,16 +19,15 @@ from drone_mesh.communication.interfaces import (
     PAYLOAD_BYTES,
     IMeshNetwork,
 )
-from drone_mesh.communication.last_places import LastPlace, tell_last_places
 from drone_mesh.communication.mesh_node import MeshNode
 from drone_mesh.communication.observer import MeshEventKind
-from drone_mesh.communication.orders.messages import OrderQuery
 from drone_mesh.communication.packet_types import (
     TYPES_WITH_FLOATS,
     TYPES_WITH_PLACES,
     MessageType,
     receivers,
 )
+from drone_mesh.communication.place_requests import LastPlace, tell_last_places
 from drone_mesh.drone.location import Location
 
 _PRESENT = int(MessageType.PRESENT)
@@ -44,7 +43,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
     def start(self, now_s: float) -> None:
         """Start the antenna, and debugging if configured; schedule the first check; introduce."""
         self._deadlines.now_s = now_s
-        self._receivers = receivers(self._drop_unknown, self, self.control)
+        self._receivers = receivers(self._drop_unknown, self, self.control, self.data, self._orders)
         self._antenna.start_antenna(self)
         if self._debug:
             self._antenna.debugging_mode(self, True)
@@ -195,22 +194,15 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
     # Implemented by router and gateway -------------------------------------------------------
 
     @property
-    @abc.abstractmethod
     def _served(self) -> bool:
         """Whether the mesh knows this node, so that another one with its id gives way to it."""
+        return True  # a gateway is looked for as soon as it starts
 
     def _begin(self) -> None:
         """Start this kind of node, before routing starts."""
 
-    @abc.abstractmethod
     def _antenna_is_off(self) -> None:
-        """The antenna was switched off, or a check finds it off."""
-
-    @abc.abstractmethod
-    def _on_negotiation(
-        self, bid: messages.MovementNegotiationMessage, gateway: messages.GatewayPlace | None
-    ) -> None:
-        """A neighbour bids for the flight; `gateway`: the gateway's place in the announcement."""
+        """The antenna was switched off, or a check finds it off; a gateway remains one."""
 
     def _on_passing_location(self, creator: int, payload: bytes) -> None:
         """A LOCATION for another node is about to be forwarded."""
@@ -221,16 +213,13 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
     ) -> None:
         """`node` reports its place, and perhaps that of a gateway."""
 
-    def _on_gateway_place(self, gateway: messages.GatewayPlace) -> None:
-        """A node reports where a gateway was."""
-
     def _on_goal(self, neighbour: int, goal: Location) -> None:
         """A neighbour announces where it is about to fly."""
 
     def _on_neighbour_found(self, node: int) -> None:
         """A packet arrived from a node that was not a neighbour."""
 
-    # Receiving: a method for each type that every node handles -----------------------------------
+    # Receiving: methods for types that every node handles, beside those of its parts -------------
 
     def receive_location(self, payload: bytes, creator: int, from_: int) -> None:
         """A node's place, and perhaps that of a gateway."""
@@ -261,28 +250,10 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
             self._on_last_place(last)
 
     def receive_gateway_place(self, payload: bytes, _creator: int, _from: int) -> None:
-        """Where a gateway was, in a mesh with a key."""
-        gateway = messages.GatewayPlace.from_payload(payload)
-        if gateway is not None:
-            self._on_gateway_place(gateway)
+        """Where a gateway was: for those who may fly there."""
 
-    def receive_move_to_location(self, payload: bytes, _creator: int, _from: int) -> None:
-        """An order to fly."""
-        order = messages.GoToLocationMessage.from_payload(payload)
-        self._orders.on_order(order, messages.order_number(payload))
-
-    def receive_movement_negotiation(self, payload: bytes, _creator: int, _from: int) -> None:
-        """A neighbour bids for the flight."""
-        bid = messages.MovementNegotiationMessage.from_payload(payload)
-        self._on_negotiation(bid, messages.GatewayPlace.from_payload(payload))
-
-    def receive_data(self, payload: bytes, _creator: int, _from: int) -> None:
-        """Users' data."""
-        self.data.on_packet(payload)
-
-    def receive_order_query(self, payload: bytes, creator: int, _from: int) -> None:
-        """A gateway asks for the state of an order."""
-        self._orders.on_query(creator, OrderQuery.number_in(payload))
+    def receive_movement_negotiation(self, payload: bytes, creator: int, from_: int) -> None:
+        """A neighbour bids for the flight: for those who may fly for the mesh."""
 
     def receive_seal_challenge(self, payload: bytes, creator: int, _from: int) -> None:
         """A neighbour has a key; with one, the antenna would have answered."""

@@ -13,6 +13,7 @@ from __future__ import annotations
 import abc
 from typing import Callable
 
+from drone_mesh.communication.interfaces import IMeshDebugInfo
 from drone_mesh.communication.parts import NodeBasics
 from drone_mesh.communication.router_states import RouterEvent, RouterStates
 from drone_mesh.communication.ways import IDelivery, IRoutes, ITechnique
@@ -21,7 +22,7 @@ Learn = Callable[[int, int, int, bytes], bool]
 Forward = Callable[[bytes, int, int, int, int, float], None]
 
 
-class IControlHost(abc.ABC):
+class IControlHost(IMeshDebugInfo):
     """What a control plane tells its node. The defaults are those of a node that never flies."""
 
     def may_connect(self, node: int, know_gateway: bool) -> bool:
@@ -42,14 +43,6 @@ class IControlHost(abc.ABC):
 
     def on_node_missing(self, node: int) -> None:
         """At a gateway: a relay has no route to `node`."""
-
-    @abc.abstractmethod
-    def get_connected_to_gateway(self) -> bool:
-        """Whether a gateway is reached; true for a gateway whose internet works."""
-
-    @abc.abstractmethod
-    def get_hops_from_gateway_away(self) -> int:
-        """Hops to the preferred gateway; 255 while unknown."""
 
 
 class IControlPlane(abc.ABC):

@@ -110,23 +110,6 @@ class Pilot:
         except LocationUnknown:
             return None
 
-    def battery_percent(self) -> int | None:
-        """The charge of its battery; None: unknown."""
-        percent = self._engine.battery_percent()
-        return None if percent is None else round(max(0.0, min(100.0, percent)))
-
-    def why_not_fly(self) -> str:
-        """Why the drone cannot fly to a goal now; empty if it can."""
-        return self._engine.why_not_fly()
-
-    def why_not_repair(self) -> str:
-        """Why the drone cannot fly for a repair now; empty if it can."""
-        return self._engine.why_not_repair()
-
-    def why_ended(self) -> str:
-        """Why the last flight ended before its goal; empty if it did not, or if not known."""
-        return self._engine.why_ended()
-
     def obey(self, goal: Location) -> None:
         """Start an ordered flight, or change the goal of the current one.
 

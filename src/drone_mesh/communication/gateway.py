@@ -17,15 +17,11 @@ from drone_mesh.communication.interfaces import (
     KnownNode,
 )
 from drone_mesh.communication.mesh_node import NodeSettings
-from drone_mesh.communication.messages import (
-    GatewayPlace,
-    MovementNegotiationMessage,
-    type_of,
-)
+from drone_mesh.communication.messages import GatewayPlace, type_of
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.order_record import OrderRecord
 from drone_mesh.communication.orders.book import OrderBook
-from drone_mesh.communication.orders.final_places import FinalPlaces
+from drone_mesh.communication.orders.final_places import check_place
 from drone_mesh.communication.orders.messages import OrderReply
 from drone_mesh.communication.reports.node_reports import ReportBook, ReportedNode
 from drone_mesh.communication.ways import ITechnique
@@ -61,9 +57,6 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         self._reports = ReportBook()
         self._book = OrderBook(self._parts, self._may_find, self.control.search)
         self._orders.on_own_reply = self._book.on_outcome
-        self._final_places = FinalPlaces(
-            self._parts, self._book.records, self._reports.nodes, self._options.clearance_m
-        )
 
     def stop(self) -> None:
         """Stop the internet connection, the antenna and debugging."""
@@ -93,14 +86,6 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         """True while its internet works; otherwise whether it reaches another gateway."""
         return self.control.hops != NO_ROUTE
 
-    def get_preferred_gateway(self) -> int:
-        """Itself while its internet works, otherwise another gateway."""
-        return self.control.gateway
-
-    def get_hops_from_gateway_away(self) -> int:
-        """0 while its internet works, otherwise as for a router."""
-        return self.control.hops
-
     def send_goal_request_to_drone(
         self,
         node_id: int,
@@ -110,11 +95,9 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         now_s: float,
         allow_shared_place: bool = False,
     ) -> bool:
-        """Send a drone to a place (metres).
+        """See IGatewayCommands; its own drone is asked at once.
 
-        True: a next hop took the order, a search for the drone has begun, or it is its own drone.
-        Raises GoalRefused for an invalid node id or place, or if its own drone cannot fly, and
-        PlaceTaken for the place of another drone, unless `allow_shared_place`.
+        True also for that one. GoalRefused: an invalid node id or place, or it cannot fly.
         """
         self._deadlines.now_s = now_s
         if not 0 <= node_id <= MAX_NODE_ID:
@@ -124,7 +107,8 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
             raise GoalRefused(f"invalid height {height} m: must be in whole metres")
         goal = Location(latitude, longitude, height)
         if not allow_shared_place:
-            self._final_places.check(node_id, goal)
+            orders, reports = self._book.records(), self._reports.nodes()
+            check_place(self._parts, orders, reports, node_id, goal, self._options.clearance_m)
         number = self._book.enter(node_id, goal)
         if node_id != self._node_id:
             return self._book.send(number)
@@ -189,25 +173,9 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
     def _begin(self) -> None:
         self._internet.connect(self)
 
-    @property
-    def _served(self) -> bool:
-        """Always true: a gateway is looked for as soon as it starts."""
-        return True
-
-    def _antenna_is_off(self) -> None:
-        """Nothing changes: without an antenna it is still a gateway."""
-
-    def _on_negotiation(
-        self, bid: MovementNegotiationMessage, gateway: GatewayPlace | None
-    ) -> None:
-        """Ignored: a gateway does not fly for the mesh."""
-
     def _on_location(self, node: int, location: Location, gateway: GatewayPlace | None) -> None:
         now_s = self._deadlines.now_s
         self._neighbours.set_place(node, location, now_s)
         if node == self.control.gateway:
             self.places.update_gateway(location, now_s)
             self.control.gateway_sent_place()
-
-    def _took_off(self) -> None:
-        """Nothing changes: a gateway is connected wherever it is."""

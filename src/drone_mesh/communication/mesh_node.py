@@ -6,11 +6,9 @@ the component.
 
 from __future__ import annotations
 
-import abc
 import random
 from typing import TypedDict
 
-from drone_mesh.communication import messages
 from drone_mesh.communication.complaints import Complaints
 from drone_mesh.communication.control_plane import (
     IControlHost,
@@ -27,7 +25,6 @@ from drone_mesh.communication.interfaces import (
     MAX_NODE_ID,
     NO_ROUTE,
     NO_SEALS,
-    IMeshDebugInfo,
     IMeshSeals,
     IWirelessCommunication,
 )
@@ -36,7 +33,6 @@ from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.observer import MeshObserver, Reporter, ignore_events
 from drone_mesh.communication.orders.intake import OrderIntake
 from drone_mesh.communication.own_id import OwnId
-from drone_mesh.communication.packet_types import DATA_TYPES
 from drone_mesh.communication.parts import NodeBasics, NodeParts
 from drone_mesh.communication.places import KnownPlaces
 from drone_mesh.communication.repair.options import RepairOptions
@@ -59,7 +55,7 @@ class NodeSettings(TypedDict, total=False):
     options: RepairOptions | None
 
 
-class MeshNode(IMeshDebugInfo, IControlHost):
+class MeshNode(IControlHost):
     """Owns the parts; MeshnetworkComponent passes them packets and deadlines."""
 
     def __init__(
@@ -109,6 +105,7 @@ class MeshNode(IMeshDebugInfo, IControlHost):
             self._report,
             self._neighbours,
             self.places,
+            engine,
             self._pilot,
             antenna,
             seals,
@@ -120,10 +117,9 @@ class MeshNode(IMeshDebugInfo, IControlHost):
         self.control = control = self._control_plane(basics, routing, states)
         self._learn, self._forward = control.learn, control.forward  # called for each packet
         self._parts = NodeParts(**vars(basics), routing=control.routes, delivery=control.delivery)
-        self._orders = OrderIntake(self._parts, self.complaints, self._took_off)
+        self._orders = OrderIntake(self._parts, self._took_off)
         self._reporter = NodeReporter(self._parts, self)
-        room = messages.BODY_BYTES - seals.reserved_bytes(DATA_TYPES.start)
-        self.data = Transport(self._parts, self.complaints, rng, self, room)
+        self.data = Transport(self._parts, self)
 
     def _control_plane(
         self,
@@ -144,6 +140,14 @@ class MeshNode(IMeshDebugInfo, IControlHost):
     def get_node_id(self) -> int:
         """This node's id, 0..253."""
         return self._node_id
+
+    def get_preferred_gateway(self) -> int:
+        """Id of the gateway that this node uses, perhaps itself; NO_ROUTE while it knows none."""
+        return self.control.gateway
+
+    def get_hops_from_gateway_away(self) -> int:
+        """Hops to that gateway, 0 for a gateway with internet; 255 while unknown."""
+        return self.control.hops
 
     def get_total_message_sent(self) -> int:
         """Packets sent successfully, own and forwarded ones, broadcasts not counted."""
@@ -189,6 +193,5 @@ class MeshNode(IMeshDebugInfo, IControlHost):
 
     # For the parts ---------------------------------------------------------------------------
 
-    @abc.abstractmethod
     def _took_off(self) -> None:
-        """The drone leaves its place because of an order."""
+        """The drone leaves its place because of an order; a gateway is connected anywhere."""

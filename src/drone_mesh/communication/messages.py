@@ -41,39 +41,12 @@ MOST_RECORDED = 16
 MAX_HOPS = 254  # of a heartbeat; docs/protocol.md, "Forwarding"
 
 
-@dataclass(frozen=True)
-class Message:
-    """A header without a body: REQUESTLOCATION, NOTDEFINED and unknown types.
-
-    Only this class takes the type as an argument, in third place, as the original did.
-    """
-
-    creator: int  # the node that made it
-    from_: int  # the node that sends this hop
-    type: int
-    to: int  # receiver of this hop
-    forward: int  # final addressee, 254 = every node in range
-
-    def to_payload(self) -> bytes:
-        """The 32 bytes. Raises PacketError for a value outside 0..255."""
-        try:
-            return packet(self.type, self.creator, self.from_, self.to, self.forward)
-        except ValueError as error:
-            raise PacketError(f"{self} does not fit a packet: {error}") from error
-
-    @classmethod
-    def from_payload(cls, payload: bytes) -> Message:
-        """Decode a header; the body is ignored. Raises PacketError unless there are 32 bytes."""
-        _check_length(payload)
-        return cls(*payload[:HEADER_BYTES])
-
-
 _M = TypeVar("_M", bound="_TypedMessage")
 
 
 @dataclass(frozen=True)
 class _TypedMessage:
-    """A header and the body of one type; a subclass adds the fields of its BODY, in its order."""
+    """A header and the body of one type; a subclass adds the declared fields, in their order."""
 
     TYPE: ClassVar[MessageType]
     BODY: ClassVar[struct.Struct]
@@ -82,6 +55,9 @@ class _TypedMessage:
     from_: int  # the node that sends this hop
     to: int  # receiver of this hop
     forward: int  # final addressee, 254 = every node in range
+
+    def __init_subclass__(cls, kind: MessageType) -> None:
+        cls.TYPE, cls.BODY = kind, kind.about.layout
 
     def to_payload(self) -> bytes:
         """The 32 bytes. Raises PacketError for a value that does not fit its field."""
@@ -94,7 +70,8 @@ class _TypedMessage:
     @classmethod
     def from_payload(cls: type[_M], payload: bytes) -> _M:
         """Decode. Raises PacketError for another length or type."""
-        _check_length(payload)
+        if len(payload) != PAYLOAD_BYTES:
+            raise PacketError(f"expected {PAYLOAD_BYTES} bytes, got {len(payload)}")
         creator, from_, kind, to, forward = payload[:HEADER_BYTES]
         if kind != cls.TYPE:
             raise PacketError(f"type {kind} is not {cls.TYPE.name} ({int(cls.TYPE)})")
@@ -102,11 +79,8 @@ class _TypedMessage:
 
 
 @dataclass(frozen=True)
-class LocationMessage(_TypedMessage):
+class LocationMessage(_TypedMessage, kind=MessageType.LOCATION):
     """The position of its creator."""
-
-    TYPE: ClassVar[MessageType] = MessageType.LOCATION
-    BODY: ClassVar[struct.Struct] = struct.Struct("<ffhI")
 
     latitude: float  # y, metres
     longitude: float  # x, metres
@@ -115,22 +89,16 @@ class LocationMessage(_TypedMessage):
 
 
 @dataclass(frozen=True)
-class IntroduceMessage(_TypedMessage):
+class IntroduceMessage(_TypedMessage, kind=MessageType.PRESENT):
     """PRESENT: introduces its creator."""
-
-    TYPE: ClassVar[MessageType] = MessageType.PRESENT
-    BODY: ClassVar[struct.Struct] = struct.Struct("<B?")
 
     hops_until_gateway: int  # 255 while not known
     know_gateway: bool  # whether its creator is connected
 
 
 @dataclass(frozen=True)
-class HeartbeatMessage(_TypedMessage):
+class HeartbeatMessage(_TypedMessage, kind=MessageType.HEARTBEAT):
     """Proof of a path; each node that forwards it adds a hop."""
-
-    TYPE: ClassVar[MessageType] = MessageType.HEARTBEAT
-    BODY: ClassVar[struct.Struct] = struct.Struct("<?BB")
 
     know_gateway: bool  # whether its creator is connected
     preferred_gateway: int  # 255 while not known
@@ -138,21 +106,15 @@ class HeartbeatMessage(_TypedMessage):
 
 
 @dataclass(frozen=True)
-class MissingMessage(_TypedMessage):
+class MissingMessage(_TypedMessage, kind=MessageType.MISSING):
     """Its creator can no longer reach a node."""
-
-    TYPE: ClassVar[MessageType] = MessageType.MISSING
-    BODY: ClassVar[struct.Struct] = struct.Struct("<B")
 
     missing: int  # id of that node
 
 
 @dataclass(frozen=True)
-class GoToLocationMessage(_TypedMessage):
+class GoToLocationMessage(_TypedMessage, kind=MessageType.MOVE_TO_LOCATION):
     """MOVE_TO_LOCATION: an order to fly to a place."""
-
-    TYPE: ClassVar[MessageType] = MessageType.MOVE_TO_LOCATION
-    BODY: ClassVar[struct.Struct] = struct.Struct("<ffh")
 
     latitude: float  # y, metres
     longitude: float  # x, metres
@@ -165,16 +127,13 @@ class GoToLocationMessage(_TypedMessage):
 
 
 @dataclass(frozen=True)
-class MovementNegotiationMessage(_TypedMessage):
+class MovementNegotiationMessage(_TypedMessage, kind=MessageType.MOVEMENT_NEGOTIATION):
     """The bid of its creator to fly."""
-
-    TYPE: ClassVar[MessageType] = MessageType.MOVEMENT_NEGOTIATION
-    BODY: ClassVar[struct.Struct] = struct.Struct("<f")
 
     cost: float  # its distance to the gateway in metres; negative: it does not fly
 
 
-_GATEWAY_PLACE = struct.Struct("<HBffh")  # age + 1 in seconds, id, latitude, longitude, height
+_GATEWAY_PLACE = MessageType.GATEWAY_PLACE.about.layout
 _GATEWAY_PLACE_AT = {
     int(MessageType.LOCATION): HEADER_BYTES + LocationMessage.BODY.size,
     int(MessageType.MOVEMENT_NEGOTIATION): HEADER_BYTES + MovementNegotiationMessage.BODY.size,
@@ -468,8 +427,3 @@ def is_finite(payload: bytes) -> bool:
     """Whether all floats of a packet are finite; its type is one of TYPES_WITH_FLOATS."""
     numbers = _FLOATS[payload[TYPE_AT]].unpack_from(payload, HEADER_BYTES)
     return math.isfinite(sum(numbers))
-
-
-def _check_length(payload: bytes) -> None:
-    if len(payload) != PAYLOAD_BYTES:
-        raise PacketError(f"expected {PAYLOAD_BYTES} bytes, got {len(payload)}")

@@ -8,10 +8,12 @@ docs/wire.md and the Wireshark dissector.
 from __future__ import annotations
 
 import enum
+import struct
 from typing import Callable, NamedTuple, Sequence
 
 TECHNIQUE_TYPES = range(8, 64)
 DATA_TYPES = range(128, 256)  # users' data; data/packets.py describes their bodies
+_CODES = {"bool": "?", "uint8": "B", "int16": "h", "uint16": "H", "uint32": "I", "float32": "f"}
 
 
 class PacketKind(enum.Enum):
@@ -52,10 +54,17 @@ class PacketType(NamedTuple):
     kind: PacketKind
     handler: Handler
     body: str = ""  # its fields in their order, as "uint8 name" or "bytes[10] name"
-    made_of: str = "Message"  # the class that encodes it
+    made_of: str = ""  # the class that encodes it; empty: a header is all of it
     priority: Priority = Priority.CONTROL
     answered: bool = True  # whether a broadcast of it makes several nodes send
     jittered: bool = True  # whether many nodes would broadcast it at the same moment
+
+    @property
+    def layout(self) -> struct.Struct:
+        """Packs and unpacks the body."""
+        forms = [field.split()[0] for field in self.body.split(", ")]
+        # a number, or bytes[10]
+        return struct.Struct("<" + "".join(_CODES.get(form) or f"{form[6:-1]}s" for form in forms))
 
     @property
     def floats(self) -> int:
@@ -153,26 +162,17 @@ class MessageType(enum.IntEnum):
     SEAL_ANSWER = 127, PacketType(PacketKind.OTHER, _SEAL, made_of="HopSeal")
 
 
-def _about(number: int) -> PacketType:
-    if number in MessageType.__members__.values():
-        return MessageType(number).about
-    if number in DATA_TYPES:
-        return _DATA
-    return _TECHNIQUE if number in TECHNIQUE_TYPES else _UNKNOWN
+_ABOUT_AND_HANDLER = {
+    **dict.fromkeys(range(256), (_UNKNOWN, "")),
+    **dict.fromkeys(TECHNIQUE_TYPES, (_TECHNIQUE, "receive_of_technique")),
+    **dict.fromkeys(DATA_TYPES, (_DATA, "receive_data")),
+    **{int(kind): (kind.about, f"receive_{kind.name.lower()}") for kind in MessageType},
+}
 
-
-def _handler_name(number: int) -> str:
-    if number in MessageType.__members__.values():
-        return f"receive_{MessageType(number).name.lower()}"
-    if number in DATA_TYPES:
-        return "receive_data"
-    return "receive_of_technique" if number in TECHNIQUE_TYPES else ""
-
-
-ABOUT = tuple(map(_about, range(256)))
+ABOUT = tuple(about for about, _handler in _ABOUT_AND_HANDLER.values())
 """What is declared about each number, also about those that are no MessageType."""
 
-HANDLER_NAMES = tuple(map(_handler_name, range(256)))
+HANDLER_NAMES = tuple(handler for _about, handler in _ABOUT_AND_HANDLER.values())
 """The method that handles packets with this number; empty: no node handles them."""
 
 TYPES_WITH_FLOATS = {number: ABOUT[number].floats for number in range(256) if ABOUT[number].floats}

@@ -15,6 +15,7 @@ from drone_mesh.communication.observer import Reporter
 from drone_mesh.communication.places import KnownPlaces
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.communication.ways import IDelivery, IRoutes
+from drone_mesh.drone.interfaces import IDroneEngine
 
 
 @dataclass(frozen=True)
@@ -27,7 +28,8 @@ class NodeBasics:
     report: Reporter
     neighbours: Neighbours
     places: KnownPlaces
-    pilot: Pilot
+    engine: IDroneEngine
+    pilot: Pilot  # flies it
     antenna: IWirelessCommunication
     seals: IMeshSeals
     complaints: Complaints

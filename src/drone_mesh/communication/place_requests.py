@@ -1,10 +1,25 @@
-"""Requests for places: a REQUESTLOCATION, which its addressee answers with a LOCATION."""
+"""Requests for places, and what a drone in flight is told of others in answer to them.
+
+A REQUESTLOCATION, which its addressee answers with a LOCATION; and LAST_PLACE: where another node
+was last heard, for a drone that is about to land near there (docs/protocol.md, "Places of silent
+drones").
+"""
 
 from __future__ import annotations
 
+import math
+from typing import NamedTuple
+
+from drone_mesh.communication import messages
 from drone_mesh.communication.interfaces import BROADCAST
-from drone_mesh.communication.messages import request_for_place
+from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.parts import NodeParts
+from drone_mesh.drone.location import Location
+
+NEAR_CLEARANCES = 3.0  # our choice: a drone that moves aside once is still within that
+MOST_TOLD = 4  # our choice: more drones do not stand that near to one place
+_BODY = MessageType.LAST_PLACE.about.layout
+_OLDEST_AGE_S = 2**16 - 1
 
 
 def ask_for_place(parts: NodeParts, node: int) -> None:
@@ -22,4 +37,41 @@ def _request(parts: NodeParts, to: int, may_fly_on: bool = False) -> bytes:
     goal = parts.pilot.goal
     place = goal or parts.pilot.place()
     flies_there = may_fly_on or goal is not None
-    return request_for_place(parts.node_id, to, place, flies_there=flies_there)
+    return messages.request_for_place(parts.node_id, to, place, flies_there=flies_there)
+
+
+class LastPlace(NamedTuple):
+    """Where a node was last heard."""
+
+    node: int
+    place: Location
+    age_s: float
+
+    def packet(self, creator: int, to: int) -> bytes:
+        """The 32 bytes, from `creator` for `to`."""
+        latitude, longitude, height = self.place
+        age = max(0, min(_OLDEST_AGE_S, math.ceil(self.age_s)))
+        body = _BODY.pack(age, self.node, latitude, longitude, round(height))
+        return messages.packet(MessageType.LAST_PLACE, creator, creator, to, to, body)
+
+    @classmethod
+    def from_payload(cls, payload: bytes) -> LastPlace | None:
+        """Decode; None if its place is not finite."""
+        age, node, *place = _BODY.unpack_from(payload, messages.HEADER_BYTES)
+        if not all(map(math.isfinite, place)):
+            return None
+        return cls(node, Location(*place), float(age))
+
+
+def tell_last_places(parts: NodeParts, asker: int, goal: Location, clearance_m: float) -> None:
+    """Tell a drone in flight which nodes were last heard near its goal: it may not hear them."""
+    near = sorted(
+        (heard.place.distance_m(goal), node)
+        for node, heard in parts.neighbours.places().items()
+        if node not in (asker, parts.node_id)
+    )
+    for away_m, node in near[:MOST_TOLD]:
+        heard = parts.neighbours.place_of(node)
+        if heard is not None and away_m < NEAR_CLEARANCES * clearance_m:
+            last = LastPlace(node, heard.place, parts.now_s - heard.heard_s)
+            parts.delivery.send_own(last.packet(parts.node_id, asker))

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 from drone_mesh.communication.component import MeshnetworkComponent
 from drone_mesh.communication.deadlines import Due
 from drone_mesh.communication.interfaces import IWirelessCommunication
-from drone_mesh.communication.last_places import LastPlace
 from drone_mesh.communication.mesh_node import NodeSettings
 from drone_mesh.communication.messages import (
     GatewayPlace,
@@ -21,6 +20,7 @@ from drone_mesh.communication.messages import (
 )
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.packet_types import MessageType
+from drone_mesh.communication.place_requests import LastPlace
 from drone_mesh.communication.repair.connection_repair import ConnectionRepair
 from drone_mesh.communication.repair.interfaces import IRepairStrategy
 from drone_mesh.communication.repair.status import RepairStatus
@@ -77,14 +77,6 @@ class MeshnetworkRouter(MeshnetworkComponent):
         """Whether a gateway answered the last heartbeat, or may still answer."""
         return self._states.connected
 
-    def get_preferred_gateway(self) -> int:
-        """Id of the gateway that this node uses, or NO_ROUTE while it knows none."""
-        return self.control.gateway
-
-    def get_hops_from_gateway_away(self) -> int:
-        """Hops to the preferred gateway; 255 while unknown."""
-        return self.control.hops
-
     def get_repair_status(self) -> RepairStatus:
         """What the node does about a lost connection, and why."""
         return self._repair.status()
@@ -127,12 +119,13 @@ class MeshnetworkRouter(MeshnetworkComponent):
             if self._is_possible(place, gateway=True):
                 self.places.update_gateway(place, self._deadlines.now_s)
 
-    def _on_negotiation(
-        self, bid: MovementNegotiationMessage, gateway: GatewayPlace | None
-    ) -> None:
-        if bid.creator != self._node_id:
+    def receive_movement_negotiation(self, payload: bytes, creator: int, from_: int) -> None:
+        """A neighbour bids for the flight, or announces one to the gateway's place."""
+        if creator != self._node_id:
+            bid = MovementNegotiationMessage.from_payload(payload)
+            gateway = GatewayPlace.from_payload(payload)
             about = None if gateway is None else gateway.place
-            self._repair.on_bid(bid.creator, bid.cost, bid.from_, about)
+            self._repair.on_bid(creator, bid.cost, from_, about)
 
     def _on_location(self, node: int, location: Location, gateway: GatewayPlace | None) -> None:
         now_s, control = self._deadlines.now_s, self.control
@@ -158,6 +151,12 @@ class MeshnetworkRouter(MeshnetworkComponent):
         heard = self._neighbours.place_of(last.node)
         if heard is not None:
             self._repair.on_taken(heard.place)
+
+    def receive_gateway_place(self, payload: bytes, _creator: int, _from: int) -> None:
+        """Where a gateway was, in a mesh with a key."""
+        gateway = GatewayPlace.from_payload(payload)
+        if gateway is not None:
+            self._on_gateway_place(gateway)
 
     def _on_gateway_place(self, gateway: GatewayPlace) -> None:
         if self._is_possible(gateway.place, gateway=True) and self.control.may_use(gateway.gateway):

@@ -65,11 +65,7 @@ _AWAITING = frozenset((ConnectionState.AWAITING_FIRST_ANSWER, ConnectionState.AW
 
 _ALL_TO_SEARCHING = {state: ConnectionState.SEARCHING for state in ConnectionState}
 _ALL_BUT_FLYING_TO_REST = {
-    RepairState.AT_REST: RepairState.AT_REST,
-    RepairState.LOST: RepairState.AT_REST,
-    RepairState.ASKING: RepairState.AT_REST,
-    RepairState.NEGOTIATING: RepairState.AT_REST,
-    RepairState.WATCHING: RepairState.AT_REST,
+    **{state: RepairState.AT_REST for state in RepairState},
     RepairState.FLYING: RepairState.FLYING,
 }
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Callable, Mapping
 
-from drone_mesh.communication.repair.interfaces import IRepairStrategy, Step
+from drone_mesh.communication.repair.actions import Step
+from drone_mesh.communication.repair.interfaces import IRepairStrategy
 from drone_mesh.drone.location import Location
 
 JUST_IN_RANGE = 0.95  # of the range

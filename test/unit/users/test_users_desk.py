@@ -53,7 +53,7 @@ def test_an_echo_is_answered_or_refused_with_the_reason(rig):
 
 def test_an_echo_without_an_answer_names_the_neighbour_with_another_key(rig):
     network = rig.network
-    network.nodes[2].component.data.on_packet = lambda _payload: None
+    network.nodes[2].component.data._echoes.asked = lambda _creator, _body: None
     assert rig.desks[0].echo(2, 0.01) is None
     reason = "a neighbour, node 9, sends packets without a seal: it has no key"
     network.nodes[0].component.complaints.foreign(1, reason, b"", network.now_s())

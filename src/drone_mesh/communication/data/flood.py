@@ -18,7 +18,8 @@ class Flood:
 
     def __init__(self, parts: NodeParts) -> None:
         self._parts = parts
-        self._seen = SeenFragments()
+        # By sender and message: its fragments that arrived, as bits, and when the first one did
+        self._seen: OrderedDict[tuple[int, int], tuple[int, float]] = OrderedDict()
 
     def send(self, fragment: bytes) -> None:
         """Broadcast a fragment of this node."""
@@ -35,20 +36,10 @@ class Flood:
         return True
 
     def _is_new(self, fragment: bytes) -> bool:
+        """Whether this fragment is new; records it."""
         creator, _from, kind, _to, _forward = messages.header(fragment)
         number, index = messages.body(fragment)[0], kind - packets.FRAGMENTS.start
-        return self._seen.is_new(creator, number, index, self._parts.now_s)
-
-
-class SeenFragments:
-    """Remembers fragments by sender, message and index. Memory: MOST_REMEMBERED entries."""
-
-    def __init__(self) -> None:
-        self._seen: OrderedDict[tuple[int, int], tuple[int, float]] = OrderedDict()
-
-    def is_new(self, sender: int, number: int, index: int, now_s: float) -> bool:
-        """Whether this fragment is new; records it."""
-        key = (sender, number)
+        key, now_s = (creator, number), self._parts.now_s
         indices, first_s = self._seen.get(key, (0, now_s))
         if now_s - first_s >= REMEMBERED_S:  # the number now belongs to another message
             indices, first_s = 0, now_s

@@ -16,11 +16,6 @@ Seal = Callable[[bytes, bytes], bytes]
 """Turns the place and the payload of a message into the bytes to send."""
 
 
-def leave_plain(_place: bytes, payload: bytes) -> bytes:
-    """For a mesh without a key: the payload itself."""
-    return payload
-
-
 class Fragmentation:
     """Cuts messages into the fragments that the receiver's Reassembly joins again."""
 

@@ -9,8 +9,8 @@ from typing import Callable
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.ordering import PortOrder
 from drone_mesh.communication.data.packets import COMPLETE, Ack, Poll
-from drone_mesh.communication.data.reassembly import Open, Reassembly, Whole, open_plain
-from drone_mesh.communication.medium import UNDISTURBED, Medium
+from drone_mesh.communication.data.reassembly import Open, Reassembly, Whole
+from drone_mesh.communication.medium import Medium
 
 ACK_DELAY_S = 0.02  # our choice: complete messages are acknowledged after a pause of this time
 ACK_LATEST_S = 0.2  # our choice: or after this time without a pause
@@ -27,8 +27,8 @@ class Inbox:
         self,
         room: int,
         acknowledge: Callable[[Ack], None],
-        open_message: Open = open_plain,
-        medium: Medium = UNDISTURBED,
+        open_message: Open,
+        medium: Medium,
     ) -> None:
         """`acknowledge` sends an ACK to the sender; `room`: bytes of a body."""
         self._ack_delay_s = medium.stretched(ACK_DELAY_S)

@@ -4,8 +4,8 @@ A message is cut into fragments. The receiver of a reliable one reports the frag
 an ACK: when the message is complete, when its last fragment arrived but others are missing, and in
 answer to a POLL. Missing fragments are then sent again. The sender sends a POLL when no ACK arrives
 in time, and when the window is full; while one is unanswered, it sends nothing else. If there are
-relays on a shared channel on the way, a train takes the place of the window (see RelayedWay), also
-for messages that are not reliable.
+relays on a shared channel on the way, a train takes the place of the window (see Train), also for
+messages that are not reliable.
 """
 
 from __future__ import annotations
@@ -15,12 +15,10 @@ from collections import deque
 from typing import Callable, Iterator
 
 from drone_mesh.communication.data import packets
-from drone_mesh.communication.data.congestion_window import CongestionWindow
-from drone_mesh.communication.data.fragmentation import Fragmentation, Seal, leave_plain
+from drone_mesh.communication.data.fragmentation import Fragmentation, Seal
 from drone_mesh.communication.data.outgoing import LIFETIME_S, DataPacket, OutgoingMessage
+from drone_mesh.communication.data.pacing import CongestionWindow, RoundTrip
 from drone_mesh.communication.data.packets import COMPLETE, NO_ANSWER, Ack, Poll
-from drone_mesh.communication.data.relayed_way import RelayedWay
-from drone_mesh.communication.data.round_trip import RoundTrip
 from drone_mesh.communication.data.ticket import TicketState, destination_in_words
 from drone_mesh.communication.data.train import Train
 
@@ -34,8 +32,8 @@ class Outbox:
         session: int,
         room: int,
         ended: Callable[[TicketState], None],
-        seal: Seal = leave_plain,
-        hint: Callable[[], str] = str,
+        seal: Seal,
+        hint: Callable[[], str],
     ) -> None:
         """`room`: bytes of a body; `ended` is called with the last state of each message.
 
@@ -50,7 +48,7 @@ class Outbox:
         self._fragmentation = Fragmentation(session, room, seal, self._open)
         self._window = CongestionWindow()
         self._round_trip = RoundTrip()
-        self._way = RelayedWay(self._round_trip)
+        self._train: Train | None = None  # if there are relays
         self._nonce = 0
         self._latest: OutgoingMessage | None = None  # message whose fragment left last
         self.not_before_s = -math.inf  # no route: time of the next attempt
@@ -66,7 +64,7 @@ class Outbox:
     @property
     def is_idle(self) -> bool:
         """Whether it has nothing to send, now or later."""
-        return not len(self) and not self._way.is_open
+        return not len(self) and not (self._train and self._train.is_open)
 
     def add(self, message: OutgoingMessage) -> None:
         """Add a message for this destination."""
@@ -74,16 +72,19 @@ class Outbox:
 
     def set_relayed(self, relayed: bool) -> None:
         """Set whether there are relays on the same channel on the way to the destination."""
-        self._way.set_relayed(relayed)
+        if not relayed:
+            self._train = None
+        elif self._train is None:
+            self._train = Train(self._round_trip)
 
     def next_packet(self, now_s: float) -> DataPacket | None:
         """The next packet to send; call `on_sent` once it was sent."""
-        train = self._way.train
+        train = self._train
         if train is None:
             poll = self._timely_poll(now_s)
             return poll if poll is not None or self._unanswered else self._fragment()
         if train.waits:
-            if now_s < self._way.waits_until_s(train):
+            if now_s < train.waits_until_s:
                 return None
             if any(message.in_flight for message in self._open.values()):
                 return self._end_of_train()
@@ -111,7 +112,7 @@ class Outbox:
     def _fragment(self) -> DataPacket | None:
         """The next fragment; a POLL if the window is full."""
         in_flight, window = 0, math.inf
-        if self._way.train is None:
+        if self._train is None:
             in_flight, window = self._in_flight(), self._window.size
         for message in self._open.values():
             if message.to_send and message.asked_s == math.inf:
@@ -133,15 +134,17 @@ class Outbox:
         """The packet was sent."""
         message = packet.message
         if packet.ends_train:
-            self._way.end_left(packets.poll_of(packet.body).nonce, now_s)
+            assert self._train is not None
+            self._train.end_left(packets.poll_of(packet.body).nonce, now_s)
             return
         if packet.kind == packets.POLL:
-            self._way.interrupted()
+            self._interrupted()
             message.asked_s, message.asks = now_s, message.asks + 1
             return
         self._latest = message
         message.ticket.reason = ""
-        self._way.fragment_left(packet.kind)
+        if self._train is not None:
+            self._train.fragment_left(packet.kind)
         index = message.to_send.popleft()
         message.sent |= 1 << index
         if message.to_send:
@@ -179,7 +182,8 @@ class Outbox:
                 self._measure(message, ack, now_s)
             self._window.grow(message.in_flight)
             self._close(message, TicketState.DELIVERED)
-        if self._way.answered(ack.nonce, not self._in_flight(), now_s):
+        train = self._train
+        if train is not None and train.answered(ack.nonce, not self._in_flight(), now_s):
             for message in self._open.values():
                 if not message.ticket.reliable:
                     message.sent &= message.known  # lost fragments are not sent again
@@ -189,10 +193,9 @@ class Outbox:
         due_s = math.inf
         if self.is_idle:
             return due_s
-        train = self._way.train
-        waits = train is not None and train.waits
-        if train is not None and train.waits:
-            due_s = self._way.waits_until_s(train)
+        waits = self._train is not None and self._train.waits
+        if self._train is not None and waits:
+            due_s = self._train.waits_until_s
         for message in self._open.values():
             if message.asked_s < math.inf and not waits:
                 due_s = min(due_s, message.asked_s + self._timeout_s(message))
@@ -222,7 +225,7 @@ class Outbox:
 
     def waits_because(self, reason: str) -> None:
         """Nothing is sent for now."""
-        self._way.interrupted()
+        self._interrupted()
         for message in self:
             message.ticket.reason = reason
 
@@ -242,15 +245,16 @@ class Outbox:
         messages = [message for message in self if message.ticket.to == to]
         for message in messages:
             self._remove(message)
-            message.begin_again()
+            message.begin()
         if messages:
-            self._way.begin_again()
+            self._train = None
         return messages
 
     # One message ------------------------------------------------------------------------------
 
     def _may_open(self) -> bool:
-        if not self._waiting or len(self._open) >= self._way.most_messages:
+        train = self._train
+        if not self._waiting or (train is not None and len(self._open) >= train.most_messages):
             return False
         return self._fragmentation.may_open(self._waiting[0].ticket)
 
@@ -273,6 +277,11 @@ class Outbox:
     def _end_of_train(self) -> DataPacket:
         assert self._latest is not None
         return self._asking(self._latest)._replace(ends_train=True)
+
+    def _interrupted(self) -> None:
+        """Nothing follows for now, so relays need not wait."""
+        if self._train is not None:
+            self._train.is_open = False
 
     def _mark_of_end(self, train: Train) -> DataPacket | None:
         """For the relays, after a train that is not full."""
@@ -313,8 +322,8 @@ class Outbox:
 
         The latter may arrive after a POLL; without it, a timeout that is too short would stay so.
         """
-        if self._way.measures(ack.nonce):
-            return
+        if self._train is not None and ack.nonce == self._train.nonce != 0:
+            return  # the train measures itself
         if ack.nonce and ack.nonce == message.nonce:
             self._round_trip.measured(now_s - message.asked_s)
         elif ack.nonce == 0 and message.whole:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import functools
 import math
-import random
 from collections import OrderedDict
 from typing import Callable
 
@@ -36,7 +35,6 @@ class Outboxes:
     def __init__(
         self,
         parts: NodeParts,
-        rng: random.Random,
         node: IMeshDebugInfo,
         room: int,
         send_packet: SendPacket,
@@ -45,7 +43,6 @@ class Outboxes:
     ) -> None:
         """`room`, `ended` and `hint` as for Outbox; `node` knows its connection."""
         self._parts = parts
-        self._rng = rng
         self._node = node
         self._was_lost = False
         self._room = room
@@ -176,7 +173,7 @@ class Outboxes:
 
     def _outbox(self, to: int) -> Outbox:
         if self._session is None:
-            self._session = self._rng.randrange(1 << 16)
+            self._session = self._parts.rng.randrange(1 << 16)
         outbox = self._outboxes.get(to)
         if outbox is None:
             seal = functools.partial(self._parts.seals.seal_message, self._parts.node_id, to)

@@ -34,23 +34,19 @@ class OutgoingMessage:
         self.payload = payload
         self.sealed = b""  # the bytes to send, once it is under way
         self.expires_s = now_s + LIFETIME_S
+        self.left_s = math.inf  # when its last fragment left
+        self.begin()
+
+    def begin(self) -> None:
+        """Nothing of it was sent, or that no longer counts."""
         self.head: Head | None = None  # once it is under way
         self.to_send: deque[int] = deque()  # indices of fragments
         self.whole = False  # whether each fragment has left at least once
         self.sent = 0  # fragments that left, as bits
         self.known = 0  # fragments that the receiver has, as bits
         self.asked_s = math.inf  # since when an answer is awaited
-        self.left_s = math.inf  # when its last fragment left
         self.asks = 0  # questions without an answer
         self.nonce = 0  # of the latest POLL; 0: none
-
-    def begin_again(self) -> None:
-        """Reset: nothing of it was sent."""
-        self.head = None
-        self.whole = False
-        self.to_send.clear()
-        self.sent = self.known = self.asks = self.nonce = 0
-        self.asked_s = math.inf
 
     @property
     def in_flight(self) -> int:

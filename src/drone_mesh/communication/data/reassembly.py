@@ -17,11 +17,6 @@ Open = Callable[[bytes, bytes], Optional[bytes]]
 """Turns the place and the sealed bytes of a message into its content; None: not authentic."""
 
 
-def open_plain(_place: bytes, sealed: bytes) -> bytes:
-    """For a mesh without a key: the bytes themselves."""
-    return sealed
-
-
 class Whole(NamedTuple):
     """A complete message."""
 
@@ -42,7 +37,7 @@ class _Partial:
 class Reassembly:
     """Reassembles the messages of one sender. Memory: MOST_PARTIAL messages at most."""
 
-    def __init__(self, room: int, open_message: Open = open_plain) -> None:
+    def __init__(self, room: int, open_message: Open) -> None:
         """`room`: bytes of a body."""
         self._room = room
         self._open = open_message

@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import math
 
+from drone_mesh.communication.data import packets
+from drone_mesh.communication.data.fragmentation import MOST_OPEN
+from drone_mesh.communication.data.pacing import FIRST_TIMEOUT_S, RoundTrip
+
 FIRST_LENGTH = 32  # our choice, in fragments
 LEAST_LENGTH = 8  # our choice
 MOST_LENGTH = 80  # our choice: two messages of 1,024 bytes; a relay forwards it in one piece
+MOST_IN_TURN = 6  # our choice: with 12, turns are long and few
 
 
 class Train:
@@ -18,13 +23,15 @@ class Train:
     without an answer, the next ones are shorter.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, round_trip: RoundTrip) -> None:
+        """`round_trip`: of the outbox; answers to trains are measured in it."""
+        self._round_trip = round_trip
         self.length = FIRST_LENGTH
         self.left = 0  # fragments that left
         self.is_open = False  # relays wait for more of it
         self.nonce = 0  # of its latest POLL; 0: none
-        self.asks = 0  # POLLs without an answer
-        self.asked_s = math.inf
+        self._asks = 0  # POLLs without an answer
+        self._asked_s = math.inf
 
     @property
     def is_full(self) -> bool:
@@ -34,12 +41,38 @@ class Train:
     @property
     def waits(self) -> bool:
         """Whether the next train waits for an answer."""
-        return self.asks > 0
+        return self._asks > 0
 
-    def asked(self, nonce: int, now_s: float) -> None:
-        """Its POLL was sent."""
-        self.nonce, self.asked_s = nonce, now_s
-        self.asks += 1
+    @property
+    def waits_until_s(self) -> float:
+        """When to ask again for the answer that the next train waits for."""
+        return self._asked_s + self._round_trip.timeout_s(max(0, self._asks - 1))
+
+    @property
+    def most_messages(self) -> int:
+        """How many messages may be on their way at once: few if answers wait for others' turns."""
+        return MOST_IN_TURN if self._round_trip.mean_s > FIRST_TIMEOUT_S else MOST_OPEN
+
+    def fragment_left(self, kind: int) -> None:
+        """A fragment was sent."""
+        self.left += 1
+        self.is_open |= kind != packets.FRAGMENTS.start
+
+    def end_left(self, nonce: int, now_s: float) -> None:
+        """The POLL that ends it was sent."""
+        self.is_open = False
+        if nonce != packets.NO_ANSWER:
+            self.nonce, self._asked_s = nonce, now_s
+            self._asks += 1
+
+    def answered(self, nonce: int, arrived: bool, now_s: float) -> bool:
+        """An answer came; `arrived`: nothing is known to be missing. True: it ends the train."""
+        ends = self.waits and nonce == self.nonce
+        if ends:
+            self._round_trip.measured(now_s - self._asked_s)
+        if ends or (arrived and not self.waits):
+            self.end(arrived)
+        return ends
 
     def end(self, arrived: bool) -> None:
         """The train is over; `arrived`: nothing of it is known to be missing."""
@@ -47,5 +80,5 @@ class Train:
             self.length = max(LEAST_LENGTH, self.length // 2)
         elif self.is_full:
             self.length = min(MOST_LENGTH, 2 * self.length)
-        self.left = self.nonce = self.asks = 0
-        self.asked_s = math.inf
+        self.left = self.nonce = self._asks = 0
+        self._asked_s = math.inf

@@ -8,11 +8,9 @@ sender.
 from __future__ import annotations
 
 import hmac
-import random
 from typing import Callable, NamedTuple
 
 from drone_mesh.communication import messages
-from drone_mesh.communication.complaints import Complaints
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.echo import Echoes, OnEchoAnswer
 from drone_mesh.communication.data.flood import Flood
@@ -61,23 +59,13 @@ class DataFigures(NamedTuple):
 class Transport:
     """Sends and receives the messages of one node. Belongs to the component's thread."""
 
-    def __init__(
-        self,
-        parts: NodeParts,
-        complaints: Complaints,
-        rng: random.Random,
-        node: IMeshDebugInfo,
-        room: int = messages.BODY_BYTES,
-    ) -> None:
-        """`node` knows its connection; `room`: free bytes in a packet's body."""
-        if not packets.LEAST_ROOM <= room <= messages.BODY_BYTES:
-            raise ValueError(
-                f"invalid room {room}: must be {packets.LEAST_ROOM}..{messages.BODY_BYTES}"
-            )
+    def __init__(self, parts: NodeParts, node: IMeshDebugInfo) -> None:
+        """`node` knows its connection."""
+        room = messages.BODY_BYTES - parts.seals.reserved_bytes(packets.FRAGMENTS.start)
+        assert room >= packets.LEAST_ROOM, "a seal leaves too little room for users' data"
         self._parts = parts
-        self._complaints = complaints
         self._my_gateway = node.get_preferred_gateway
-        self._outboxes = Outboxes(parts, rng, node, room, self._send_packet, self._ended, self.hint)
+        self._outboxes = Outboxes(parts, node, room, self._send_packet, self._ended, self.hint)
         self._inboxes = Inboxes(parts, room, self._send_packet, self._arrived)
         self._flood = Flood(parts)
         self._echoes = Echoes(self._send_packet, room)
@@ -132,7 +120,7 @@ class Transport:
     def hint(self) -> str:
         """Text to append to an error: that a neighbour has another key or none. Otherwise empty."""
         foreign = self._parts.seals.foreign_neighbour()
-        foreign = foreign or self._complaints.foreign_neighbour(self._parts.now_s)
+        foreign = foreign or self._parts.complaints.foreign_neighbour(self._parts.now_s)
         return f"; {foreign}" if foreign else ""
 
     def figures(self) -> DataFigures:
@@ -141,23 +129,24 @@ class Transport:
 
     # For the component -------------------------------------------------------------------------
 
-    def on_packet(self, payload: bytes) -> None:
+    def receive_data(self, payload: bytes, creator: int, _from: int) -> None:
         """Process a packet of a user's type, for this node or for all."""
-        creator, _from, kind, _to, forward = messages.header(payload)
-        body = messages.body(payload)
+        kind, body = messages.type_of(payload), messages.body(payload)
         if creator == self._parts.node_id:
             return  # it came back
         now_s = self._parts.now_s
         try:
             if kind in packets.FRAGMENTS:
-                to_all = forward == TO_ALL
+                to_all = messages.addressee(payload) == TO_ALL
                 if not to_all or self._flood.repeat(payload):
                     self._inboxes.fragment(creator, to_all, kind - packets.FRAGMENTS.start, body)
             elif kind == packets.ACK:
                 if self._is_authentic(body, creator):
                     self._outboxes.answered(creator, packets.ack_of(body))
                 else:
-                    self._complaints.dropped("an acknowledgement without proof", payload, now_s)
+                    self._parts.complaints.dropped(
+                        "an acknowledgement without proof", payload, now_s
+                    )
             elif kind == packets.POLL:
                 self._inboxes.poll(creator, packets.poll_of(body))
             elif kind == packets.ECHO:
@@ -165,9 +154,9 @@ class Transport:
             elif kind == packets.ECHO_ANSWER:
                 self._echoes.answered(creator, body, now_s)
             else:
-                self._complaints.dropped("data of an unknown type", payload, now_s)
+                self._parts.complaints.dropped("data of an unknown type", payload, now_s)
         except PacketError as error:
-            self._complaints.dropped(f"invalid data: {error}", payload, now_s)
+            self._parts.complaints.dropped(f"invalid data: {error}", payload, now_s)
         self._work()
 
     def on_due(self) -> None:

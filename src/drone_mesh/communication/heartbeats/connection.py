@@ -131,19 +131,17 @@ class GatewayConnection:
         the route in use may still work. The neighbour that led to no answer is avoided for a while.
         """
         tried, self._tried = self._tried, NO_ROUTE
-        if tried != NO_ROUTE:
+        was_connected = self._states.connected
+        if tried == NO_ROUTE:
+            self._unanswered += 1
+        else:
             self._detours.avoid(tried, self._parts.now_s + AVOIDED_S)
-            if self._states.connected:
-                self._heartbeat_sent_s = -math.inf
-                self.send_heartbeat()
-                return
-        self._unanswered += 1
-        if self._states.connected and self._unanswered < self._parts.antenna.medium.heartbeats:
+        may_answer = tried != NO_ROUTE or self._unanswered < self._parts.antenna.medium.heartbeats
+        if was_connected and may_answer:
             self._heartbeat_sent_s = -math.inf
             self.send_heartbeat()
             return
         self._unanswered = 0
-        was_connected = self._states.connected
         self._states.happened(RouterEvent.ANSWER_MISSED)
         self._show()
         if was_connected:
@@ -265,7 +263,7 @@ class GatewayConnection:
 
     def gateway_sent_place(self) -> None:
         """The preferred gateway itself reported its place."""
-        self._relay_check.gateway_sent_place()
+        self._relay_check.swallowing.answered()
 
     def _ask_for_places(self, fresh_s: float = 0.0, gateway_asked: bool = False) -> None:
         """Ask the next hop where it is, and the gateway if that is unknown or may have moved.
@@ -298,11 +296,6 @@ class GatewayConnection:
         self._heartbeat_sent_s = self._answered_s = -math.inf
         self._show()
 
-    def give_up_routes(self) -> None:
-        """Forget every route to the gateway and inform the neighbours."""
-        if self.gateway != NO_ROUTE:
-            self._parts.delivery.gateway_lost(self.gateway)
-
     def _answer_window_s(self) -> float:
         medium = self._parts.antenna.medium
         hops = self.hops if self.hops != NO_ROUTE else _HOPS_UNTIL_KNOWN
@@ -323,7 +316,7 @@ class GatewayConnection:
             self.gateway = gateway
             self._resigned_s = -math.inf
             self._parts.places.forget_gateway()
-            self._relay_check.gateway_changed()
+            self._relay_check.swallowing.give_up()  # this one may not know its own place
 
     def _show(self) -> None:
         """Report a change of the connection; cancel the wait for an answer that is not expected."""

@@ -67,7 +67,9 @@ class Delivery(IDelivery):
         """
         is_known = to in self._known
         if not is_known and self._strangers.ignores(to, self._deadlines.now_s):
-            self._ignore(to)
+            # Too many nodes that never took a packet were lost: drop this one, unannounced.
+            self._neighbours.lost(to, self._deadlines.now_s)
+            self._routing.cant_communicate_with_node(to)
             return False
         if payload[CREATOR_AT] == self._node_id and payload[FORWARD_AT] != to:
             now_s = self._deadlines.now_s
@@ -84,7 +86,7 @@ class Delivery(IDelivery):
             failures += 1
         self._routing.sent(to, False, failures)
         if not messages.asks_for_place(payload):
-            self._neighbour_lost(to, came_from)
+            self.neighbour_lost(to, came_from)
         return False
 
     def went_to(self, payload: bytes) -> int | None:
@@ -125,7 +127,7 @@ class Delivery(IDelivery):
             self._gave_up.add(to)
         else:
             self._gave_up.discard(to)
-            self._neighbour_lost(to, NO_ROUTE)
+            self.neighbour_lost(to)
         detour = self._routing.get_direction_to_node(other)
         if detour in (NO_ROUTE, to) and other != to:
             detour = self._another_next_hop(other, to)
@@ -246,16 +248,11 @@ class Delivery(IDelivery):
             messages.MissingMessage(me, me, BROADCAST, BROADCAST, missing).to_payload()
         )
 
-    def neighbour_leaves(self, node: int) -> None:
-        """A neighbour is about to fly out of reach, so other routes are needed."""
-        self._neighbour_lost(node, NO_ROUTE)
+    def neighbour_lost(self, node: int, came_from: int = NO_ROUTE) -> None:
+        """A neighbour is out of reach, or about to be: find other routes.
 
-    def _ignore(self, node: int) -> None:
-        """Too many nodes that never took a packet were lost: drop this one, unannounced."""
-        self._neighbours.lost(node, self._deadlines.now_s)
-        self._routing.cant_communicate_with_node(node)
-
-    def _neighbour_lost(self, node: int, came_from: int) -> None:
+        `came_from`: the neighbour to inform first.
+        """
         self._strangers.gave_up(node, self._deadlines.now_s)
         if self._neighbours.lost(node, self._deadlines.now_s):
             self._report(MeshEventKind.NEIGHBOUR_LOST, node)

@@ -8,7 +8,6 @@ requests a packet from it (docs/protocol.md, "Shared channel").
 from __future__ import annotations
 
 import math
-import struct
 from typing import Callable
 
 from drone_mesh.communication import messages
@@ -16,7 +15,7 @@ from drone_mesh.communication.interfaces import BROADCAST
 from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.parts import NodeParts
 
-BODY = struct.Struct("<BH")  # the node, the number of the search
+BODY = MessageType.NODE_SEARCH.about.layout
 SEARCH_EVERY_S = 0.3  # our choice: each search is one broadcast by every node
 SAME_SEARCH_S = 10.0  # our choice: far longer than a search takes to pass through a mesh
 NUMBERS_PER_S = 16  # our choice, for orders too: a restarted gateway starts at another number

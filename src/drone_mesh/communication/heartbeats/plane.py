@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import abc
 import math
 from typing import Sequence
 
@@ -74,7 +73,7 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
     def neighbour_leaves(self, neighbour: int) -> None:
         """On a shared medium, look for other routes; otherwise the next packet shows it."""
         if self._antenna.medium.shared:
-            self._delivery.neighbour_leaves(neighbour)
+            self._delivery.neighbour_lost(neighbour)
 
     # Packets ---------------------------------------------------------------------------------
 
@@ -94,14 +93,6 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         """Send the packet over another route, if there is one; the routes learn from this."""
         if not self._delivery.undelivered(payload, tries):
             self._forwarding.stranded(payload, self._deadlines.now_s)
-
-    @abc.abstractmethod
-    def receive_heartbeat(self, payload: bytes, creator: int, from_: int) -> None:
-        """A HEARTBEAT for this node arrived."""
-
-    @abc.abstractmethod
-    def receive_present(self, payload: bytes, creator: int, from_: int) -> None:
-        """A neighbour introduced itself."""
 
     def receive_missing(self, payload: bytes, creator: int, from_: int) -> None:
         """`creator` reports that it cannot reach a node."""

@@ -1,20 +1,67 @@
 """RelayCheck: in a mesh with a key, checks whether the next hop relays more than heartbeats.
 
-docs/security.md, "A relay that swallows".
+docs/security.md, "A relay that swallows". A captured relay can forward heartbeats, so that the
+nodes behind it stay connected, and drop all other packets. With a key, only the gateway itself can
+answer a request for its place. If it answers heartbeats but repeatedly does not answer this
+request, a node on the route swallows packets.
 """
 
 from __future__ import annotations
 
 import logging
+import math
 
 from drone_mesh.communication.heartbeats.detours import SWALLOWER_AVOIDED_S, Detours
 from drone_mesh.communication.heartbeats.parts import HeartbeatParts
-from drone_mesh.communication.heartbeats.swallowing import Swallowing
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.place_requests import ask_for_place
 
+ASK_PERIODS = 3.0  # our choice, in check periods: one packet and its answer in half a minute
+LEAST_UNANSWERED = 2  # our choice: for a next hop chosen because another one swallowed packets
+
 _log = logging.getLogger(__name__)
+
+
+class Swallowing:
+    """Counts unanswered questions to one gateway."""
+
+    def __init__(self, check_period_s: float) -> None:
+        self._ask_period_s = ASK_PERIODS * check_period_s
+        self._answers = False  # whether this gateway knows its place and answers at all
+        self._unanswered = 0
+        self._asked_s = -math.inf
+
+    def must_ask(self, now_s: float) -> bool:
+        """Whether to ask the gateway in this check: in each one after a question without answer."""
+        return self._unanswered > 0 or now_s - self._asked_s >= self._ask_period_s
+
+    def asked(self, now_s: float) -> None:
+        """The gateway was asked for its place."""
+        self._asked_s = now_s
+        self._unanswered += 1
+
+    def answered(self) -> None:
+        """It answered."""
+        self._answers = True
+        self._unanswered = 0
+
+    def noticed(self, hops: int) -> bool:
+        """Whether packets are swallowed on the route, which is `hops` long.
+
+        Nodes with fewer hops come to this conclusion sooner. So the node next to the relay is the
+        first to change its next hop, and the nodes behind it need not change theirs.
+        """
+        return self._answers and self._unanswered >= max(LEAST_UNANSWERED, hops)
+
+    def another_next_hop(self, hops: int) -> None:
+        """The route has changed, and must soon prove that it works."""
+        self._unanswered = max(0, hops - LEAST_UNANSWERED)
+
+    def give_up(self) -> None:
+        """Stop suspecting: there is another gateway, or it is silent through every next hop."""
+        self._answers = False
+        self._unanswered = 0
 
 
 class RelayCheck:
@@ -23,7 +70,7 @@ class RelayCheck:
     def __init__(self, parts: HeartbeatParts, detours: Detours) -> None:
         self._parts = parts
         self._detours = detours
-        self._swallowing = Swallowing(parts.timing.check_period_s)
+        self.swallowing = Swallowing(parts.timing.check_period_s)
         self._detour = NO_ROUTE
 
     def run(self, gateway: int, next_hop: int, hops: int) -> bool:
@@ -36,7 +83,7 @@ class RelayCheck:
         relayed = next_hop not in (gateway, NO_ROUTE)
         if not (sealed and relayed and parts.routing.TAKES_SHORTCUTS):
             return False
-        if self._swallowing.noticed(hops):
+        if self.swallowing.noticed(hops):
             self._detours.avoid(next_hop, now_s + SWALLOWER_AVOIDED_S)
             _log.warning(
                 "node %d: node %d carries heartbeats to gateway %d, but no other packets",
@@ -47,14 +94,14 @@ class RelayCheck:
         if self._detours.avoids(next_hop, now_s):  # just now, or the route has returned to it
             self._detour = self._detours.nearest(next_hop, hops, now_s)
             if self._detour == NO_ROUTE:
-                self._swallowing.give_up()
+                self.swallowing.give_up()
                 self._detours.avoid_none()
             else:
-                self._swallowing.another_next_hop(hops)
+                self.swallowing.another_next_hop(hops)
             return False
-        if not self._swallowing.must_ask(now_s):
+        if not self.swallowing.must_ask(now_s):
             return False
-        self._swallowing.asked(now_s)
+        self.swallowing.asked(now_s)
         ask_for_place(parts, gateway)
         return True
 
@@ -62,11 +109,3 @@ class RelayCheck:
         """The neighbour to send the next heartbeat through, for one heartbeat; NO_ROUTE: none."""
         detour, self._detour = self._detour, NO_ROUTE
         return detour
-
-    def gateway_sent_place(self) -> None:
-        """The gateway itself reported its place."""
-        self._swallowing.answered()
-
-    def gateway_changed(self) -> None:
-        """The router prefers another gateway; this one may not know its own place."""
-        self._swallowing.give_up()

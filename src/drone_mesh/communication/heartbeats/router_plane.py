@@ -102,7 +102,8 @@ class RouterHeartbeats(HeartbeatPlane):
 
     def give_up_routes(self) -> None:
         """Forget every route to the gateway and inform the neighbours."""
-        self._connection.give_up_routes()
+        if self._connection.gateway != NO_ROUTE:
+            self._delivery.gateway_lost(self._connection.gateway)
 
     def gateway_sent_place(self) -> None:
         """The preferred gateway itself reported its place."""

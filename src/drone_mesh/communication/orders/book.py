@@ -117,7 +117,7 @@ class OrderBook:
         """
         order = self._orders[number]
         if self._parts.delivery.send_own(self._packet(order)):
-            self._wait(order, self._stretched(REPEAT_AFTER_S[0]))
+            self._wait(order, REPEAT_AFTER_S[0])
         elif not self._seek(order):
             self._move(order, OrderState.NO_ROUTE)
             return False
@@ -139,7 +139,7 @@ class OrderBook:
             if order.seeking:
                 order.seeking = False
                 self._parts.delivery.send_own(self._packet(order))
-                self._wait(order, self._stretched(REPEAT_AFTER_S[0]))
+                self._wait(order, REPEAT_AFTER_S[0])
 
     def _seek(self, order: _Order) -> bool:
         """Search for the drone; the order is lost unless a search finds it in time."""
@@ -148,9 +148,9 @@ class OrderBook:
         order.seeking = True
         if self._search(order.drone):
             order.searches += 1
-            self._wait(order, self._stretched(FOUND_WITHIN_S))
+            self._wait(order, FOUND_WITHIN_S)
         else:
-            self._wait(order, self._stretched(SEARCH_EVERY_S))
+            self._wait(order, SEARCH_EVERY_S)
         return True
 
     def on_reply(self, drone: int, reply: OrderReply) -> None:
@@ -180,7 +180,7 @@ class OrderBook:
             self._replace(order, self._older(order), for_good=True)
         self._move(order, _STATE_AFTER[outcome], reason)
         is_own = order.drone == self._parts.node_id
-        self._wait(order, math.inf if order.settled or is_own else self._stretched(QUERY_PERIOD_S))
+        self._wait(order, math.inf if order.settled or is_own else QUERY_PERIOD_S)
 
     def on_due(self) -> None:
         """Repeat orders without a reply, and query drones that are under way."""
@@ -202,15 +202,14 @@ class OrderBook:
                 self._lost(order, order.dropped or "it did not reply")
                 return
             self._send_if_routed(order, self._packet(order))
-            again_s = self._stretched(REPEAT_AFTER_S[order.unanswered])
-            order.due_s = self._parts.now_s + again_s
+            self._wait(order, REPEAT_AFTER_S[order.unanswered])
         elif order.state is OrderState.ACCEPTED:
             if order.unanswered > MOST_QUERIES:
                 self._lost(order, "it fell silent on its way")
                 return
             query = OrderQuery.packet(order.number, self._parts.node_id, order.drone)
             self._send_if_routed(order, query)
-            order.due_s = self._parts.now_s + self._stretched(QUERY_PERIOD_S)
+            self._wait(order, QUERY_PERIOD_S)
 
     def _send_if_routed(self, order: _Order, packet: bytes) -> None:
         """Send nothing without a route: the drone may be in flight, out of reach."""
@@ -262,11 +261,9 @@ class OrderBook:
         self._parts.report(EVENT_OF[order.state], order.drone, detail)
 
     def _wait(self, order: _Order, seconds: float) -> None:
-        order.due_s = self._parts.now_s + seconds
+        """Repeat or query after so many seconds, on a slow medium more."""
+        order.due_s = self._parts.now_s + self._parts.antenna.medium.stretched(seconds)
         self._schedule()
-
-    def _stretched(self, seconds: float) -> float:
-        return self._parts.antenna.medium.stretched(seconds)
 
     def _schedule(self) -> None:
         due_s = min((order.due_s for order in self._orders.values()), default=math.inf)

@@ -1,4 +1,4 @@
-"""FinalPlaces: where each drone is going to stand, as far as its gateway knows.
+"""Where each drone is going to stand, as far as its gateway knows.
 
 docs/protocol.md, "Orders".
 """
@@ -6,7 +6,7 @@ docs/protocol.md, "Orders".
 from __future__ import annotations
 
 import math
-from typing import Callable, Iterable, NamedTuple
+from typing import Iterable, NamedTuple
 
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.order_record import OrderRecord, OrderState
@@ -25,63 +25,58 @@ class _Place(NamedTuple):
     place: Location
 
 
-class FinalPlaces:
-    """Refuses orders onto the place of another drone."""
+def check_place(
+    parts: NodeParts,
+    orders: Iterable[OrderRecord],
+    reports: Iterable[ReportedNode],
+    drone: int,
+    goal: Location,
+    clearance_m: float,
+) -> None:
+    """Raise PlaceTaken if another drone stands at `goal`, flies there or was heard there.
 
-    def __init__(
-        self,
-        parts: NodeParts,
-        orders: Callable[[], Iterable[OrderRecord]],
-        reports: Callable[[], Iterable[ReportedNode]],
-        clearance_m: float,
-    ) -> None:
-        """`orders` and `reports`: what the gateway knows of them now."""
-        self._parts = parts
-        self._orders = orders
-        self._reports = reports
-        self._clearance_m = clearance_m
+    `parts` are those of the gateway, `orders` and `reports` all that it knows.
+    """
+    places = _final_places(parts, orders, reports)
+    places.pop(drone, None)
+    for other, (since_s, place) in sorted(places.items()):
+        away_m = goal.distance_m(place)
+        if away_m < clearance_m - ROUNDING_M:
+            raise PlaceTaken(
+                f"drone {other} {_verb(parts, other, since_s)} {away_m:.1f} m from there; "
+                "allow_shared_place sends it all the same",
+                other,
+            )
 
-    def check(self, drone: int, goal: Location) -> None:
-        """Raise PlaceTaken if another drone stands at `goal`, flies there or was heard there."""
-        places = self._places()
-        places.pop(drone, None)
-        for other, (since_s, place) in sorted(places.items()):
-            away_m = goal.distance_m(place)
-            if away_m < self._clearance_m - ROUNDING_M:
-                raise PlaceTaken(
-                    f"drone {other} {self._verb(other, since_s)} {away_m:.1f} m from there; "
-                    "allow_shared_place sends it all the same",
-                    other,
-                )
 
-    def _verb(self, other: int, since_s: float) -> str:
-        if since_s == math.inf:
-            return "flies to a place"
-        parts = self._parts
-        is_here = other == parts.node_id
-        if is_here or parts.routing.get_direction_to_node(other) != NO_ROUTE:
-            return "stands"
-        return "was last heard"
+def _verb(parts: NodeParts, other: int, since_s: float) -> str:
+    if since_s == math.inf:
+        return "flies to a place"
+    is_here = other == parts.node_id
+    if is_here or parts.routing.get_direction_to_node(other) != NO_ROUTE:
+        return "stands"
+    return "was last heard"
 
-    def _places(self) -> dict[int, _Place]:
-        """The newest place of each drone; only the final place of one on its way counts."""
-        parts = self._parts
-        places: dict[int, _Place] = {}
 
-        def note(drone: int, since_s: float, place: Location | None) -> None:
-            known = places.get(drone)
-            if place is not None and (known is None or since_s >= known.since_s):
-                places[drone] = _Place(since_s, place)
+def _final_places(
+    parts: NodeParts, orders: Iterable[OrderRecord], reports: Iterable[ReportedNode]
+) -> dict[int, _Place]:
+    """The newest place of each drone; only the final place of one on its way counts."""
+    places: dict[int, _Place] = {}
 
-        note(parts.node_id, parts.now_s, parts.pilot.place())
-        for node, heard in parts.neighbours.places().items():
-            note(node, heard.heard_s, heard.place)
-        for reported in self._reports():
-            if reported.report is not None:
-                note(reported.node_id, reported.heard_s, reported.report.place)
-        for order in self._orders():
-            if order.state.is_open or order.state is OrderState.LOST_CONTACT:
-                note(order.drone, math.inf, order.goal)
-            elif order.state is OrderState.ARRIVED:
-                note(order.drone, order.changed_s, order.goal)
-        return places
+    def note(drone: int, since_s: float, place: Location | None) -> None:
+        known = places.get(drone)
+        if place is not None and (known is None or since_s >= known.since_s):
+            places[drone] = _Place(since_s, place)
+
+    note(parts.node_id, parts.now_s, parts.pilot.place())
+    for node, heard in parts.neighbours.places().items():
+        note(node, heard.heard_s, heard.place)
+    for reported in reports:
+        note(reported.node_id, reported.heard_s, reported.report.place)
+    for order in orders:
+        if order.state.is_open or order.state is OrderState.LOST_CONTACT:
+            note(order.drone, math.inf, order.goal)
+        elif order.state is OrderState.ARRIVED:
+            note(order.drone, order.changed_s, order.goal)
+    return places

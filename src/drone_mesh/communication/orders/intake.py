@@ -10,11 +10,10 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Callable
 
-from drone_mesh.communication.complaints import Complaints
 from drone_mesh.communication.deadlines import Due
-from drone_mesh.communication.messages import GoToLocationMessage
+from drone_mesh.communication.messages import GoToLocationMessage, order_number
 from drone_mesh.communication.observer import MeshEventKind
-from drone_mesh.communication.orders.messages import OrderOutcome, reply_packets
+from drone_mesh.communication.orders.messages import OrderOutcome, OrderQuery, reply_packets
 from drone_mesh.communication.parts import NodeParts
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.location import Location
@@ -42,22 +41,20 @@ class _KnownOrder:
 class OrderIntake:
     """Checks the orders for one drone, starts its flights, and replies to numbered orders."""
 
-    def __init__(
-        self, parts: NodeParts, complaints: Complaints, took_off: Callable[[], None]
-    ) -> None:
+    def __init__(self, parts: NodeParts, took_off: Callable[[], None]) -> None:
         """`took_off` is called when an order has started a flight."""
         self._parts = parts
-        self._complaints = complaints
         self._took_off = took_off
         self._known: deque[_KnownOrder] = deque(maxlen=ORDERS_KEPT)
         self.on_own_reply: OwnReply = _ignore
 
-    def on_order(self, order: GoToLocationMessage, number: int) -> None:
+    def receive_move_to_location(self, payload: bytes, creator: int, _from: int) -> None:
         """An order from the air: accepted, or refused with a log line."""
+        order = GoToLocationMessage.from_payload(payload)
         try:
-            self.take(order.creator, order.location, number)
+            self.take(creator, order.location, order_number(payload))
         except GoalRefused as error:
-            self._complaints.add("order refused", str(error), self._parts.now_s)
+            self._parts.complaints.add("order refused", str(error), self._parts.now_s)
 
     def take(self, gateway: int, goal: Location, number: int = 0) -> None:
         """Fly to `goal`, unless the drone already does: two gateways may order the same flight.
@@ -101,8 +98,9 @@ class OrderIntake:
             for packet in reply_packets(number, OrderOutcome.REFUSED, reason, me, gateway):
                 self._parts.delivery.send_own(packet)
 
-    def on_query(self, gateway: int, number: int) -> None:
+    def receive_order_query(self, payload: bytes, gateway: int, _from: int) -> None:
         """A gateway queries the state of an order."""
+        number = OrderQuery.number_in(payload)
         known = self._find(gateway, number)
         if known is not None:
             self._reply(known, known.outcome, known.reason)
@@ -115,9 +113,9 @@ class OrderIntake:
         orders = self._under_way()
         if not orders:
             return
-        pilot = self._parts.pilot
+        pilot, engine = self._parts.pilot, self._parts.engine
         here = pilot.location()
-        why = pilot.why_ended() or pilot.why_not_fly() or pilot.flight_end
+        why = engine.why_ended() or engine.why_not_fly() or pilot.flight_end
         for order in orders:
             if here is None:
                 self._reply(order, OrderOutcome.GIVEN_UP, f"{why}; its place is not known")
@@ -139,7 +137,7 @@ class OrderIntake:
         """Start the flight; returns False if the drone already flies there."""
         check_goal(*goal)
         pilot = self._parts.pilot
-        why_not = pilot.why_not_fly()
+        why_not = self._parts.engine.why_not_fly()
         if why_not:
             raise GoalRefused(f"drone {self._parts.node_id} cannot fly: {why_not}")
         if pilot.goal == goal:

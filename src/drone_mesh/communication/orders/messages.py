@@ -34,7 +34,7 @@ class OrderReply:
     """One part of a drone's reply about the order `number` to the gateway that sent it."""
 
     TYPE: ClassVar[MessageType] = MessageType.ORDER_REPLY
-    BODY: ClassVar[struct.Struct] = struct.Struct(f"<HBB{TEXT_BYTES}s")
+    BODY: ClassVar[struct.Struct] = TYPE.about.layout
 
     number: int  # 1..65535
     outcome: OrderOutcome
@@ -70,7 +70,7 @@ class OrderQuery:
     """A gateway asks for the state of an order; the body is its number."""
 
     TYPE: ClassVar[MessageType] = MessageType.ORDER_QUERY
-    BODY: ClassVar[struct.Struct] = struct.Struct("<H")
+    BODY: ClassVar[struct.Struct] = TYPE.about.layout
 
     @classmethod
     def packet(cls, number: int, gateway: int, drone: int) -> bytes:

@@ -9,25 +9,17 @@ from __future__ import annotations
 import math
 
 from drone_mesh.communication.control_plane import IControlPlane
-from drone_mesh.communication.deadlines import Due
-from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE
-from drone_mesh.communication.messages import (
-    GatewayPlace,
-    MovementNegotiationMessage,
-    addressed,
-    location,
-)
+from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.parts import NodeParts
-from drone_mesh.communication.place_requests import ask_all_for_places, ask_for_place
+from drone_mesh.communication.repair.actions import RepairActions, Step
 from drone_mesh.communication.repair.election import NO_BID, TOOK_OFF, TOOK_OFF_HOME
 from drone_mesh.communication.repair.flight import ASK_AGAIN_S, RepairFlight
-from drone_mesh.communication.repair.interfaces import IRepairStrategy, Step
+from drone_mesh.communication.repair.interfaces import IRepairStrategy
 from drone_mesh.communication.repair.options import RepairOptions
 from drone_mesh.communication.repair.spots import PITCH, Landing, own_spot
 from drone_mesh.communication.repair.status import NOTHING_TO_REPAIR, RepairStatus
 from drone_mesh.communication.repair.taken_places import TakenPlaces
-from drone_mesh.communication.repair.views import RepairViews
 from drone_mesh.communication.router_states import RepairState, RouterEvent, RouterStates
 from drone_mesh.drone.location import Location
 
@@ -35,7 +27,7 @@ MOVING_PATIENCE = 3.0  # our choice: while drones move by themselves, a lost lin
 ROUNDING_S = 1e-6  # sums of periods are not exact
 
 
-class ConnectionRepair(RepairViews):
+class ConnectionRepair(RepairActions):
     """The repair of one router. It drives the `RepairState` of the router's states."""
 
     def __init__(
@@ -142,11 +134,17 @@ class ConnectionRepair(RepairViews):
 
     def on_due(self) -> bool:
         """The repair's timer has expired. Returns whether a flight is over."""
-        self._parts.deadlines.set(Due.REPAIR, math.inf)
-        if self._flight is not None:
-            return self._stands_clear(self._flight)
-        self._strategy.on_time()
-        return False
+        self.wait_until(math.inf)
+        flight = self._flight
+        if flight is None:
+            self._strategy.on_time()
+            return False
+        if not flight.on_ground:
+            return False
+        is_over = not flight.ask_again()
+        if not is_over:
+            self._await_answers()
+        return is_over
 
     def status(self) -> RepairStatus:
         """The current activity of the repair, and its reason."""
@@ -177,7 +175,7 @@ class ConnectionRepair(RepairViews):
     # Actions of the strategy -----------------------------------------------------------------
 
     def fly(self, step: Step, until_connected: bool = False) -> None:
-        """See IRepairActions; also for the functions below."""
+        """See RepairActions; also for the functions below."""
         self._parts.report(MeshEventKind.FLIGHT_DECIDED, step.owner)
         flight = self._new_flight(step, self.goal_of(step))
         flight.stops_when_connected = until_connected or step.home
@@ -191,45 +189,10 @@ class ConnectionRepair(RepairViews):
         self._parts.neighbours.forget_all()
         self._parts.neighbours.takes_off(by_order=False)
         self._parts.routing.node_moved_location()
-        flight.start()
+        flight.fly_on()
         self._flight = None
         self._took_off()
         self._flight = flight
-
-    def bid(  # noqa: D102
-        self,
-        score: float,
-        node: int | None = None,
-        but_not_to: int = NO_ROUTE,
-        about: Location | None = None,
-    ) -> None:
-        me = self.node_id
-        creator = me if node is None else node
-        packet = MovementNegotiationMessage(creator, me, me, me, score).to_payload()
-        if about is not None:
-            packet = GatewayPlace(self._control.gateway, about, 0.0).appended_to(packet)
-        for neighbour in sorted(self._parts.routing.get_set_of_children() - {creator, but_not_to}):
-            self._parts.delivery.send_own(addressed(packet, neighbour))
-
-    def ask_places(self) -> None:  # noqa: D102
-        ask_all_for_places(self._parts)
-
-    def ask_place(self, node: int) -> None:  # noqa: D102
-        ask_for_place(self._parts, node)
-
-    def announce_place(self, place: Location) -> None:  # noqa: D102
-        me = self.node_id
-        packet = location(place, self.now_s, me, me, BROADCAST, BROADCAST)
-        self._parts.antenna.broadcast_message(packet)
-
-    def present(self) -> None:  # noqa: D102
-        self._control.introduce()
-
-    def wait_until(self, at_s: float) -> None:  # noqa: D102
-        self._parts.deadlines.set(Due.REPAIR, at_s)
-
-    def happened(self, event: RouterEvent) -> None:  # noqa: D102
-        self._states.happened(event)
 
     def end_round(self) -> None:  # noqa: D102
         checked_s = self._checked_s
@@ -237,11 +200,6 @@ class ConnectionRepair(RepairViews):
         self._clear()
         if checked_s is not None:
             self._notice_loss(checked_s)
-
-    def report(  # noqa: D102
-        self, kind: MeshEventKind, peer: int = NO_ROUTE, detail: str = ""
-    ) -> None:
-        self._parts.report(kind, peer, detail)
 
     # Flight ----------------------------------------------------------------------------------
 
@@ -269,7 +227,7 @@ class ConnectionRepair(RepairViews):
         if self._flight is None:
             return True
         if self._flight.arrived():
-            self.wait_until(self.now_s + self.medium.stretched(ASK_AGAIN_S))
+            self._await_answers()
         return False
 
     def on_landed(self) -> None:
@@ -295,27 +253,21 @@ class ConnectionRepair(RepairViews):
             self._took_off()
             self._flight = flight
             flight.ask_on_ground()
-            self.wait_until(self.now_s + self.medium.stretched(ASK_AGAIN_S))
+            self._await_answers()
 
     def _new_flight(self, step: Step, goal: Location) -> RepairFlight:
         return RepairFlight(
             self._parts,
-            self._control.introduce,
-            step.owner,
-            step.place,
+            self.present,
+            step,
             goal,
             self._options,
             self._taken,
             self._landing(step),
         )
 
-    def _stands_clear(self, flight: RepairFlight) -> bool:
-        if not flight.on_ground:
-            return False
-        if flight.ask_again():
-            self.wait_until(self.now_s + self.medium.stretched(ASK_AGAIN_S))
-            return False
-        return True
+    def _await_answers(self) -> None:
+        self.wait_until(self.now_s + self.medium.stretched(ASK_AGAIN_S))
 
     def goal_of(self, step: Step) -> Location:  # noqa: D102
         if step.owner == self.node_id:

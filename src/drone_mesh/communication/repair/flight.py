@@ -6,6 +6,7 @@ from typing import Callable
 
 from drone_mesh.communication.parts import NodeParts
 from drone_mesh.communication.place_requests import ask_all_for_places
+from drone_mesh.communication.repair.actions import Step
 from drone_mesh.communication.repair.options import RepairOptions
 from drone_mesh.communication.repair.spots import Landing
 from drone_mesh.communication.repair.taken_places import TakenPlaces
@@ -29,20 +30,19 @@ class RepairFlight:
         self,
         parts: NodeParts,
         introduce: Callable[[], None],
-        owner: int,
-        place: Location,
+        step: Step,
         goal: Location,
         options: RepairOptions,
         taken: TakenPlaces,
         landing: Landing,
     ) -> None:
-        """To `goal`, at or near the `place` of node `owner`. `introduce` broadcasts a PRESENT."""
+        """To `goal`, at or near the place of `step`. `introduce` broadcasts a PRESENT."""
         self.goal = goal
-        self._owner, self._place = owner, place
+        self._step = step
         self.group = parts.neighbours.ids()  # the neighbours that it leaves behind
         self.stops_when_connected = False
         self.asks_left = 0  # on the ground
-        self._wanted = place
+        self._wanted = step.place
         self._taken = taken
         self._landing = landing
         self._parts = parts
@@ -60,11 +60,7 @@ class RepairFlight:
     @property
     def leads_back(self) -> bool:
         """Whether its goal is the place where this drone stood before."""
-        return self._owner == self._parts.node_id
-
-    def start(self) -> None:
-        """Take off."""
-        self._fly_on()
+        return self._step.owner == self._parts.node_id
 
     def each_second(self) -> None:
         """It is still in flight."""
@@ -89,7 +85,7 @@ class RepairFlight:
 
     def on_place(self, node: int, place: Location) -> None:
         """Another node reports its place; keep clear of it."""
-        if node == self._owner and place.distance_m(self._place) < self._clearance_m:
+        if node == self._step.owner and place.distance_m(self._step.place) < self._clearance_m:
             self.stop_when_connected()
         if place.distance_m(self.goal) < self._clearance_m:
             self.stop_when_connected()
@@ -106,7 +102,7 @@ class RepairFlight:
         """It is on the ground: ask for places. Returns False after one leg of several."""
         here = self._parts.pilot.location()
         if self._leg_is_short(here):
-            self._fly_on()
+            self.fly_on()
             return False
         self.ask_on_ground()
         return True
@@ -126,10 +122,10 @@ class RepairFlight:
     def _go_to(self, goal: Location) -> None:
         self.goal = goal
         self.asks_left = 0
-        self._fly_on()
+        self.fly_on()
 
-    def _fly_on(self) -> None:
-        """Continue towards the goal.
+    def fly_on(self) -> None:
+        """Take off, or continue towards the goal.
 
         A flight that may end where the drone is connected consists of legs. The drone climbs by
         half the length of a leg; from higher up it would hear no node on the ground. No leg ends

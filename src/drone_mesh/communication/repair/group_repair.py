@@ -10,6 +10,7 @@ import math
 
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.communication.repair.actions import RepairActions, Step
 from drone_mesh.communication.repair.bid_credit import BidCredit, highest_plausible
 from drone_mesh.communication.repair.election import (
     HOME_FAILED,
@@ -20,7 +21,6 @@ from drone_mesh.communication.repair.election import (
     as_on_the_air,
 )
 from drone_mesh.communication.repair.flight_news import FlightNews
-from drone_mesh.communication.repair.interfaces import IRepairActions, Step
 from drone_mesh.communication.repair.lone_repair import LoneRepair
 from drone_mesh.communication.repair.spots import NEAR, PITCH
 from drone_mesh.communication.router_states import RepairState, RouterEvent
@@ -40,13 +40,14 @@ IN_A_ROUND = (RepairState.ASKING, RepairState.NEGOTIATING, RepairState.WATCHING)
 class GroupRepair(LoneRepair):
     """Asks for places, elects, flies one step back; the gateway's place is the second choice."""
 
-    def start(self, mesh: IRepairActions) -> None:
+    def start(self, mesh: RepairActions) -> None:
         """Called once, before any other call."""
         super().start(mesh)
         self._election = Election(mesh.bids_within_s)
         self._news = FlightNews()
         self._credit = BidCredit()
         self._asked_s = -math.inf
+        self._places_within_s = mesh.medium.stretched(PLACES_WITHIN_S)
         self._rounds_without_flier = 0
 
     @abc.abstractmethod
@@ -123,7 +124,7 @@ class GroupRepair(LoneRepair):
             return
         state = self.mesh.state
         if state is RepairState.ASKING:
-            until_s = self._asked_s + self._places_within_s()
+            until_s = self._asked_s + self._places_within_s
             if self._all_answered() or self.mesh.now_s >= until_s:
                 self._negotiate()
             else:
@@ -189,14 +190,11 @@ class GroupRepair(LoneRepair):
         mesh = self.mesh
         mesh.happened(RouterEvent.ASKED_FOR_PLACES)
         self._asked_s = mesh.now_s
-        mesh.wait_until(self._asked_s + self._places_within_s())
+        mesh.wait_until(self._asked_s + self._places_within_s)
         mesh.ask_places()
         owner = mesh.lost_next_hop
         if mesh.reaches(owner) and owner not in mesh.neighbours():
             mesh.ask_place(owner)
-
-    def _places_within_s(self) -> float:
-        return self.mesh.medium.stretched(PLACES_WITHIN_S)
 
     def _all_answered(self) -> bool:
         """Whether all neighbours, and the node whose place it wants, have sent their places."""
@@ -246,7 +244,7 @@ class GroupRepair(LoneRepair):
     def _begin_election(self) -> None:
         mesh = self.mesh
         score = as_on_the_air(self.own_bid)
-        settled_s = max(mesh.now_s, self._asked_s + self._places_within_s())
+        settled_s = max(mesh.now_s, self._asked_s + self._places_within_s)
         settled_s += mesh.medium.stretched(SETTLE_S)
         self._election.start(mesh.node_id, score, mesh.now_s, settled_s)
         tried = self._was_home() if score < 0 else None

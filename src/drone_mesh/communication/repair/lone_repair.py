@@ -11,12 +11,8 @@ import abc
 import math
 
 from drone_mesh.communication.observer import MeshEventKind
-from drone_mesh.communication.repair.interfaces import (
-    SILENCE_PATIENCE,
-    IRepairActions,
-    IRepairStrategy,
-    Step,
-)
+from drone_mesh.communication.repair.actions import RepairActions, Step
+from drone_mesh.communication.repair.interfaces import SILENCE_PATIENCE, IRepairStrategy
 from drone_mesh.communication.router_states import RepairState
 from drone_mesh.drone.location import Location
 
@@ -37,7 +33,7 @@ class LoneRepair(IRepairStrategy):
     _landed_s = -math.inf  # from its latest look around
     _jammed_s = -math.inf  # when its channel was last found to be jammed
 
-    def start(self, mesh: IRepairActions) -> None:
+    def start(self, mesh: RepairActions) -> None:
         """Called once, before any other call."""
         super().start(mesh)
         self._lost: set[int] = set()  # neighbours that were not heard again

@@ -28,7 +28,7 @@ class NodeReport:
     """NODE_REPORT: the state of its creator in figures."""
 
     TYPE: ClassVar[MessageType] = MessageType.NODE_REPORT
-    BODY: ClassVar[struct.Struct] = struct.Struct("<BBBhhhBBB")
+    BODY: ClassVar[struct.Struct] = TYPE.about.layout
 
     neighbours: int
     hops: int  # to its gateway; 255: not known
@@ -42,13 +42,10 @@ class NodeReport:
 
     def packet(self, creator: int, gateway: int) -> bytes:
         """The 32 bytes, from `creator` for `gateway`."""
-        return messages.packet(self.TYPE, creator, creator, gateway, gateway, self._body())
-
-    def _body(self) -> bytes:
         steps = [NO_PLACE] * 3
         if self.place is not None:
             steps = [_int16(round(metres * STEPS_PER_M)) for metres in self.place]
-        return self.BODY.pack(
+        body = self.BODY.pack(
             min(self.neighbours, UNKNOWN),
             self.hops,
             self.next_hop,
@@ -57,6 +54,7 @@ class NodeReport:
             self.flying * _FLYING | self.can_fly * _CAN_FLY | self.shares_id * _SHARES_ID,
             min(UNKNOWN, round(self.tries * 10)),
         )
+        return messages.packet(self.TYPE, creator, creator, gateway, gateway, body)
 
     @classmethod
     def from_payload(cls, payload: bytes) -> NodeReport:
@@ -81,7 +79,7 @@ class NodeWords:
     """NODE_WORDS: why its creator cannot fly, in one or more packets."""
 
     TYPE: ClassVar[MessageType] = MessageType.NODE_WORDS
-    BODY: ClassVar[struct.Struct] = struct.Struct(f"<B{WORDS_BYTES}s")
+    BODY: ClassVar[struct.Struct] = TYPE.about.layout
 
     @classmethod
     def packets(cls, words: str, creator: int, gateway: int) -> list[bytes]:

@@ -46,13 +46,13 @@ class NodeReporter:
         connected = mesh.get_connected_to_gateway() and gateway <= MAX_NODE_ID
         if not connected or gateway == parts.node_id:
             return
-        why_not = parts.pilot.why_not_fly()
+        why_not, percent = parts.engine.why_not_fly(), parts.engine.battery_percent()
         report = NodeReport(
             neighbours=len(parts.neighbours.ids()),
             hops=mesh.get_hops_from_gateway_away(),
             next_hop=parts.routing.get_direction_to_node(gateway),
             place=parts.pilot.place(),
-            battery_percent=parts.pilot.battery_percent(),
+            battery_percent=None if percent is None else round(max(0.0, min(100.0, percent))),
             flying=parts.pilot.goal is not None,
             can_fly=not why_not,
             tries=parts.antenna.channel_use().tries,

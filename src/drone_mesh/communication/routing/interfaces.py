@@ -113,10 +113,6 @@ class IRoutingTechnique(ITechnique, IRoutes):
         """Neighbour `other` can reach `node`."""
 
     @abc.abstractmethod
-    def get_table_size(self) -> int:
-        """Children and all their grandchildren; a node under two children counts twice."""
-
-    @abc.abstractmethod
     def get_amount_of_children(self) -> int:
         """Number of nodes in direct reach."""
 

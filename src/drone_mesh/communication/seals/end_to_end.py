@@ -276,7 +276,10 @@ class EndToEnd:
         what = _what(payload, form)
         for nonce in self._nonces:
             if compare_digest(_tag(state, nonce.value, sequence, what), tag):
-                if not _use(nonce.windows, creator, sequence):
+                window = nonce.windows.get(creator)
+                if window is None:
+                    nonce.windows[creator] = ReplayWindow(sequence)
+                elif not window.use(window.expand(sequence)):
                     raise NotProven("a replayed packet")
                 return
         kind = payload[TYPE_AT]
@@ -311,11 +314,3 @@ def _tag(state: hashlib.blake2s, nonce: int, sequence: int, what: bytes) -> byte
     tag = state.copy()
     tag.update(_nonce_and_sequence(nonce, sequence) + what)
     return tag.digest()
-
-
-def _use(windows: dict[int, ReplayWindow], creator: int, sequence: int) -> bool:
-    window = windows.get(creator)
-    if window is None:
-        windows[creator] = ReplayWindow(sequence)
-        return True
-    return window.use(window.expand(sequence))

@@ -19,10 +19,8 @@ _NODES = MAX_NODE_ID + 1
 class Keys(abc.ABC):
     """The keys that one node holds. Neither str nor repr shows a key."""
 
-    @property
-    @abc.abstractmethod
-    def network(self) -> bytes:
-        """Seals each hop. Every node of the mesh has it."""
+    network: bytes
+    """Seals each hop. Every node of the mesh has it."""
 
     @abc.abstractmethod
     def authority_over(self, node: int) -> bytes | None:
@@ -46,12 +44,8 @@ class MeshKey(Keys):
                 f"invalid mesh key: must be {8 * KEY_BYTES} bits, has {8 * len(secret)}"
             )
         self._secret = secret
-        self._network = _derived(secret, _NETWORK)
+        self.network = _derived(secret, _NETWORK)
         self._known: dict[bytes, bytes] = {}  # cache: no key is derived twice
-
-    @property
-    def network(self) -> bytes:
-        return self._network
 
     def authority_over(self, node: int) -> bytes:
         return self._derive(_AUTHORITY + bytes((node,)))
@@ -63,7 +57,7 @@ class MeshKey(Keys):
         """The keys for a router, with which it cannot give orders to others."""
         return NodeKeys(
             node,
-            self._network,
+            self.network,
             self.authority_over(node),
             [self.pair(node, other) for other in range(_NODES)],
         )
@@ -85,13 +79,9 @@ class NodeKeys(Keys):
     def __init__(self, node: int, network: bytes, authority: bytes, pairs: list[bytes]) -> None:
         """`pairs`: the keys that it shares with nodes 0..253."""
         self.node = node
-        self._network = network
+        self.network = network
         self._authority = authority
         self._pairs = pairs
-
-    @property
-    def network(self) -> bytes:
-        return self._network
 
     def authority_over(self, node: int) -> bytes | None:
         return self._authority if node == self.node else None
@@ -103,7 +93,7 @@ class NodeKeys(Keys):
 
     def to_text(self) -> str:
         """The content of a key file."""
-        keys = [self._network, self._authority, *self._pairs]
+        keys = [self.network, self._authority, *self._pairs]
         return "\n".join([f"drone_mesh keys of node {self.node}", *(k.hex() for k in keys), ""])
 
 

@@ -33,8 +33,6 @@ class MessageSeal:
     def seal(self, creator: int, to: int, place: bytes, payload: bytes) -> bytes:
         """The encrypted payload and its tag. `place` distinguishes the messages of a sender."""
         key = self._key(creator, to)
-        if key is None:
-            return payload
         context = bytes((creator, to)) + place
         tag = _tag(key, context, payload)
         return self._encrypted(key, context + tag, payload) + tag
@@ -42,8 +40,6 @@ class MessageSeal:
     def open(self, creator: int, to: int, place: bytes, sealed: bytes) -> bytes | None:
         """The payload; None unless `creator` sealed this for `to` and this place."""
         key = self._key(creator, to)
-        if key is None:
-            return sealed
         if len(sealed) < MESSAGE_TAG_BYTES:
             return None
         context = bytes((creator, to)) + place
@@ -53,16 +49,15 @@ class MessageSeal:
 
     def acknowledgement_tag(self, creator: int, to: int, body: bytes) -> bytes:
         """The tag over the body of an ACK that `creator` sends to `to`."""
-        key = self._keys.pair(creator, to)
-        assert key is not None, "a node has its own keys"
-        made = bytes((creator, to)) + body
-        return hashlib.blake2s(
-            made, key=key, digest_size=ACK_TAG_BYTES, person=b"received"
-        ).digest()
+        key, made = self._key(creator, to), bytes((creator, to)) + body
+        tag = hashlib.blake2s(made, key=key, digest_size=ACK_TAG_BYTES, person=b"received")
+        return tag.digest()
 
-    def _key(self, creator: int, to: int) -> bytes | None:
+    def _key(self, creator: int, to: int) -> bytes:
         """The key of the pair; for messages to all, that of the network."""
-        return self._keys.pair(creator, to) if to <= MAX_NODE_ID else self._keys.network
+        key = self._keys.pair(creator, to) if to <= MAX_NODE_ID else self._keys.network
+        assert key is not None, "a node has its own keys"
+        return key
 
 
 def _tag(key: bytes, context: bytes, payload: bytes) -> bytes:

@@ -192,10 +192,6 @@ class HopSeal:
         """Whether so many challenges are unanswered that many of those nodes cannot exist."""
         return len(self._challenges) > WAITING_CHALLENGES // 2
 
-    def is_challenge(self, challenge: bytes) -> bool:
-        """Whether it is one of a node with the key, now or earlier."""
-        return self._is_proven(challenge)
-
     def answer(self, challenge: bytes, now_s: float) -> bytes | None:
         """The answer to a challenge; None: it had one, or there were too many challenges."""
         node = messages.sender(challenge)
@@ -217,7 +213,7 @@ class HopSeal:
         """
         node = messages.sender(answer)
         waiting = self._challenges.get(node)
-        if waiting is None or not self._is_proven(answer):
+        if waiting is None or not self.is_proven(answer):
             return None
         nonce, epoch, count = _ANSWER.unpack_from(answer, messages.HEADER_BYTES)
         if nonce != waiting.nonce or epoch == self._epoch:  # its own, thrown back at it
@@ -255,7 +251,8 @@ class HopSeal:
         packet = messages.packet(kind, self._node_id, self._node_id, to, to, body)[:TAG_AT]
         return packet + self._proof(packet, to)
 
-    def _is_proven(self, payload: bytes) -> bool:
+    def is_proven(self, payload: bytes) -> bool:
+        """Whether a challenge or an answer is one of a node with the key, now or earlier."""
         proof = self._proof(payload[:TAG_AT], messages.sender(payload))
         return compare_digest(proof, payload[TAG_AT:])
 

@@ -40,14 +40,6 @@ _ORDER = int(MessageType.MOVE_TO_LOCATION)
 _NO_SEAL = bytes(SEAL_BYTES)
 
 
-class _Unopened:
-    """The packets of one node that could not be opened."""
-
-    def __init__(self, since_s: float) -> None:
-        self.since_s = since_s
-        self.count = 0
-
-
 class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
     """Seals what the component sends, and hands it only what is authentic.
 
@@ -76,7 +68,8 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
         self._message_seal = MessageSeal(keys)
         self._mesh: IMeshNetwork | None = None
         self._present = b""  # the last one, for neighbours that could not open it
-        self._unopened: dict[int, _Unopened] = {}
+        # By node: since when its packets could not be opened, and how many
+        self._unopened: dict[int, tuple[float, int]] = {}
         self._clock = clock
         self.complaints = Complaints(node_id)
 
@@ -239,7 +232,7 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
     def _on_challenge(self, challenge: bytes, from_: int, now_s: float) -> None:
         if messages.addressee(challenge) != self._node_id:
             return
-        if not self._seal.is_challenge(challenge):
+        if not self._seal.is_proven(challenge):
             self._complain(challenge, from_, now_s)
             return
         answer = self._seal.answer(challenge, now_s)
@@ -278,11 +271,11 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
 
     def _complain(self, payload: bytes, from_: int, now_s: float) -> None:
         """A restarted neighbour is normal; one that never answers a challenge is not."""
-        unopened = self._unopened.get(from_)
-        if unopened is None or now_s - unopened.since_s > FOREIGN_FORGOTTEN_S:
-            unopened = self._unopened[from_] = _Unopened(now_s)
-        unopened.count += 1
-        if unopened.count < FOREIGN_PACKETS or now_s - unopened.since_s < FOREIGN_AFTER_S:
+        since_s, count = self._unopened.get(from_, (now_s, 0))
+        if now_s - since_s > FOREIGN_FORGOTTEN_S:
+            since_s, count = now_s, 0
+        self._unopened[from_] = since_s, count + 1
+        if count + 1 < FOREIGN_PACKETS or now_s - since_s < FOREIGN_AFTER_S:
             return
         if self._seal.knows(from_, now_s):
             reason = f"replayed or forged packets in the name of node {from_}"

@@ -10,7 +10,7 @@ from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.ack_turns import TURN_S, AckTurns
 from drone_mesh.communication.data.inbox import ACK_DELAY_S, Inbox
 from drone_mesh.communication.data.packets import Head, Poll
-from drone_mesh.communication.medium import FAST_HOP_S, Medium
+from drone_mesh.communication.medium import FAST_HOP_S, UNDISTURBED, Medium
 
 ROOM = 27
 BUSY = 2.5
@@ -29,6 +29,8 @@ class Receiver:
                 lambda ack, sender=sender: self.acknowledged.append(
                     (round(self.now_s, 3), sender, ack.number)
                 ),
+                lambda _place, sealed: sealed,
+                UNDISTURBED,
             )
             for sender in range(3)
         ]

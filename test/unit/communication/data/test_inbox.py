@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import pytest
 
 from drone_mesh.communication.data import packets
-from drone_mesh.communication.data.flood import SeenFragments
+from drone_mesh.communication.data.flood import Flood
 from drone_mesh.communication.data.inbox import Inbox
 from drone_mesh.communication.data.ordering import PortOrder
 from drone_mesh.communication.data.outgoing import LIFETIME_S
 from drone_mesh.communication.data.packets import Head
 from drone_mesh.communication.data.reassembly import Whole
+from drone_mesh.communication.medium import UNDISTURBED
 
 ROOM = 27
 OLD, NEW = 7, 8  # sessions of the sender
@@ -21,7 +24,12 @@ class Receiver:
 
     def __init__(self):
         self.acks = []
-        self.inbox = Inbox(ROOM, lambda ack: self.acks.append(round(self.now_s, 3)))
+        self.inbox = Inbox(
+            ROOM,
+            lambda ack: self.acks.append(round(self.now_s, 3)),
+            lambda _place, sealed: sealed,
+            UNDISTURBED,
+        )
         self.now_s = 0.0
 
     def first(self, number, now_s, session=OLD, size=4):
@@ -83,9 +91,15 @@ def test_an_incomplete_message_is_kept_for_a_minute(after_s, delivered):
 
 @pytest.mark.parametrize(("after_s", "is_new"), [(4.0, False), (6.0, True)])
 def test_a_flooded_fragment_counts_as_known_for_five_seconds(after_s, is_new):
-    seen = SeenFragments()
-    assert seen.is_new(2, 9, 0, 0.0)
-    assert seen.is_new(2, 9, 0, after_s) is is_new
+    repeated = []
+    antenna = SimpleNamespace(broadcast_message=repeated.append)
+    parts = SimpleNamespace(node_id=1, now_s=0.0, antenna=antenna)
+    flood = Flood(parts)
+    fragment = bytes((2, 2, 128, 254, 254, 9)).ljust(32, b"\0")
+    assert flood.repeat(fragment)
+    parts.now_s = after_s
+    assert flood.repeat(fragment) is is_new
+    assert len(repeated) == 1 + is_new
 
 
 def test_a_message_waits_for_earlier_ones_for_longer_than_their_sender_tries_and_not_for_ever():

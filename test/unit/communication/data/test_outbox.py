@@ -7,12 +7,19 @@ import pytest
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.outbox import Outbox
 from drone_mesh.communication.data.outgoing import OutgoingMessage
-from drone_mesh.communication.data.round_trip import FIRST_TIMEOUT_S, MOST_TIMEOUT_S, RoundTrip
+from drone_mesh.communication.data.pacing import FIRST_TIMEOUT_S, MOST_TIMEOUT_S, RoundTrip
 from drone_mesh.communication.data.ticket import Ticket, TicketState
 
 
 def outbox_with(count, relayed):
-    outbox = Outbox(to=0, session=7, room=27, ended=lambda _state: None)
+    outbox = Outbox(
+        to=0,
+        session=7,
+        room=27,
+        ended=lambda _state: None,
+        seal=lambda _place, payload: payload,
+        hint=str,
+    )
     outbox.set_relayed(relayed)
     tickets = [Ticket(number, to=0, port=5, size=16, reliable=True) for number in range(count)]
     for ticket in tickets:

@@ -9,6 +9,7 @@ import pytest
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.outbox import Outbox
 from drone_mesh.communication.data.outgoing import OutgoingMessage
+from drone_mesh.communication.data.pacing import RoundTrip
 from drone_mesh.communication.data.ticket import Ticket
 from drone_mesh.communication.data.train import FIRST_LENGTH, LEAST_LENGTH, MOST_LENGTH, Train
 from drone_mesh.inprocess import Network
@@ -93,7 +94,14 @@ def test_a_silent_receiver_does_not_stop_best_effort(chain):
 
 
 def test_a_loss_of_best_effort_shortens_the_next_train_and_not_those_after_it():
-    outbox = Outbox(to=0, session=7, room=27, ended=lambda _state: None)
+    outbox = Outbox(
+        to=0,
+        session=7,
+        room=27,
+        ended=lambda _state: None,
+        seal=lambda _place, payload: payload,
+        hint=str,
+    )
     outbox.set_relayed(True)
     for number in (1, 2, 3):
         ticket = Ticket(number, to=0, port=5, size=1024, reliable=False)
@@ -120,7 +128,7 @@ def test_a_loss_of_best_effort_shortens_the_next_train_and_not_those_after_it():
 
 
 def test_a_train_grows_with_answers_and_is_halved_without():
-    train = Train()
+    train = Train(RoundTrip())
     assert train.length == FIRST_LENGTH
     for longer in (2 * FIRST_LENGTH, MOST_LENGTH, MOST_LENGTH):
         train.left = train.length

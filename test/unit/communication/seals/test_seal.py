@@ -119,8 +119,8 @@ def test_an_answer_without_a_challenge_is_ignored(link):
 
 def test_a_node_with_another_key_neither_answers_nor_is_answered():
     receiver, stranger = node(1), node(5, key=OTHER_KEY)
-    assert not stranger.is_challenge(receiver.challenge(5, 0.0))
-    assert not receiver.is_challenge(stranger.challenge(1, 0.0))
+    assert not stranger.is_proven(receiver.challenge(5, 0.0))
+    assert not receiver.is_proven(stranger.challenge(1, 0.0))
 
 
 def test_a_withheld_packet_is_worthless_after_a_silence(link):

@@ -9,8 +9,7 @@ from seal_rig import KEY, packet
 
 from drone_mesh.communication.data.ticket import TO_GATEWAY, TicketState
 from drone_mesh.communication.heartbeats.detours import Detours
-from drone_mesh.communication.heartbeats.relay_check import RelayCheck
-from drone_mesh.communication.heartbeats.swallowing import Swallowing
+from drone_mesh.communication.heartbeats.relay_check import RelayCheck, Swallowing
 from drone_mesh.communication.routing.child_table_tree import ChildTableTree
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.inprocess import Network
@@ -90,9 +89,9 @@ def test_a_relay_that_swallowed_is_tried_again_after_ten_minutes():
         routing=ChildTableTree(),
     )
     check = RelayCheck(parts, detours)
-    check.gateway_sent_place()
+    check.swallowing.answered()
     for _ in range(2):
-        check._swallowing.asked(90.0)
+        check.swallowing.asked(90.0)
     check.run(gateway=0, next_hop=1, hops=2)
     assert check.take_detour() == 2
     assert detours.avoids(1, 699.0)

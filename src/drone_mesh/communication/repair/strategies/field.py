@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 
-from drone_mesh.communication.repair.interfaces import IRepairStrategy, Step
+from drone_mesh.communication.repair.actions import Step
+from drone_mesh.communication.repair.interfaces import IRepairStrategy
 from drone_mesh.drone.location import Location
 
 TO_NEIGHBOURS = 0.1  # weight of the neighbours against the gateway, as in MDSG-APF

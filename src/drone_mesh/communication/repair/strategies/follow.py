@@ -7,7 +7,7 @@ tree. A drone whose next hop moves out of reach flies until it is in reach again
 
 from __future__ import annotations
 
-from drone_mesh.communication.repair.interfaces import Step
+from drone_mesh.communication.repair.actions import Step
 from drone_mesh.communication.repair.spots import WITHIN_REACH
 from drone_mesh.communication.repair.strategies.nearest import Nearest
 from drone_mesh.communication.router_states import RepairState

@@ -7,7 +7,7 @@ move may not suffice: a second one leads to the place itself, and a third flight
 
 from __future__ import annotations
 
-from drone_mesh.communication.repair.interfaces import Step
+from drone_mesh.communication.repair.actions import Step
 from drone_mesh.communication.repair.spots import WITHIN_REACH
 from drone_mesh.communication.repair.strategies.home import Home
 from drone_mesh.communication.router_states import RepairState

@@ -7,9 +7,9 @@ the drone leaves behind lose their gateway, and repeat the same: the cascade of 
 
 from __future__ import annotations
 
+from drone_mesh.communication.repair.actions import Step
 from drone_mesh.communication.repair.election import NO_BID
 from drone_mesh.communication.repair.group_repair import GroupRepair
-from drone_mesh.communication.repair.interfaces import Step
 
 
 class Nearest(GroupRepair):

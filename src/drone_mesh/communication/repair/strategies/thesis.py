@@ -5,9 +5,9 @@ The rule of the Software Design Document of 2019, corrected; docs/protocol.md, "
 
 from __future__ import annotations
 
+from drone_mesh.communication.repair.actions import Step
 from drone_mesh.communication.repair.election import MAX_SCORE_M, NO_BID
 from drone_mesh.communication.repair.group_repair import GroupRepair
-from drone_mesh.communication.repair.interfaces import Step
 
 
 class Thesis(GroupRepair):

@@ -1,10 +1,38 @@
-"""RoundTrip: how long to wait for an acknowledgement (RFC 6298)."""
+"""How fast an outbox sends, as in TCP: its window (RFC 5681) and its timeout (RFC 6298)."""
 
 from __future__ import annotations
 
+FIRST_SIZE = 32  # our choice: less than a message of 1,024 bytes
+LEAST_SIZE = 4
+MOST_SIZE = 256  # our choice: six messages of 1,024 bytes
 FIRST_TIMEOUT_S = 1.0  # RFC 6298, 2.1
 LEAST_TIMEOUT_S = 0.3  # our choice: above the half second of circulation after one doubling
 MOST_TIMEOUT_S = 30.0  # our choice: three check periods; with less, POLLs alone fill a channel
+
+
+class CongestionWindow:
+    """How many fragments may be under way to one destination without an acknowledgement.
+
+    Slow start and halving after a loss, counted in fragments.
+    """
+
+    def __init__(self) -> None:
+        self.size = float(FIRST_SIZE)
+        self._slow_start = True
+
+    def grow(self, arrived: int) -> None:
+        """This many fragments have arrived."""
+        self.size += arrived if self._slow_start else arrived / self.size * 4
+        self.size = min(self.size, float(MOST_SIZE))
+
+    def on_loss(self) -> None:
+        """Fragments are missing."""
+        self._slow_start = False
+        self.size = max(float(LEAST_SIZE), self.size / 2)
+
+    def on_silence(self) -> None:
+        """There is no answer."""
+        self.size, self._slow_start = float(LEAST_SIZE), True
 
 
 class RoundTrip:

@@ -1,0 +1,239 @@
+"""RepairActions: what a repair strategy sees of its router, and what it can do."""
+
+from __future__ import annotations
+
+import abc
+import math
+from typing import Mapping, NamedTuple
+
+from drone_mesh.communication.control_plane import IControlPlane
+from drone_mesh.communication.deadlines import Due
+from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE
+from drone_mesh.communication.messages import (
+    GatewayPlace,
+    MovementNegotiationMessage,
+    addressed,
+    location,
+)
+from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.communication.parts import NodeParts
+from drone_mesh.communication.place_requests import ask_all_for_places, ask_for_place
+from drone_mesh.communication.repair.options import RepairOptions
+from drone_mesh.communication.repair.spots import NEAR, PITCH
+from drone_mesh.communication.router_states import RepairState, RouterEvent, RouterStates
+from drone_mesh.drone.goal import check_goal
+from drone_mesh.drone.location import Location
+from drone_mesh.errors import GoalRefused
+
+
+class Step(NamedTuple):
+    """A possible flight of a drone."""
+
+    place: Location
+    owner: int = NO_ROUTE  # the node at that place; NO_ROUTE: none; own id: a return
+    home: bool = False  # whether it is the gateway's place
+
+
+class NeighbourView(NamedTuple):
+    """What a router knows about a neighbour."""
+
+    place: Location | None  # where it is, or its destination; None: not reported
+    age_s: float  # age of the place; infinity if unknown
+    hops: int  # to its gateway, as last reported; 255: it has none
+
+
+class RepairActions(abc.ABC):
+    """A strategy's view of its router, and its possible actions. Places in metres, x east.
+
+    ConnectionRepair adds what changes the course of a repair.
+    """
+
+    def __init__(
+        self,
+        parts: NodeParts,
+        states: RouterStates,
+        control: IControlPlane,
+        options: RepairOptions,
+    ) -> None:
+        self.node_id = parts.node_id
+        self.medium = parts.antenna.medium
+        self.range_m = options.range_m  # of the radio, as far as known
+        self.clearance_m = options.clearance_m  # least distance between drones at rest
+        self.check_period_s = parts.timing.check_period_s
+        # The time without a gateway until the emergency
+        self.connection_lost_after_s = parts.timing.connection_lost_after_s
+        # For so long a bid counts, and the bids of neighbours are awaited
+        self.bids_within_s = control.bids_within_s
+        self._parts = parts
+        self._states = states
+        self._control = control
+        self._options = options
+        self._tried_goals: list[Location] = []  # goals of this drone since it was last connected
+        self._tried_spots: list[Location] = []  # where it landed for these
+
+    # Views -----------------------------------------------------------------------------------
+
+    @property
+    def now_s(self) -> float:
+        """The time, in seconds of the core's clock."""
+        return self._parts.now_s
+
+    @property
+    def connected(self) -> bool:
+        """Whether a gateway answers."""
+        return self._states.connected
+
+    @property
+    def state(self) -> RepairState:
+        """The current repair state."""
+        return self._states.repair
+
+    @property
+    def silent(self) -> bool:
+        """Whether all neighbours (2 or more) fell silent together, so the medium may be down."""
+        return self._parts.neighbours.silent
+
+    def hears_power(self) -> bool | None:
+        """Whether there is power in the channel of its radio now; None: it cannot measure it."""
+        return self._parts.antenna.hears_power()
+
+    def neighbours(self) -> Mapping[int, NeighbourView]:
+        """The nodes in direct reach."""
+        return {node: self._view(node) for node in self._parts.routing.get_set_of_children()}
+
+    def reachable(self) -> Mapping[int, NeighbourView]:
+        """All nodes with a route to them and a reported place."""
+        places = self._parts.neighbours.places()
+        return {node: self._view(node) for node in places if self.reaches(node)}
+
+    def reaches(self, node: int) -> bool:
+        """Whether there is a route to `node`."""
+        return self._parts.routing.get_direction_to_node(node) != NO_ROUTE
+
+    @property
+    def lost_next_hop(self) -> int:
+        """The next hop to the gateway before the connection was lost; NO_ROUTE: unknown."""
+        return self._parts.places.good_id
+
+    @property
+    def steps(self) -> list[Step]:
+        """The flights back: to the lost next hop, the gateway, and where it was connected last.
+
+        The last one has the owner NO_ROUTE; it is for a drone that has no other.
+        """
+        places, gateway = self._parts.places, self._control.gateway
+        candidates = [
+            (places.good, places.good_id),
+            (places.gateway, gateway),
+            (places.connected_at, NO_ROUTE),
+        ]
+        return [
+            Step(place, owner, home=owner == gateway != NO_ROUTE)
+            for place, owner in candidates
+            if place is not None and _may_be_flown_to(place)
+        ]
+
+    @property
+    def gateway_place(self) -> Location | None:
+        """The last reported place of the preferred gateway."""
+        return self._parts.places.gateway
+
+    def own_place(self) -> Location | None:
+        """The position of this drone; None: unknown."""
+        return self._parts.pilot.location()
+
+    def why_not_fly(self) -> str:
+        """Why the drone cannot fly for a repair; empty if it can."""
+        return self._parts.engine.why_not_repair()
+
+    @abc.abstractmethod
+    def goal_of(self, step: Step) -> Location:
+        """Where a flight for this step would end, clear of other drones, silent ones included."""
+
+    def was_at(self, step: Step) -> bool:
+        """Whether the drone flew there since it was last connected, or since `try_again`."""
+        radius_m = self.clearance_m * (2 * PITCH if step.home else NEAR)
+        here = self._parts.pilot.place() if step.owner == NO_ROUTE else None
+        places = [*self._tried_goals, *filter(None, [here])]
+        return any(step.place.distance_m(place) < radius_m for place in places)
+
+    # Actions ---------------------------------------------------------------------------------
+
+    def try_again(self) -> None:
+        """Let it fly once more to where it was in vain; it lands at another side of each place."""
+        self._tried_goals.clear()
+
+    @abc.abstractmethod
+    def fly(self, step: Step, until_connected: bool = False) -> None:
+        """Fly there and land clear of other drones; `on_landed` reports the landing.
+
+        `until_connected`: land as soon as a gateway answers. The routes are forgotten.
+        """
+
+    def bid(
+        self,
+        score: float,
+        node: int | None = None,
+        but_not_to: int = NO_ROUTE,
+        about: Location | None = None,
+    ) -> None:
+        """Send a bid to all neighbours; `node` is its creator if it is relayed.
+
+        `about`: the gateway's place, if the bid announces that a drone flies or flew there.
+        """
+        me = self.node_id
+        creator = me if node is None else node
+        packet = MovementNegotiationMessage(creator, me, me, me, score).to_payload()
+        if about is not None:
+            packet = GatewayPlace(self._control.gateway, about, 0.0).appended_to(packet)
+        for neighbour in sorted(self._parts.routing.get_set_of_children() - {creator, but_not_to}):
+            self._parts.delivery.send_own(addressed(packet, neighbour))
+
+    def ask_places(self) -> None:
+        """Request the places of all nodes in range; the answers arrive in `on_place`."""
+        ask_all_for_places(self._parts)
+
+    def ask_place(self, node: int) -> None:
+        """Request the place of one node, along the route to it."""
+        ask_for_place(self._parts, node)
+
+    def announce_place(self, place: Location) -> None:
+        """Send the place where this drone is or will be to all nodes in range."""
+        me = self.node_id
+        packet = location(place, self.now_s, me, me, BROADCAST, BROADCAST)
+        self._parts.antenna.broadcast_message(packet)
+
+    def present(self) -> None:
+        """Introduce this node to all nodes in range."""
+        self._control.introduce()
+
+    def wait_until(self, at_s: float) -> None:
+        """Call `on_time` at this time instead of an earlier request; infinity: not at all."""
+        self._parts.deadlines.set(Due.REPAIR, at_s)
+
+    def happened(self, event: RouterEvent) -> None:
+        """Change the states of the router (see router_states). An election needs this."""
+        self._states.happened(event)
+
+    @abc.abstractmethod
+    def end_round(self) -> None:
+        """An election is over. Count the time without a gateway from its first check."""
+
+    def report(self, kind: MeshEventKind, peer: int = NO_ROUTE, detail: str = "") -> None:
+        """Report an event to the node's observer."""
+        self._parts.report(kind, peer, detail)
+
+    def _view(self, node: int) -> NeighbourView:
+        heard, hops = self._parts.neighbours.place_of(node), self._parts.neighbours.hops_of(node)
+        if heard is None:
+            return NeighbourView(None, math.inf, hops)
+        return NeighbourView(heard.place, self.now_s - heard.heard_s, hops)
+
+
+def _may_be_flown_to(place: Location) -> bool:
+    """Whether a drone may fly there: a LOCATION may contain any numbers."""
+    try:
+        check_goal(*place)
+    except GoalRefused:
+        return False
+    return True
