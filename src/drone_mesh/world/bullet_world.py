@@ -9,10 +9,35 @@ from drone_mesh.drone.flight_path import Vector
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.world.body import GRAVITY_M_S2
 from drone_mesh.world.interfaces import World
-from drone_mesh.world.static_box import add_static_box
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)  # unit quaternion, pybullet's order x y z w
 KINEMATIC = 0.0  # physics never moves a body of mass 0
+
+
+def connect() -> int:
+    """A new pybullet client, in which nothing is drawn. Raises ConfigurationError."""
+    client: int = pybullet.connect(pybullet.DIRECT)
+    if client < 0:
+        raise ConfigurationError("pybullet has no room for another world: close one first")
+    return client
+
+
+def add_static_box(client: int, box: Box) -> int:
+    """Add a fixed box to this pybullet client; returns its body number."""
+    halves = [edge_m / 2 for edge_m in box.size]
+    shape = pybullet.createCollisionShape(
+        pybullet.GEOM_BOX, halfExtents=halves, physicsClientId=client
+    )
+    turned = pybullet.getQuaternionFromEuler((0.0, 0.0, box.yaw_rad))
+    return int(
+        pybullet.createMultiBody(
+            KINEMATIC,
+            shape,
+            basePosition=box.center,
+            baseOrientation=turned,
+            physicsClientId=client,
+        )
+    )
 
 
 class BulletWorld(World):
@@ -23,9 +48,7 @@ class BulletWorld(World):
 
     def __init__(self) -> None:
         super().__init__()
-        self.client = pybullet.connect(pybullet.DIRECT)
-        if self.client < 0:
-            raise ConfigurationError("pybullet has no room for another world: close one first")
+        self.client = connect()
         self._shapes: dict[Vector, int] = {}  # by size
         pybullet.setTimeStep(self.tick_s, physicsClientId=self.client)
         pybullet.setGravity(0.0, 0.0, -GRAVITY_M_S2, physicsClientId=self.client)
@@ -44,7 +67,7 @@ class BulletWorld(World):
         )
 
     def add_obstacle(self, box: Box) -> None:
-        add_static_box(self.client, box.center, box.size, box.yaw_rad)
+        add_static_box(self.client, box)
 
     def move_box(self, box: int, centre: Vector) -> None:
         pybullet.resetBasePositionAndOrientation(box, centre, UPRIGHT, physicsClientId=self.client)
