@@ -12,11 +12,10 @@ from drone_mesh.drone.flight_path import FlightPath, PlanFlight, Vector
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.roles import Role
 from drone_mesh.errors import ConfigurationError, FleetRefused, GoalRefused
-from drone_mesh.world.drones import GatewayDrone, RouterDrone, VirtualDrone
+from drone_mesh.world.drones import VirtualDrone
 from drone_mesh.world.interfaces import World
 
 HALF_WIDTH_M = 0.15  # from the centre of a drone's box to its corner, plus a margin
-_KINDS = {Role.GATEWAY: GatewayDrone, Role.ROUTER: RouterDrone}
 
 
 class DroneFactory:
@@ -33,19 +32,16 @@ class DroneFactory:
         routers: int,
         gridsize: int,
         spacing: float,
-        debug: bool,
         wind: Vector | None = None,
         obstacles: Obstacles | None = None,
         cruise_height_m: float = math.inf,
     ) -> None:
         """Parameters and errors as for `plan_fleet`.
 
-        `debug`: whether the nodes of the drones publish debug information; `wind`: as for
-        VirtualDrone. The `obstacles` are added to the world too; without them, `cruise_height_m` is
-        the ceiling of ordered flights. Raises ConfigurationError if a drone would start in or
-        against an obstacle.
+        `wind`: as for VirtualDrone. The `obstacles` are added to the world too; without them,
+        `cruise_height_m` is the ceiling of ordered flights. Raises ConfigurationError if a drone
+        would start in or against an obstacle.
         """
-        self.debug = debug
         self._world = world
         self._wind = wind
         self._for_flights: Obstacles | None = None
@@ -94,7 +90,7 @@ class DroneFactory:
         drones = {drone.node_id: drone for drone in self.drones}
         if node_id not in drones:
             raise FleetRefused(f"drone {node_id} does not exist")
-        gateways = [n for n, drone in drones.items() if drone.ROLE is Role.GATEWAY]
+        gateways = [n for n, drone in drones.items() if drone.role is Role.GATEWAY]
         if gateways == [node_id] and len(drones) > 1:
             raise FleetRefused(
                 f"drone {node_id} is the last gateway: no order would reach a router any more; "
@@ -109,10 +105,7 @@ class DroneFactory:
         drone.engine.leave()
 
     def _make(self, place: StartPlace) -> VirtualDrone:
-        node_id, role, longitude, latitude = place
-        return _KINDS[role](
-            self._world, node_id, longitude, latitude, self._wind, self._plan_flight
-        )
+        return VirtualDrone(self._world, place, self._wind, self._plan_flight)
 
     def _check_place(self, place: StartPlace) -> None:
         try:

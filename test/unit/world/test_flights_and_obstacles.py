@@ -18,7 +18,7 @@ TOWER = Box((3.0, 0.0, 3.0), (1.0, 1.0, 6.0))  # between the two routers, higher
 
 
 def fleet(world, box, wind=None):
-    return DroneFactory(world, 0, 2, 2, 6.0, False, wind, Obstacles([box])).drones
+    return DroneFactory(world, 0, 2, 2, 6.0, wind, Obstacles([box])).drones
 
 
 WALL = Box((3.0, 0.0, 2.0), (1.0, 60.0, 4.0))  # too long to go round, higher than their climb

@@ -19,7 +19,7 @@ def drone_views(drones: Iterable[VirtualDrone], now_s: float) -> list[DroneView]
         state = drone.engine.state
         engine = drone.engine
         battery = engine.battery_percent()
-        view = describe_drone(drone.node_id, drone.ROLE, state.position, state.path, now_s)
+        view = describe_drone(drone.node_id, drone.role, state.position, state.path, now_s)
         views.append(
             replace(
                 view,

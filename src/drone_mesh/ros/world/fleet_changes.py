@@ -113,7 +113,7 @@ class FleetChanges:
         if not _comes_true(lambda: not node_runs(node_id)):
             _log.warning("the process that hosts node %d has not ended it", node_id)
         self._spawner.despawn(drone)
-        message = f"removed {drone.ROLE.word} {node_id}"
+        message = f"removed {drone.role.word} {node_id}"
         _log.info("%s", message)
         return RemoveDroneResponse(success=True, message=message)
 
@@ -133,7 +133,7 @@ class FleetChanges:
         return f"{host} has not started its node yet"
 
     def _publish(self, without: int | None = None) -> None:
-        roles = {d.node_id: d.ROLE for d in self._factory.drones if d.node_id != without}
+        roles = {d.node_id: d.role for d in self._factory.drones if d.node_id != without}
         value = PresentDrones(roles, self._hosts).to_parameter()
         rospy.set_param(names.DRONES_PARAM, value)
         self._watch.keep(names.DRONES_PARAM, value)

@@ -53,7 +53,6 @@ class RosSimulation:
             configuration.routers,
             configuration.gridsize,
             configuration.spacing,
-            configuration.debug,
             (configuration.wind_x, configuration.wind_y, 0.0)
             if configuration.flight == "dynamic"
             else None,
@@ -127,7 +126,7 @@ class RosSimulation:
         host.start()
         if self._present():
             host.wait_for_radios(stop.requested)
-        host.start_nodes({drone.node_id: drone.ROLE for drone in self._present()})
+        host.start_nodes({drone.node_id: drone.role for drone in self._present()})
         return host
 
     def _step(
