@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Sequence
+
 import pybullet
 
 from drone_mesh.air.box import Box
@@ -24,19 +26,28 @@ def connect() -> int:
 
 def add_static_box(client: int, box: Box) -> int:
     """Add a fixed box to this pybullet client; returns its body number."""
-    halves = [edge_m / 2 for edge_m in box.size]
-    shape = pybullet.createCollisionShape(
-        pybullet.GEOM_BOX, halfExtents=halves, physicsClientId=client
-    )
     turned = pybullet.getQuaternionFromEuler((0.0, 0.0, box.yaw_rad))
+    return _add(client, KINEMATIC, _box_shape(client, box.size), box.center, turned)
+
+
+def _add(
+    client: int, mass_kg: float, shape: int, centre: Vector, turned: Sequence[float] = UPRIGHT
+) -> int:
     return int(
         pybullet.createMultiBody(
-            KINEMATIC,
+            mass_kg,
             shape,
-            basePosition=box.center,
+            basePosition=centre,
             baseOrientation=turned,
             physicsClientId=client,
         )
+    )
+
+
+def _box_shape(client: int, size: Vector) -> int:
+    halves = [edge_m / 2 for edge_m in size]
+    return int(
+        pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=halves, physicsClientId=client)
     )
 
 
@@ -56,15 +67,7 @@ class BulletWorld(World):
         self.ground = pybullet.createMultiBody(KINEMATIC, plane, physicsClientId=self.client)
 
     def add_box(self, size: Vector, centre: Vector) -> int:
-        return int(
-            pybullet.createMultiBody(
-                KINEMATIC,
-                self._shape(size),
-                basePosition=centre,
-                baseOrientation=UPRIGHT,
-                physicsClientId=self.client,
-            )
-        )
+        return _add(self.client, KINEMATIC, self._shape(size), centre)
 
     def add_obstacle(self, box: Box) -> None:
         add_static_box(self.client, box)
@@ -77,15 +80,7 @@ class BulletWorld(World):
 
     def add_body(self, size: Vector, centre: Vector, mass_kg: float) -> int:
         """A box that physics moves; it stays upright, as a drone's controller would keep it."""
-        body = int(
-            pybullet.createMultiBody(
-                mass_kg,
-                self._shape(size),
-                basePosition=centre,
-                baseOrientation=UPRIGHT,
-                physicsClientId=self.client,
-            )
-        )
+        body = _add(self.client, mass_kg, self._shape(size), centre)
         pybullet.changeDynamics(
             body,
             -1,
@@ -120,9 +115,5 @@ class BulletWorld(World):
     def _shape(self, size: Vector) -> int:
         """The collision shape of a box; boxes of equal size share it."""
         if size not in self._shapes:
-            self._shapes[size] = pybullet.createCollisionShape(
-                pybullet.GEOM_BOX,
-                halfExtents=[edge_m / 2 for edge_m in size],
-                physicsClientId=self.client,
-            )
+            self._shapes[size] = _box_shape(self.client, size)
         return self._shapes[size]
