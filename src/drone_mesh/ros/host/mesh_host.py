@@ -13,6 +13,7 @@ from drone_mesh.drone.roles import Role
 from drone_mesh.errors import MeshError
 from drone_mesh.execution import MeshExecutor
 from drone_mesh.ros.graph.figures import FiguresPublisher
+from drone_mesh.ros.graph.waiting import comes_true
 from drone_mesh.ros.host.announcements import PlaceOf
 from drone_mesh.ros.host.grounded_drones import GroundedDrones
 from drone_mesh.ros.host.host_reports import HostReports
@@ -26,7 +27,6 @@ from drone_mesh.ros.host.virtual_raspberry_pi import (
 from drone_mesh.state.figures import LOST_IN_RANGE, WORST_LAG
 
 RADIOS_TIMEOUT_S = 10.0  # our choice: wall seconds to wait for a simulator before starting nodes
-_POLL_PERIOD_S = 0.02  # wall; our choice
 _KINDS = {Role.GATEWAY: VirtualRaspberryPiGateway, Role.ROUTER: VirtualRaspberryPiRouter}
 
 _log = logging.getLogger(__name__)
@@ -97,12 +97,9 @@ class MeshHost:
 
         Nodes start without a simulator as well, but their first packets are lost then.
         """
-        deadline_s = time.monotonic() + RADIOS_TIMEOUT_S
-        while not self._radios.ready and not give_up():
-            if time.monotonic() > deadline_s:
-                _log.warning("no simulator after %g s: starting without it", RADIOS_TIMEOUT_S)
-                return
-            time.sleep(_POLL_PERIOD_S)
+        ready = comes_true(lambda: self._radios.ready, RADIOS_TIMEOUT_S, give_up)
+        if not (ready or give_up()):
+            _log.warning("no simulator after %g s: starting without it", RADIOS_TIMEOUT_S)
 
     def start_nodes(self, nodes: Mapping[int, Role]) -> None:
         """Start these nodes, given by id and role, in this order."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import time
 from functools import partial
 from typing import Callable
 
@@ -23,13 +22,13 @@ from drone_mesh.ros.graph.node_presence import node_runs
 from drone_mesh.ros.graph.orderly_stop import OrderlyStop
 from drone_mesh.ros.graph.parameters import configured_obstacles, or_exit
 from drone_mesh.ros.graph.present_drones import PresentDrones
+from drone_mesh.ros.graph.waiting import comes_true
 from drone_mesh.ros.host.followed_clock import FollowedClock
 from drone_mesh.ros.host.followed_fleet import FollowedFleet
 from drone_mesh.ros.host.mesh_host import MeshHost
 from drone_mesh.ros.host.mesh_settings import MeshSettings
 from drone_mesh.ros.host.reported_places import ReportedPlaces
 
-POLL_PERIOD_S = 0.1  # wall; our choice
 WAITING_LOG_PERIOD_S = 5.0  # wall; between two log lines about what is being waited for
 PROGRESS_PERIOD_S = 0.5  # wall; the world continues without a host that is silent for two seconds
 
@@ -37,12 +36,8 @@ _log = logging.getLogger(__name__)
 
 
 def _wait_for(what: str, is_there: Callable[[], bool], give_up: Callable[[], bool]) -> None:
-    logged_s = time.monotonic()
-    while not is_there() and not give_up():
-        if time.monotonic() - logged_s >= WAITING_LOG_PERIOD_S:
-            logged_s = time.monotonic()
-            _log.info("waiting for %s", what)
-        time.sleep(POLL_PERIOD_S)
+    while not (comes_true(is_there, WAITING_LOG_PERIOD_S, give_up) or give_up()):
+        _log.info("waiting for %s", what)
 
 
 def _whole_parameter(name: str) -> int:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import logging
-import time
 from typing import Sequence
 
 import actionlib
@@ -24,6 +23,7 @@ from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
 from drone_mesh.ros.graph.master_watch import MasterWatch
 from drone_mesh.ros.graph.parameters import manager_layouts, or_exit
 from drone_mesh.ros.graph.present_drones import PresentDrones
+from drone_mesh.ros.graph.waiting import comes_true
 from drone_mesh.ros.services.order_answers import OrderAnswers, Outcomes
 from drone_mesh.ros.services.order_summary import OrderSummary
 from drone_mesh.ros.services.standing_layouts import Given, StandingLayouts
@@ -54,7 +54,6 @@ from drone_mesh.state.standing_orders import PartState
 
 WAIT_FOR_GATEWAY_S = 3.0  # of wall time (docs/ros.md, "Drone manager")
 ANSWERS_TIMEOUT_S = 1.0  # our choice, wall: a gateway answers in milliseconds, if it answers
-POLL_PERIOD_S = 0.05
 NO_GATEWAY = "no gateway is running to take the order"
 ORDERS_IN_QUEUE = 512  # two whole fleets
 
@@ -278,16 +277,13 @@ class DroneManager:
 
     def _gateway_is_there(self) -> bool:
         """Whether a gateway subscribes; waits for one, which may be starting."""
-        deadline_s = time.monotonic() + WAIT_FOR_GATEWAY_S
-        while not rospy.is_shutdown():
+
+        def is_there() -> bool:
             if self._gateways.impl is not None:
                 self._gateways.impl.check()  # drops what a killed gateway left behind
-            if self._gateways.get_num_connections() > 0:
-                return True
-            if time.monotonic() >= deadline_s:
-                return False
-            time.sleep(POLL_PERIOD_S)
-        return False
+            return self._gateways.get_num_connections() > 0
+
+        return comes_true(is_there, WAIT_FOR_GATEWAY_S)
 
 
 def _in_fleet(
