@@ -18,7 +18,8 @@ from drone_mesh.errors import FleetRefused
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import ros_time
 from drone_mesh.ros.graph.direct_publisher import DirectPublisher
-from drone_mesh.ros.world.paced_hosts import PacedHosts, PacedNodes
+from drone_mesh.ros.host.mesh_host import MeshHost
+from drone_mesh.ros.world.paced_hosts import PacedHosts
 from drone_mesh.srv import SetSpeed, SetSpeedRequest, SetSpeedResponse
 from drone_mesh.world.interfaces import World
 from drone_mesh.world.pace import Pace
@@ -48,7 +49,7 @@ class WorldRunner:
     time slows down, and no timer is late. Threads of rospy set `_paused` and `_wanted`.
     """
 
-    def __init__(self, world: World, factor: float, nodes: PacedNodes | None) -> None:
+    def __init__(self, world: World, factor: float, nodes: MeshHost | None) -> None:
         """`nodes` are those of this process, or None."""
         self._world = world
         self._hosts = PacedHosts(nodes)
