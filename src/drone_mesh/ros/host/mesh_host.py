@@ -18,7 +18,8 @@ from drone_mesh.ros.host.announcements import PlaceOf
 from drone_mesh.ros.host.grounded_drones import GroundedDrones
 from drone_mesh.ros.host.host_reports import HostReports
 from drone_mesh.ros.host.mesh_settings import MeshSettings
-from drone_mesh.ros.host.radios import Radios, VirtualRadios
+from drone_mesh.ros.host.radios import Radios
+from drone_mesh.ros.host.virtual_nrf24 import VirtualRadios
 from drone_mesh.ros.host.virtual_raspberry_pi import (
     VirtualRaspberryPi,
     VirtualRaspberryPiGateway,
@@ -75,12 +76,12 @@ class MeshHost:
 
         Nodes with emulated radios do not count, because they and their chips run in wall time.
         """
-        return self.executor.lag_s(now_s)
+        return 0.0 if self._radios.in_wall_time else self.executor.lag_s(now_s)
 
     @property
     def idle(self) -> bool:
-        """Whether the worker of the nodes waits for work."""
-        return self.executor.idle
+        """Whether the nodes wait for work; those with emulated radios do not count."""
+        return self._radios.in_wall_time or self.executor.idle
 
     @property
     def under_way(self) -> int:
@@ -90,7 +91,6 @@ class MeshHost:
     def time_advanced(self) -> None:
         """The clock has advanced."""
         self.executor.time_advanced()
-        self._radios.time_advanced()
 
     def wait_for_radios(self, give_up: Callable[[], bool]) -> None:
         """Return when packets can be sent, after RADIOS_TIMEOUT_S, or when `give_up` returns True.
@@ -127,7 +127,7 @@ class MeshHost:
                 self._radios.remove(node_id)
                 _log.info("ended node %d", node_id)
 
-        self._radios.slot().submit(end)  # runs after the start of this node
+        self.executor.submit(end)  # runs after the start of this node
 
     def stop(self) -> None:
         """Stop all threads; returns when they have ended. Nodes not started yet never start."""
@@ -138,20 +138,20 @@ class MeshHost:
         self._radios.fall_silent()
         for node in list(self.nodes.values()):
             # Only these have threads of their own; the others end with the executor.
-            if self._radios.own_threads or isinstance(node, VirtualRaspberryPiGateway):
+            if self._radios.in_wall_time or isinstance(node, VirtualRaspberryPiGateway):
                 node.slot.submit(node.stop)
-        self._radios.close()
         self.executor.stop()
+        self._radios.close()
 
     def _take_figures(self) -> dict[str, float]:
         return {
-            WORST_LAG: self.executor.take_worst_lag_s(),
+            WORST_LAG: 0.0 if self._radios.in_wall_time else self.executor.take_worst_lag_s(),
             LOST_IN_RANGE: self._radios.never_handed_over,
             **self._radios.figures(),
         }
 
     def _submit_start(self, node_id: int, role: Role, on_start: Callable[[], None]) -> None:
-        slot = self._radios.slot()
+        slot = self.executor.slot()
 
         def start(now_s: float) -> None:
             if self._stopping:

@@ -110,14 +110,13 @@ class RosSimulation:
 
     def _make_radios(self) -> EmulatedRadios | None:
         """The emulated chips; None: the radio is virtual."""
-        configuration, world = self._parameters.configuration, self._world
+        configuration = self._parameters.configuration
         if configuration.radio == "nrf24":
             return EmulatedRadios(
                 self._present(),
                 configuration.max_distance,
                 data_rate(configuration.data_rate),
                 configuration.seed,
-                lambda: world.now_s,
             )
         _log.info("radio virtual: an ideal disc, range %g m", configuration.max_distance)
         return None
