@@ -7,8 +7,8 @@ from typing import Callable
 import rospy
 
 from drone_mesh.communication.component import MeshnetworkComponent
-from drone_mesh.communication.gateway import MeshnetworkGateway
 from drone_mesh.communication.observer import MeshEvent
+from drone_mesh.drone.roles import Role
 from drone_mesh.msg import HostReport, NodeState
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import event_msg, ros_time
@@ -38,11 +38,13 @@ class HostReports(Periodic):
         self._publisher = rospy.Publisher(names.REPORTS_TOPIC, HostReport, queue_size=REPORTS_QUEUE)
 
     def add(
-        self, component: MeshnetworkComponent, worker: Worker, antenna_on: Callable[[], bool]
+        self,
+        role: Role,
+        component: MeshnetworkComponent,
+        worker: Worker,
+        antenna_on: Callable[[], bool],
     ) -> None:
         """Report on this node, which `worker` drives, from now on."""
-        gateway = isinstance(component, MeshnetworkGateway)
-        role = NodeState.GATEWAY if gateway else NodeState.ROUTER
         node_id = component.get_node_id()
         self._snapshots.add(component, worker, lambda: NodeState(id=node_id, role=role), antenna_on)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import logging
 import threading
@@ -20,15 +19,10 @@ from drone_mesh.ros.host.host_reports import HostReports
 from drone_mesh.ros.host.mesh_settings import MeshSettings
 from drone_mesh.ros.host.radios import Radios
 from drone_mesh.ros.host.virtual_nrf24 import VirtualRadios
-from drone_mesh.ros.host.virtual_raspberry_pi import (
-    VirtualRaspberryPi,
-    VirtualRaspberryPiGateway,
-    VirtualRaspberryPiRouter,
-)
+from drone_mesh.ros.host.virtual_raspberry_pi import VirtualRaspberryPi
 from drone_mesh.state.figures import LOST_IN_RANGE, WORST_LAG
 
 RADIOS_TIMEOUT_S = 10.0  # our choice: wall seconds to wait for a simulator before starting nodes
-_KINDS = {Role.GATEWAY: VirtualRaspberryPiGateway, Role.ROUTER: VirtualRaspberryPiRouter}
 
 _log = logging.getLogger(__name__)
 
@@ -55,7 +49,7 @@ class MeshHost:
         any thread. `radios`: virtual ones by default.
         """
         self._reports = HostReports()
-        self._settings = dataclasses.replace(settings, observer=self._reports.observe)
+        self._settings = settings
         self._on_failure = on_failure
         self.executor = MeshExecutor(clock, clock_notifies=True, name="mesh_host")
         self._radios = VirtualRadios(self.executor, place_of) if radios is None else radios
@@ -138,7 +132,7 @@ class MeshHost:
         self._radios.fall_silent()
         for node in list(self.nodes.values()):
             # Only these have threads of their own; the others end with the executor.
-            if self._radios.in_wall_time or isinstance(node, VirtualRaspberryPiGateway):
+            if self._radios.in_wall_time or node.role is Role.GATEWAY:
                 node.slot.submit(node.stop)
         self.executor.stop()
         self._radios.close()
@@ -159,8 +153,16 @@ class MeshHost:
             try:
                 antenna = self._radios.antenna(node_id, slot)
                 why_not_fly = functools.partial(self._grounded.reason, node_id)
-                node = _KINDS[role](node_id, self._settings, antenna, slot, why_not_fly)
-                self._reports.add(node.component, slot, node.antenna.on)
+                node = VirtualRaspberryPi(
+                    node_id,
+                    role,
+                    self._settings,
+                    self._reports.observe,
+                    antenna,
+                    slot,
+                    why_not_fly,
+                )
+                self._reports.add(role, node.component, slot, antenna.on)
                 node.start(now_s)
             except MeshError as error:  # retrying would not help
                 self._on_failure(f"node {node_id} cannot start: {error}")
