@@ -100,29 +100,23 @@ class DroneManager:
 
     def _request_movement(self, request: RequestDroneFlightRequest) -> RequestDroneFlightResponse:
         """Status 1: a gateway has the order; 2: no gateway has a route; 0: there is no gateway."""
-        try:
-            why_not = self._order_one(Order(request.ID, location_of(request)), False)
-        except GoalRefused as error:
-            raise rospy.ServiceException(str(error)) from None
+        why_not = self._order_one(Order(request.ID, location_of(request)), False)
         if why_not == NO_GATEWAY:
             return RequestDroneFlightResponse(status=0)
         return RequestDroneFlightResponse(status=2 if why_not else 1)
 
     def _order_flight(self, request: OrderFlightRequest) -> OrderFlightResponse:
         order = Order(request.id, location_of(request))
-        try:
-            why_not = self._order_one(order, request.allow_shared_place)
-        except GoalRefused as error:
-            raise rospy.ServiceException(str(error)) from None
+        why_not = self._order_one(order, request.allow_shared_place)
         return OrderFlightResponse(success=not why_not, message=why_not)
 
     def _order_one(self, order: Order, allow_shared_place: bool) -> str:
-        """Why the order was not sent; empty if it was. Raises GoalRefused if it was refused."""
-        drone, goal = order
+        """Why the order was not sent; empty if it was. Raises ServiceException: it was refused."""
+        drone, _goal = order
         _check(order)
         fleet = drones_if_known()
         if fleet is not None and drone not in fleet.roles:
-            raise GoalRefused(
+            raise rospy.ServiceException(
                 f"drone {drone} is not in this fleet: its ids are {ids_in_words(fleet.roles)}"
             )
         if not self._gateway_is_there():
@@ -130,7 +124,7 @@ class DroneManager:
             return NO_GATEWAY
         outcomes = self._order([order], fleet, allow_shared_place)
         for answer in outcomes.refused.values():
-            raise GoalRefused(answer.reason)
+            raise rospy.ServiceException(answer.reason)
         if not outcomes.no_route:
             self._standing.replace(drone)
             return ""
@@ -145,11 +139,7 @@ class DroneManager:
         return self._order_case(request.caseID, request.at_once)
 
     def _order_formation(self, request: OrderFormationRequest) -> OrderFormationResponse:
-        try:
-            orders = _formation(request)
-        except GoalRefused as error:
-            raise rospy.ServiceException(str(error)) from None
-        answer = self._carry_out(request.name, orders, request.at_once)
+        answer = self._carry_out(request.name, _formation(request), request.at_once)
         return OrderFormationResponse(**{name: getattr(answer, name) for name in answer.__slots__})
 
     def _preview_layout(self, request: PreviewLayoutRequest) -> PreviewLayoutResponse:
@@ -295,12 +285,14 @@ def _in_fleet(
 
 
 def _formation(request: OrderFormationRequest) -> list[Order]:
-    """The orders by descending id, as those of a layout. Raises GoalRefused."""
+    """The orders by descending id, as those of a layout. Raises ServiceException."""
     if not (request.name.isprintable() and 0 < len(request.name) <= MAX_NAME):
-        raise GoalRefused(f"invalid name: must be 1..{MAX_NAME} printable characters")
+        raise rospy.ServiceException(f"invalid name: must be 1..{MAX_NAME} printable characters")
     goals = dict(zip(request.drones, map(location_of, request.places)))
     if not len(goals) == len(request.drones) == len(request.places) > 0:
-        raise GoalRefused("a formation needs drones, each once, and a place for each of them")
+        raise rospy.ServiceException(
+            "a formation needs drones, each once, and a place for each of them"
+        )
     orders = [Order(*item) for item in sorted(goals.items(), reverse=True)]
     for order in orders:
         _check(order)
@@ -308,10 +300,13 @@ def _formation(request: OrderFormationRequest) -> list[Order]:
 
 
 def _check(order: Order) -> None:
-    """Raises GoalRefused for an order that no drone can be given."""
+    """Raises ServiceException for an order that no drone can be given."""
     if order.node_id > MAX_NODE_ID:
-        raise GoalRefused(f"invalid drone id {order.node_id}: must be 0..{MAX_NODE_ID}")
-    check_goal(*order.goal)
+        raise rospy.ServiceException(f"invalid drone id {order.node_id}: must be 0..{MAX_NODE_ID}")
+    try:
+        check_goal(*order.goal)
+    except GoalRefused as error:
+        raise rospy.ServiceException(str(error)) from None
 
 
 def main() -> None:
