@@ -12,6 +12,7 @@ from drone_mesh.communication.interfaces import IMeshDebugInfo
 from drone_mesh.execution import ExecutorSlot
 from drone_mesh.msg import NodeDebugInfo
 from drone_mesh.ros.graph import names
+from drone_mesh.ros.graph.persistent_service import PersistentService, ServiceGone
 from drone_mesh.srv import PowerSwitch, PowerSwitchRequest, PowerSwitchResponse
 
 DEBUG_PERIOD_S = 1.0  # docs/ros.md, "Topics"
@@ -108,3 +109,14 @@ class AntennaPanel:
                     self._node_id,
                 )
         return PowerSwitchResponse()
+
+
+def node_runs(node_id: int) -> bool:
+    """Whether a process offers this node's power switch, and accepts connections."""
+    switch = PersistentService(names.power_switch(node_id), PowerSwitch)
+    try:
+        switch.connect()
+    except ServiceGone:
+        return False
+    switch.close()
+    return True

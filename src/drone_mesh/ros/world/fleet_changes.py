@@ -14,9 +14,9 @@ from drone_mesh.drone.roles import Role
 from drone_mesh.errors import FleetRefused
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.master_watch import MasterWatch
-from drone_mesh.ros.graph.node_presence import node_runs
 from drone_mesh.ros.graph.present_drones import PresentDrones
 from drone_mesh.ros.graph.waiting import comes_true
+from drone_mesh.ros.host.antenna_panel import node_runs
 from drone_mesh.ros.host.emulated_radios import EmulatedRadios
 from drone_mesh.ros.host.mesh_host import MeshHost
 from drone_mesh.ros.world.engine_server import EngineServers
