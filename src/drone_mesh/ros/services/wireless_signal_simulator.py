@@ -164,31 +164,27 @@ class WirelessSignalSimulator:
         )
 
     def _broadcast(self, request: BroadcastRequest) -> BroadcastResponse:
-        with self._lock:
-            nodes = self._in_range(request.from_)
-            topics = [self._nodes.link(request.from_, node) for node in nodes]
         packet = request.message.payload
         return BroadcastResponse(
             [
                 node
-                for node, topic in zip(nodes, topics)
+                for node, topic in self._topics_in_range(request.from_)
                 if topic is not None and self._carry(topic, NRF24(readdressed(packet, node)))
             ]
         )
 
     def _others_in_range(self, request: AreaScanRequest) -> AreaScanResponse:
-        with self._lock:
-            nodes = self._in_range(request.id)
-            topics = [self._nodes.link(request.id, node) for node in nodes]
-        return AreaScanResponse(
-            [node for node, topic in zip(nodes, topics) if self._is_heard(topic)]
-        )
+        topics = self._topics_in_range(request.id)
+        return AreaScanResponse([node for node, topic in topics if self._is_heard(topic)])
 
-    def _in_range(self, node_id: int) -> tuple[int, ...]:
-        try:
-            return self._nodes.in_range(node_id)
-        except AirError as error:
-            raise rospy.ServiceException(str(error)) from None
+    def _topics_in_range(self, node_id: int) -> list[tuple[int, str | None]]:
+        """The nodes in range of this one, and the topic of each."""
+        with self._lock:
+            try:
+                nodes = self._nodes.in_range(node_id)
+            except AirError as error:
+                raise rospy.ServiceException(str(error)) from None
+            return [(node, self._nodes.link(node_id, node)) for node in nodes]
 
     def _is_heard(self, topic: str | None) -> bool:
         listener = None if topic is None else self._antenna_topics.get(topic)

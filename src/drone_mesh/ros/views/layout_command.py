@@ -21,7 +21,7 @@ from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import join_graph, run_tool
 from drone_mesh.ros.graph.conversions import formation_request
 from drone_mesh.ros.graph.parameters import earth_origin
-from drone_mesh.ros.graph.persistent_service import ServiceGone, ServiceRefused, call_once
+from drone_mesh.ros.graph.persistent_service import ServiceGone, call_once
 from drone_mesh.ros.views.state_source import live_state
 from drone_mesh.srv import (
     OrderFormation,
@@ -89,8 +89,6 @@ def _run(options: argparse.Namespace) -> int:
                 answer = call_once(names.ORDER_FORMATION_SERVICE, OrderFormation, drawn)
         except ServiceGone as error:
             raise MeshError(f"{error}: is the simulation running?") from None
-        except ServiceRefused as error:
-            raise MeshError(str(error)) from None
         print(answer.message, flush=True)
         over = _follow(heard, answer.id, stop)
         if over is not None:
