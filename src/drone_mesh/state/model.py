@@ -108,7 +108,7 @@ class MeshStatus:
     routing: str = ""  # name of the routing technique; empty: not known
     repair_strategy: str = ""  # name of the repair strategy; empty: not known
     obstacles: Sequence[ObstacleStatus] = ()
-    shape: str = ""  # how drones are drawn: a value of view.picture.Shape; empty: the default
+    shape: str = ""  # how drones are drawn: a value of view.scene.Shape; empty: the default
     layouts: Sequence[str] = ()  # how far each ordered layout has come, in words
 
 

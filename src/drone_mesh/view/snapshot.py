@@ -17,7 +17,7 @@ from drone_mesh.view.bodies import paste_bodies
 from drone_mesh.view.camera import Camera, Margins, frame
 from drone_mesh.view.grid import draw_ground
 from drone_mesh.view.palette import GROUND, LIGHT, Colour
-from drone_mesh.view.picture import (
+from drone_mesh.view.scene import (
     DRONE_WIDTH_M,
     DronePicture,
     Scene,

@@ -12,7 +12,7 @@ from PIL import Image, ImageDraw
 
 from drone_mesh.state.links import LinkUse
 from drone_mesh.view.palette import GROUND, LIGHT, SHADOW, SKY, rgb
-from drone_mesh.view.picture import DRONE_WIDTH_M, Scene, drawing_scale
+from drone_mesh.view.scene import DRONE_WIDTH_M, Scene, drawing_scale
 from drone_mesh.view.window_camera import WindowCamera
 from drone_mesh.view.window_items import Line, WindowItems
 
