@@ -9,7 +9,7 @@ from still_world import StillWorld
 from drone_mesh.drone.fleet import StartPlace
 from drone_mesh.drone.roles import Role
 from drone_mesh.world.bullet_world import BulletWorld
-from drone_mesh.world.drones import VirtualDrone
+from drone_mesh.world.factory import VirtualDrone
 
 
 @pytest.fixture

@@ -12,8 +12,8 @@ from drone_mesh.drone.fleet import StartPlace
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
 from drone_mesh.errors import GoalRefused, MeshError
-from drone_mesh.world.drones import VirtualDrone
 from drone_mesh.world.engine import DroneState
+from drone_mesh.world.factory import VirtualDrone
 
 
 @pytest.fixture

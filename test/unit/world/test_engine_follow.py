@@ -7,7 +7,7 @@ from still_world import StillWorld
 from drone_mesh.drone.fleet import StartPlace
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
-from drone_mesh.world.drones import VirtualDrone
+from drone_mesh.world.factory import VirtualDrone
 
 
 def test_a_followed_drone_is_where_it_was_last_reported_and_its_listeners_are_notified() -> None:

@@ -13,8 +13,8 @@ from drone_mesh.drone.roles import Role
 from drone_mesh.mobility.pilot import TrackPilot, along
 from drone_mesh.world.body import BodyLimits
 from drone_mesh.world.bullet_world import BulletWorld
-from drone_mesh.world.drones import VirtualDrone
 from drone_mesh.world.dynamic_engine import DynamicEngine
+from drone_mesh.world.factory import VirtualDrone
 
 SQUARE = [(4.0, 0.0, 2.0), (4.0, 4.0, 2.0), (0.0, 4.0, 2.0), (0.0, 0.0, 2.0)]
 

@@ -24,8 +24,8 @@ from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.packet_samples import PacketSamples
 from drone_mesh.ros.host.antenna_panel import AntennaPanel
 from drone_mesh.ros.host.radios import Radios
-from drone_mesh.world.drones import VirtualDrone
 from drone_mesh.world.engine import DroneState
+from drone_mesh.world.factory import VirtualDrone
 
 _RECEIVED_QUEUE = 32  # packets that may wait for a slow subscriber of /Node/<id>
 

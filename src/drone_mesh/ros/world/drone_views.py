@@ -8,8 +8,8 @@ from typing import Iterable, Sequence
 
 from drone_mesh.state.observation import describe_drone
 from drone_mesh.state.roster import DroneView
-from drone_mesh.world.drones import VirtualDrone
 from drone_mesh.world.engine import DroneEngine
+from drone_mesh.world.factory import VirtualDrone
 
 
 def drone_views(drones: Iterable[VirtualDrone], now_s: float) -> list[DroneView]:

@@ -30,8 +30,7 @@ from drone_mesh.srv import (
     RemoveDroneRequest,
     RemoveDroneResponse,
 )
-from drone_mesh.world.drones import VirtualDrone
-from drone_mesh.world.factory import DroneFactory
+from drone_mesh.world.factory import DroneFactory, VirtualDrone
 
 NODE_TIMEOUT_S = 5.0  # our choice, wall: how long a node may take to start or to end
 

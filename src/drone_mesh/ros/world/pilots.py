@@ -10,7 +10,7 @@ from drone_mesh.drone.roles import Role
 from drone_mesh.missions import Mission
 from drone_mesh.mobility import Area, Mobility, tracks_of
 from drone_mesh.mobility.pilot import TrackPilot
-from drone_mesh.world.drones import VirtualDrone
+from drone_mesh.world.factory import VirtualDrone
 
 MEAN_DEGREE = 10.0  # our choice: neighbours on average, if drones were uniform in the area
 HEIGHT_M = 2.0  # our choice: of the models' flights
