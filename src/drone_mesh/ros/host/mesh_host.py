@@ -14,7 +14,7 @@ from drone_mesh.execution import MeshExecutor
 from drone_mesh.ros.graph.figures import FiguresPublisher
 from drone_mesh.ros.graph.waiting import comes_true
 from drone_mesh.ros.host.announcements import PlaceOf
-from drone_mesh.ros.host.grounded_drones import GroundedDrones
+from drone_mesh.ros.host.flown_drones import GroundedDrones
 from drone_mesh.ros.host.host_reports import HostReports
 from drone_mesh.ros.host.mesh_settings import MeshSettings
 from drone_mesh.ros.host.radios import Radios

@@ -24,10 +24,10 @@ from drone_mesh.ros.graph.parameters import configured_obstacles, or_exit
 from drone_mesh.ros.graph.present_drones import PresentDrones
 from drone_mesh.ros.graph.waiting import comes_true
 from drone_mesh.ros.host.antenna_panel import node_runs
+from drone_mesh.ros.host.flown_drones import ReportedPlaces
 from drone_mesh.ros.host.followed_clock import FollowedClock
 from drone_mesh.ros.host.mesh_host import MeshHost
 from drone_mesh.ros.host.mesh_settings import MeshSettings
-from drone_mesh.ros.host.reported_places import ReportedPlaces
 
 WAITING_LOG_PERIOD_S = 5.0  # wall; between two log lines about what is being waited for
 PROGRESS_PERIOD_S = 0.5  # wall; the world continues without a host that is silent for two seconds

@@ -18,12 +18,12 @@ from drone_mesh.communication.messages import readdressed, receiver
 from drone_mesh.msg import NRF24, DroneInfo
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import start_node
+from drone_mesh.ros.graph.direct_publisher import DirectPublisher
 from drone_mesh.ros.graph.figures import FiguresPublisher
 from drone_mesh.ros.graph.logs import ThrottledLog, show_library_logs_on_rosout
 from drone_mesh.ros.graph.master_watch import MasterWatch
 from drone_mesh.ros.graph.packet_samples import PacketSamples
 from drone_mesh.ros.graph.parameters import configured_obstacles, factory_configuration, or_exit
-from drone_mesh.ros.services.antenna_topic import AntennaTopic
 from drone_mesh.srv import (
     AreaScan,
     AreaScanRequest,
@@ -40,7 +40,32 @@ from drone_mesh.srv import (
 )
 from drone_mesh.state.figures import DELIVERED, LOST_IN_RANGE
 
+STUCK_RECEIVER_S = 0.2  # our choice: a receiver that does not read for this long is disconnected
+
 _log = logging.getLogger(__name__)
+
+
+class AntennaTopic(DirectPublisher):
+    """Publishes: the topic of one antenna, usually /Node/<id> (NRF24). Any thread."""
+
+    def __init__(self, topic: str) -> None:
+        self.has_listened = False  # set by rospy's thread: the first receiver has connected
+        super().__init__(topic, NRF24, STUCK_RECEIVER_S)
+
+    def peer_subscribe(self, topic: str, publish: object, peer_publish: object) -> None:
+        """A receiver has connected (a thread of rospy)."""
+        self.has_listened = True
+        super().peer_subscribe(topic, publish, peer_publish)
+
+    def deliver(self, message: NRF24) -> bool:
+        """Publish this packet; returns False if there is no receiver."""
+        if not self.has_subscriber():
+            return False
+        try:
+            self.publish(message)
+        except rospy.ROSException:  # the topic has been closed
+            return False
+        return bool(self.connections())
 
 
 class WirelessSignalSimulator:

@@ -23,8 +23,7 @@ from drone_mesh.ros.graph.parameters import or_exit
 from drone_mesh.ros.host.emulated_radios import EmulatedRadios
 from drone_mesh.ros.host.mesh_host import MeshHost
 from drone_mesh.ros.world.drone_views import drone_views
-from drone_mesh.ros.world.engine_server import EngineServers
-from drone_mesh.ros.world.external_engines import ExternalEngines
+from drone_mesh.ros.world.engine_server import EngineServers, ExternalEngines
 from drone_mesh.ros.world.factory_parameters import FactoryParameters
 from drone_mesh.ros.world.fleet_changes import FleetChanges
 from drone_mesh.ros.world.mesh_state import MeshStatePublisher, WorldView
@@ -33,12 +32,10 @@ from drone_mesh.ros.world.world_runner import WorldRunner
 from drone_mesh.state.links import LostLinks, known_links
 from drone_mesh.state.model import EventRecord, MeshStatus
 from drone_mesh.state.observation import describe_obstacles
-from drone_mesh.view.picture import Scene
-from drone_mesh.view.scene import scene_of
+from drone_mesh.view.scene import Scene, scene_of
 from drone_mesh.view.window_process import WindowProcess
 from drone_mesh.world.bullet_world import BulletWorld
-from drone_mesh.world.drones import VirtualDrone
-from drone_mesh.world.factory import DroneFactory
+from drone_mesh.world.factory import DroneFactory, VirtualDrone
 
 MQTT_SENDER = {0: "with internet mqtt it sends the messages published on the broker"}
 

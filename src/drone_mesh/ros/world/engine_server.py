@@ -1,4 +1,4 @@
-"""EngineServer: the ROS side of a drone's engine (docs/ros.md, "World and flights")."""
+"""The ROS side of the drones' engines, or of those of others (docs/ros.md, "World and flights")."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from drone_mesh.missions import Mission
 from drone_mesh.msg import DroneInfo
 from drone_mesh.msg import Location as LocationMsg
 from drone_mesh.ros.graph import names
-from drone_mesh.ros.graph.conversions import engine_info, gps_response, power_off_info
+from drone_mesh.ros.graph.conversions import NO_POSITION, engine_info, gps_response, power_off_info
 from drone_mesh.ros.graph.logs import ThrottledLog
 from drone_mesh.srv import (
     FlyMission,
@@ -26,8 +26,8 @@ from drone_mesh.srv import (
     RequestGPSResponse,
 )
 from drone_mesh.state.model import EventRecord
-from drone_mesh.world.drones import VirtualDrone
 from drone_mesh.world.engine import DroneState
+from drone_mesh.world.factory import VirtualDrone
 
 INFO_PERIOD_S = 0.05  # at most 20 DroneInfo per simulated second
 _ROUNDING_S = 1e-6  # simulated time moves in hundredths, which floats do not hold exactly
@@ -174,3 +174,27 @@ class EngineServers:
     def withdraw(self, node_id: int) -> None:
         """Withdraw the engine of this drone."""
         self._servers.pop(node_id).close()
+
+
+class ExternalEngines:
+    """Subscribes /WirelessSignalSimulator (DroneInfo): reports of the nodes that fly the drones.
+
+    Those nodes offer what an engine of the world offers: they subscribe /Drones/<id>/goal, offer
+    /Drones/<id>/gps, and publish DroneInfo without `sub`. Callbacks run in threads of rospy.
+    """
+
+    def __init__(self, drones: Callable[[], Sequence[VirtualDrone]]) -> None:
+        """`drones` returns all current drones."""
+        self._drones = drones
+        rospy.Subscriber(
+            names.SIGNAL_TOPIC, DroneInfo, self._reported, queue_size=names.SIGNAL_QUEUE
+        )
+
+    def _reported(self, info: DroneInfo) -> None:
+        x, y, z = info.position
+        has_position = (x, y, z) != NO_POSITION or info.on
+        if info.sub or not has_position or not math.isfinite(x + y + z):
+            return
+        for drone in self._drones():
+            if drone.node_id == info.nodeID:
+                drone.engine.follow((x, y, z))
