@@ -9,6 +9,7 @@ from typing import Sequence
 import actionlib
 import rospy
 
+from drone_mesh import srv
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.drone.fleet import ids_in_words
 from drone_mesh.drone.goal import check_goal
@@ -27,29 +28,6 @@ from drone_mesh.ros.graph.waiting import comes_true
 from drone_mesh.ros.services.order_answers import OrderAnswers, Outcomes
 from drone_mesh.ros.services.order_summary import OrderSummary
 from drone_mesh.ros.services.standing_layouts import Given, StandingLayouts
-from drone_mesh.srv import (
-    Casus,
-    CasusRequest,
-    CasusResponse,
-    OrderFlight,
-    OrderFlightRequest,
-    OrderFlightResponse,
-    OrderFormation,
-    OrderFormationRequest,
-    OrderFormationResponse,
-    OrderLayout,
-    OrderLayoutRequest,
-    OrderLayoutResponse,
-    PreviewLayout,
-    PreviewLayoutRequest,
-    PreviewLayoutResponse,
-    RequestDroneFlight,
-    RequestDroneFlightRequest,
-    RequestDroneFlightResponse,
-    WithdrawLayout,
-    WithdrawLayoutRequest,
-    WithdrawLayoutResponse,
-)
 from drone_mesh.state.standing_orders import PartState
 
 WAIT_FOR_GATEWAY_S = 3.0  # of wall time (docs/ros.md, "Drone manager")
@@ -89,26 +67,28 @@ class DroneManager:
             functools.partial(self._publish, allow_shared_place=True), self._order_case
         )
         for name in (names.REQUEST_MOVEMENT_SERVICE, names.SHORT_REQUEST_MOVEMENT_SERVICE):
-            rospy.Service(name, RequestDroneFlight, self._request_movement)
+            rospy.Service(name, srv.RequestDroneFlight, self._request_movement)
         for name in (names.SET_TO_CASUS_SERVICE, names.SHORT_SET_TO_CASUS_SERVICE):
-            rospy.Service(name, Casus, self._set_to_casus)
-        rospy.Service(names.ORDER_FLIGHT_SERVICE, OrderFlight, self._order_flight)
-        rospy.Service(names.ORDER_LAYOUT_SERVICE, OrderLayout, self._order_layout)
-        rospy.Service(names.ORDER_FORMATION_SERVICE, OrderFormation, self._order_formation)
-        rospy.Service(names.PREVIEW_LAYOUT_SERVICE, PreviewLayout, self._preview_layout)
-        rospy.Service(names.WITHDRAW_LAYOUT_SERVICE, WithdrawLayout, self._withdraw_layout)
+            rospy.Service(name, srv.Casus, self._set_to_casus)
+        rospy.Service(names.ORDER_FLIGHT_SERVICE, srv.OrderFlight, self._order_flight)
+        rospy.Service(names.ORDER_LAYOUT_SERVICE, srv.OrderLayout, self._order_layout)
+        rospy.Service(names.ORDER_FORMATION_SERVICE, srv.OrderFormation, self._order_formation)
+        rospy.Service(names.PREVIEW_LAYOUT_SERVICE, srv.PreviewLayout, self._preview_layout)
+        rospy.Service(names.WITHDRAW_LAYOUT_SERVICE, srv.WithdrawLayout, self._withdraw_layout)
 
-    def _request_movement(self, request: RequestDroneFlightRequest) -> RequestDroneFlightResponse:
+    def _request_movement(
+        self, request: srv.RequestDroneFlightRequest
+    ) -> srv.RequestDroneFlightResponse:
         """Status 1: a gateway has the order; 2: no gateway has a route; 0: there is no gateway."""
         why_not = self._order_one(Order(request.ID, location_of(request)), False)
         if why_not == NO_GATEWAY:
-            return RequestDroneFlightResponse(status=0)
-        return RequestDroneFlightResponse(status=2 if why_not else 1)
+            return srv.RequestDroneFlightResponse(status=0)
+        return srv.RequestDroneFlightResponse(status=2 if why_not else 1)
 
-    def _order_flight(self, request: OrderFlightRequest) -> OrderFlightResponse:
+    def _order_flight(self, request: srv.OrderFlightRequest) -> srv.OrderFlightResponse:
         order = Order(request.id, location_of(request))
         why_not = self._order_one(order, request.allow_shared_place)
-        return OrderFlightResponse(success=not why_not, message=why_not)
+        return srv.OrderFlightResponse(success=not why_not, message=why_not)
 
     def _order_one(self, order: Order, allow_shared_place: bool) -> str:
         """Why the order was not sent; empty if it was. Raises ServiceException: it was refused."""
@@ -131,23 +111,25 @@ class DroneManager:
         _log.warning("drone %d: no gateway has a route to it", drone)
         return f"no gateway has a route to drone {drone}"
 
-    def _set_to_casus(self, request: CasusRequest) -> CasusResponse:
+    def _set_to_casus(self, request: srv.CasusRequest) -> srv.CasusResponse:
         self._order_case(request.caseID, at_once=True)
-        return CasusResponse()
+        return srv.CasusResponse()
 
-    def _order_layout(self, request: OrderLayoutRequest) -> OrderLayoutResponse:
+    def _order_layout(self, request: srv.OrderLayoutRequest) -> srv.OrderLayoutResponse:
         return self._order_case(request.caseID, request.at_once)
 
-    def _order_formation(self, request: OrderFormationRequest) -> OrderFormationResponse:
+    def _order_formation(self, request: srv.OrderFormationRequest) -> srv.OrderFormationResponse:
         answer = self._carry_out(request.name, _formation(request), request.at_once)
-        return OrderFormationResponse(**{name: getattr(answer, name) for name in answer.__slots__})
+        return srv.OrderFormationResponse(
+            **{name: getattr(answer, name) for name in answer.__slots__}
+        )
 
-    def _preview_layout(self, request: PreviewLayoutRequest) -> PreviewLayoutResponse:
+    def _preview_layout(self, request: srv.PreviewLayoutRequest) -> srv.PreviewLayoutResponse:
         known, missing = _in_fleet(self._orders_of(request.caseID), drones_if_known())
         found = self._standing.preview(known, request.at_once)
         if found is None:
             raise rospy.ServiceException("the state of the mesh is not known")
-        return PreviewLayoutResponse(
+        return srv.PreviewLayoutResponse(
             found.duration_s,
             found.least_connected,
             found.out_of_reach,
@@ -158,15 +140,15 @@ class DroneManager:
             found.in_words(),
         )
 
-    def _withdraw_layout(self, request: WithdrawLayoutRequest) -> WithdrawLayoutResponse:
+    def _withdraw_layout(self, request: srv.WithdrawLayoutRequest) -> srv.WithdrawLayoutResponse:
         words = self._standing.withdraw(request.id)
         if words is None:
-            return WithdrawLayoutResponse(False, f"there is no standing order {request.id}")
-        return WithdrawLayoutResponse(True, words)
+            return srv.WithdrawLayoutResponse(False, f"there is no standing order {request.id}")
+        return srv.WithdrawLayoutResponse(True, words)
 
     def _order_case(
         self, case: int, at_once: bool, handle: actionlib.ServerGoalHandle | None = None
-    ) -> OrderLayoutResponse:
+    ) -> srv.OrderLayoutResponse:
         """Order a layout."""
         return self._carry_out(f"layout {case}", self._orders_of(case), at_once, handle)
 
@@ -176,7 +158,7 @@ class DroneManager:
         orders: Sequence[Order],
         at_once: bool,
         handle: actionlib.ServerGoalHandle | None = None,
-    ) -> OrderLayoutResponse:
+    ) -> srv.OrderLayoutResponse:
         """Make a standing order of these."""
         fleet = drones_if_known()
         known, missing = _in_fleet(orders, fleet)
@@ -190,7 +172,7 @@ class DroneManager:
         complete = len(summary.sent) + len(summary.later) == len(known) + len(missing)
         words = summary.in_words()
         _log.log(logging.INFO if complete else logging.WARNING, "%s: %s", name, words)
-        return OrderLayoutResponse(
+        return srv.OrderLayoutResponse(
             given.progress.number,
             summary.sent,
             summary.later,
@@ -284,7 +266,7 @@ def _in_fleet(
     return known, [order.node_id for order in orders if order not in known]
 
 
-def _formation(request: OrderFormationRequest) -> list[Order]:
+def _formation(request: srv.OrderFormationRequest) -> list[Order]:
     """The orders by descending id, as those of a layout. Raises ServiceException."""
     if not (request.name.isprintable() and 0 < len(request.name) <= MAX_NAME):
         raise rospy.ServiceException(f"invalid name: must be 1..{MAX_NAME} printable characters")

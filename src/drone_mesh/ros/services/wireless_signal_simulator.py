@@ -11,6 +11,7 @@ import threading
 import rospy
 from std_msgs.msg import Bool
 
+from drone_mesh import srv
 from drone_mesh.air.node import AirError
 from drone_mesh.air.node_table import NodeTable, Sees
 from drone_mesh.communication.interfaces import PAYLOAD_BYTES
@@ -24,20 +25,6 @@ from drone_mesh.ros.graph.logs import ThrottledLog, show_library_logs_on_rosout
 from drone_mesh.ros.graph.master_watch import MasterWatch
 from drone_mesh.ros.graph.packet_samples import PacketSamples
 from drone_mesh.ros.graph.parameters import configured_obstacles, factory_configuration, or_exit
-from drone_mesh.srv import (
-    AreaScan,
-    AreaScanRequest,
-    AreaScanResponse,
-    Broadcast,
-    BroadcastRequest,
-    BroadcastResponse,
-    WirelessMessage,
-    WirelessMessageRequest,
-    WirelessMessageResponse,
-    WirelessMessages,
-    WirelessMessagesRequest,
-    WirelessMessagesResponse,
-)
 from drone_mesh.state.figures import DELIVERED, LOST_IN_RANGE
 
 STUCK_RECEIVER_S = 0.2  # our choice: a receiver that does not read for this long is disconnected
@@ -101,10 +88,10 @@ class WirelessSignalSimulator:
         self._samples = PacketSamples()
         self._samples.start()
         # The services first: a host that sees the subscription may call at once.
-        rospy.Service(names.MESSAGE_SERVICE, WirelessMessage, self._message)
-        rospy.Service(names.MESSAGES_SERVICE, WirelessMessages, self._messages)
-        rospy.Service(names.OTHERS_IN_RANGE_SERVICE, AreaScan, self._others_in_range)
-        rospy.Service(names.BROADCAST_SERVICE, Broadcast, self._broadcast)
+        rospy.Service(names.MESSAGE_SERVICE, srv.WirelessMessage, self._message)
+        rospy.Service(names.MESSAGES_SERVICE, srv.WirelessMessages, self._messages)
+        rospy.Service(names.OTHERS_IN_RANGE_SERVICE, srv.AreaScan, self._others_in_range)
+        rospy.Service(names.BROADCAST_SERVICE, srv.Broadcast, self._broadcast)
         rospy.Subscriber(names.SIGNAL_TOPIC, DroneInfo, self._drone_info, tcp_nodelay=True)
         rospy.Subscriber(names.JAMMER_TOPIC, Bool, self._jam)
         FiguresPublisher("air", self._figures).start()
@@ -160,19 +147,19 @@ class WirelessSignalSimulator:
             if topic == rospy.resolve_name(info.sub) and kind != NRF24._type:
                 raise AirError(f"node {info.nodeID}: {info.sub[:60]} is a topic of type {kind}")
 
-    def _message(self, request: WirelessMessageRequest) -> WirelessMessageResponse:
+    def _message(self, request: srv.WirelessMessageRequest) -> srv.WirelessMessageResponse:
         with self._lock:
             topic = self._nodes.link(request.from_, request.to)
         if topic is None:
-            return WirelessMessageResponse(False)
+            return srv.WirelessMessageResponse(False)
         if request.from_ == request.to:  # an antenna's probe for its own registration
             listener = self._antenna_topics.get(topic)
-            return WirelessMessageResponse(
+            return srv.WirelessMessageResponse(
                 listener is not None and listener.deliver(request.message)
             )
-        return WirelessMessageResponse(self._carry(topic, request.message))
+        return srv.WirelessMessageResponse(self._carry(topic, request.message))
 
-    def _messages(self, request: WirelessMessagesRequest) -> WirelessMessagesResponse:
+    def _messages(self, request: srv.WirelessMessagesRequest) -> srv.WirelessMessagesResponse:
         joined = request.packets
         if len(joined) % PAYLOAD_BYTES:
             raise rospy.ServiceException(
@@ -181,16 +168,16 @@ class WirelessSignalSimulator:
         packets = [joined[at : at + PAYLOAD_BYTES] for at in range(0, len(joined), PAYLOAD_BYTES)]
         with self._lock:
             topics = [self._nodes.link(request.from_, receiver(packet)) for packet in packets]
-        return WirelessMessagesResponse(
+        return srv.WirelessMessagesResponse(
             [
                 topic is not None and self._carry(topic, NRF24(packet))
                 for packet, topic in zip(packets, topics)
             ]
         )
 
-    def _broadcast(self, request: BroadcastRequest) -> BroadcastResponse:
+    def _broadcast(self, request: srv.BroadcastRequest) -> srv.BroadcastResponse:
         packet = request.message.payload
-        return BroadcastResponse(
+        return srv.BroadcastResponse(
             [
                 node
                 for node, topic in self._topics_in_range(request.from_)
@@ -198,9 +185,9 @@ class WirelessSignalSimulator:
             ]
         )
 
-    def _others_in_range(self, request: AreaScanRequest) -> AreaScanResponse:
+    def _others_in_range(self, request: srv.AreaScanRequest) -> srv.AreaScanResponse:
         topics = self._topics_in_range(request.id)
-        return AreaScanResponse([node for node, topic in topics if self._is_heard(topic)])
+        return srv.AreaScanResponse([node for node, topic in topics if self._is_heard(topic)])
 
     def _topics_in_range(self, node_id: int) -> list[tuple[int, str | None]]:
         """The nodes in range of this one, and the topic of each."""
