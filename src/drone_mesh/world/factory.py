@@ -88,6 +88,10 @@ class DroneFactory:
                 world.add_obstacle(box)
         self.drones: tuple[VirtualDrone, ...] = tuple(self._make(place) for place in fleet)
 
+    def get(self, node_id: int) -> VirtualDrone | None:
+        """The present drone with this id; None: there is none. Any thread."""
+        return next((drone for drone in self.drones if drone.node_id == node_id), None)
+
     def add(
         self, role: Role, longitude: float, latitude: float, node_id: int | None = None
     ) -> VirtualDrone:
@@ -120,16 +124,16 @@ class DroneFactory:
         The last gateway must stay while there are routers, because nothing else could send them
         orders. Any thread.
         """
-        drones = {drone.node_id: drone for drone in self.drones}
-        if node_id not in drones:
+        drone = self.get(node_id)
+        if drone is None:
             raise FleetRefused(f"drone {node_id} does not exist")
-        gateways = [n for n, drone in drones.items() if drone.role is Role.GATEWAY]
-        if gateways == [node_id] and len(drones) > 1:
+        gateways = [other for other in self.drones if other.role is Role.GATEWAY]
+        if gateways == [drone] and len(self.drones) > 1:
             raise FleetRefused(
                 f"drone {node_id} is the last gateway: no order would reach a router any more; "
                 "add another gateway first, or switch this one off"
             )
-        return drones[node_id]
+        return drone
 
     def remove(self, node_id: int) -> None:
         """Remove a drone from the world. Raises FleetRefused as `check_removal` does."""

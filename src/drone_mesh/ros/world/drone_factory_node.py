@@ -6,7 +6,6 @@ import logging
 import time
 from collections import deque
 from dataclasses import replace
-from typing import Sequence
 
 import rospy
 
@@ -35,7 +34,7 @@ from drone_mesh.state.observation import describe_obstacles
 from drone_mesh.view.scene import Scene, scene_of
 from drone_mesh.view.window_process import WindowProcess
 from drone_mesh.world.bullet_world import BulletWorld
-from drone_mesh.world.factory import DroneFactory, VirtualDrone
+from drone_mesh.world.factory import DroneFactory
 
 MQTT_SENDER = {0: "with internet mqtt it sends the messages published on the broker"}
 
@@ -80,10 +79,10 @@ class RosSimulation:
         """Offer the engines, start the nodes, and step the world until `stop` is requested."""
         engines = None
         if self._parameters.configuration.drones == "external":
-            ExternalEngines(self._present)
+            ExternalEngines(self._factory)
         else:
-            engines = EngineServers(self._present, self._happened.append)
-            for drone in self._present():
+            engines = EngineServers(self._factory, self._happened.append)
+            for drone in self._factory.drones:
                 if stop.requested():
                     return
                 engines.offer(drone)
@@ -95,22 +94,17 @@ class RosSimulation:
             if host is not None:
                 host.stop()
 
-    def _present(self) -> Sequence[VirtualDrone]:
-        return self._factory.drones
-
     def _place_of(self, node_id: int) -> Vector:
         """Where the engine of this drone is; NO_POSITION if there is none (yet, or any more)."""
-        for drone in self._present():
-            if drone.node_id == node_id:
-                return drone.engine.state.position
-        return NO_POSITION
+        drone = self._factory.get(node_id)
+        return NO_POSITION if drone is None else drone.engine.state.position
 
     def _make_radios(self) -> EmulatedRadios | None:
         """The emulated chips; None: the radio is virtual."""
         configuration = self._parameters.configuration
         if configuration.radio == "nrf24":
             return EmulatedRadios(
-                self._present(),
+                self._factory.drones,
                 configuration.max_distance,
                 data_rate(configuration.data_rate),
                 configuration.seed,
@@ -127,9 +121,9 @@ class RosSimulation:
             self._parameters.settings, lambda: world.now_s, stop.fail, self._place_of, radios
         )
         host.start()
-        if self._present():
+        if self._factory.drones:
             host.wait_for_radios(stop.requested)
-        host.start_nodes({drone.node_id: drone.role for drone in self._present()})
+        host.start_nodes({drone.node_id: drone.role for drone in self._factory.drones})
         return host
 
     def _step(
@@ -155,7 +149,7 @@ class RosSimulation:
         def read_view() -> WorldView:
             factor, paused = runner.wanted_factor, runner.paused
             now = replace(settings, stamp_s=world.now_s, real_time_factor=factor, paused=paused)
-            return now, drone_views(self._present(), now.stamp_s)
+            return now, drone_views(self._factory.drones, now.stamp_s)
 
         state = MeshStatePublisher(read_view, self._happened)
         state.start()
@@ -194,7 +188,7 @@ class RosSimulation:
             if mesh is None:
                 return Scene(title="starting")
             lost = lost_links.update(known_links(mesh.nodes), time.monotonic())
-            return scene_of(mesh, lost, drone_views(self._present(), self._world.now_s))
+            return scene_of(mesh, lost, drone_views(self._factory.drones, self._world.now_s))
 
         return WindowProcess(read_scene)
 
