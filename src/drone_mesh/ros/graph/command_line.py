@@ -45,20 +45,12 @@ def require_master() -> None:
 def join_graph(name: str) -> None:
     """Register as an anonymous node without rospy's signal handlers. Raises NoMaster."""
     require_master()
-    _init_node(name, anonymous=True, disable_signals=True, disable_rosout=True)
+    rospy.init_node(name, argv=_words(), anonymous=True, disable_signals=True, disable_rosout=True)
 
 
-def _init_node(
-    name: str, *, disable_signals: bool, anonymous: bool = False, disable_rosout: bool = False
-) -> None:
-    """Register; its clock is that of its namespace."""
-    rospy.init_node(
-        name,
-        argv=[*sys.argv, *names.REMAPPINGS],
-        anonymous=anonymous,
-        disable_signals=disable_signals,
-        disable_rosout=disable_rosout,
-    )
+def _words() -> list[str]:
+    """The command line of a node, whose clock is that of its namespace."""
+    return [*sys.argv, *names.REMAPPINGS]
 
 
 def _require_free_name(name: str) -> None:
@@ -107,7 +99,7 @@ def start_node(about: str | None, name: str, *, disable_signals: bool = False) -
     except MeshError as error:
         print(f"{program}: {error}", file=sys.stderr)
         sys.exit(FAILED)
-    _init_node(name, disable_signals=disable_signals)
+    rospy.init_node(name, argv=_words(), disable_signals=disable_signals)
 
 
 def run_tool(name: str, work: Callable[[], int]) -> None:
