@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import functools
 import math
-from typing import Iterable
+from typing import Iterable, Sequence
 
 from drone_mesh.air.obstacles import Obstacles
-from drone_mesh.drone.fleet import MAX_DRONES, StartPlace, plan_fleet
+from drone_mesh.drone.fleet import MAX_DRONES, StartPlace
 from drone_mesh.drone.flight_path import FlightPath, PlanFlight, Vector
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.roles import Role
@@ -61,25 +61,21 @@ class DroneFactory:
     def __init__(
         self,
         world: World,
-        gateways: int,
-        routers: int,
-        gridsize: int,
-        spacing: float,
+        fleet: Sequence[StartPlace],
         wind: Vector | None = None,
         obstacles: Obstacles | None = None,
         cruise_height_m: float = math.inf,
     ) -> None:
-        """Parameters and errors as for `plan_fleet`.
+        """`fleet`: as of `plan_fleet`; `wind`: as for VirtualDrone.
 
-        `wind`: as for VirtualDrone. The `obstacles` are added to the world too; without them,
-        `cruise_height_m` is the ceiling of ordered flights. Raises ConfigurationError if a drone
-        would start in or against an obstacle.
+        The `obstacles` are added to the world too; without them, `cruise_height_m` is the ceiling
+        of ordered flights. Raises ConfigurationError if a drone would start in or against an
+        obstacle.
         """
         self._world = world
         self._wind = wind
         self._for_flights: Obstacles | None = None
         self._plan_flight: PlanFlight = functools.partial(FlightPath, ceiling_m=cruise_height_m)
-        fleet = plan_fleet(gateways, routers, gridsize, spacing)
         if obstacles is not None:
             check_starts(fleet, obstacles)
             self._for_flights = obstacles.for_flights(HALF_WIDTH_M)

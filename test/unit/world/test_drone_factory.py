@@ -18,7 +18,7 @@ from drone_mesh.world.factory import DroneFactory
 
 def make(**changes):
     parameters = {"gateways": 1, "routers": 17, "gridsize": 6, "spacing": 1.0}
-    return DroneFactory(StillWorld(), **{**parameters, **changes})
+    return DroneFactory(StillWorld(), plan_fleet(**{**parameters, **changes}))
 
 
 def test_ids_count_gateways_first_and_then_routers():
@@ -53,7 +53,7 @@ def test_each_drone_starts_with_its_underside_on_the_ground():
 
 def test_each_kind_of_drone_has_a_box_of_its_own_size():
     with BulletWorld() as world:
-        gateway, router = DroneFactory(world, 1, 1, gridsize=1, spacing=1.0).drones
+        gateway, router = DroneFactory(world, plan_fleet(1, 1, gridsize=1, spacing=1.0)).drones
         for drone, size in ((gateway, (0.2, 0.1, 0.2)), (router, (0.2, 0.2, 0.1))):
             (shape,) = pybullet.getCollisionShapeData(drone.box, -1, physicsClientId=world.client)
             assert shape[2] == pybullet.GEOM_BOX

@@ -9,6 +9,7 @@ from still_world import StillWorld
 
 from drone_mesh.air.box import Box
 from drone_mesh.air.obstacles import Obstacles
+from drone_mesh.drone.fleet import plan_fleet
 from drone_mesh.drone.roles import Role
 from drone_mesh.errors import FleetRefused
 from drone_mesh.world.bullet_world import BulletWorld
@@ -16,7 +17,7 @@ from drone_mesh.world.factory import DroneFactory
 
 
 def factory(world=None, gateways=1, routers=3, **more):
-    return DroneFactory(world or StillWorld(), gateways, routers, 6, 1.0, **more)
+    return DroneFactory(world or StillWorld(), plan_fleet(gateways, routers, 6, 1.0), **more)
 
 
 def ids(fleet):

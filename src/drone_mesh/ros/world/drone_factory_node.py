@@ -52,10 +52,7 @@ class RosSimulation:
         configuration = parameters.configuration
         self._factory = DroneFactory(
             world,
-            configuration.gateways,
-            configuration.routers,
-            configuration.gridsize,
-            configuration.spacing,
+            parameters.fleet,
             (configuration.wind_x, configuration.wind_y, 0.0)
             if configuration.flight == "dynamic"
             else None,
