@@ -138,6 +138,11 @@ def another_radio(node: int) -> str:
     return f"another radio uses id {node}"
 
 
+def waypoints(path: Sequence[float]) -> list[Sequence[float]]:
+    """The places in a NodeStatus.path, each (3,) m."""
+    return [path[at : at + 3] for at in range(0, len(path), 3)]
+
+
 def position_is_known(node: NodeStatus) -> bool:
     """Whether the world or the node itself has reported where the node is."""
     return math.isfinite(node.position[0])

@@ -13,7 +13,13 @@ from drone_mesh.drone.flight_path import Vector
 from drone_mesh.drone.roles import Role
 from drone_mesh.state.condition import Condition, condition_of
 from drone_mesh.state.links import Link, LinkUse, links_by_use, shortest
-from drone_mesh.state.model import MeshStatus, NodeStatus, ObstacleStatus, position_is_known
+from drone_mesh.state.model import (
+    MeshStatus,
+    NodeStatus,
+    ObstacleStatus,
+    position_is_known,
+    waypoints,
+)
 from drone_mesh.state.roster import DroneView
 from drone_mesh.state.trouble import find_trouble, summarise
 from drone_mesh.view.fan import Slot, fan_offset, fan_out
@@ -153,7 +159,7 @@ def _drone(node: NodeStatus, seen: NodeStatus | DroneView, slot: Slot | None) ->
         role=Role(node.role),
         position=_vector(seen.position),
         condition=condition_of(node),
-        path=[_vector(seen.path[i : i + 3]) for i in range(0, len(seen.path), 3)],
+        path=[_vector(place) for place in waypoints(seen.path)],
         slot=slot,
     )
 

@@ -22,7 +22,7 @@ from drone_mesh.state.links import (
     links_by_use,
     shortest,
 )
-from drone_mesh.state.model import NodeStatus, ObstacleStatus, position_is_known
+from drone_mesh.state.model import NodeStatus, ObstacleStatus, position_is_known, waypoints
 from drone_mesh.view.fan import fanned_positions
 from drone_mesh.view.palette import DARK, Colour, rgb  # rviz has a dark background
 from drone_mesh.view.quadrocopter import (
@@ -226,8 +226,8 @@ def _path_lines(
 ) -> list[tuple[Sequence[float], ...]]:
     lines: list[tuple[Sequence[float], ...]] = []
     for node in nodes:
-        waypoints = [positions[node.id], *zip(*[iter(node.path)] * 3)]
-        lines += zip(waypoints, waypoints[1:])
+        way = [positions[node.id], *waypoints(node.path)]
+        lines += zip(way, way[1:])
     return lines
 
 
