@@ -8,6 +8,7 @@ from typing import Callable
 
 import rospy
 
+from drone_mesh import srv
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.errors import GoalRefused
 from drone_mesh.missions import Mission
@@ -16,14 +17,6 @@ from drone_mesh.msg import Location as LocationMsg
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import NO_POSITION, engine_info, gps_response, power_off_info
 from drone_mesh.ros.graph.logs import ThrottledLog
-from drone_mesh.srv import (
-    FlyMission,
-    FlyMissionRequest,
-    FlyMissionResponse,
-    RequestGPS,
-    RequestGPSRequest,
-    RequestGPSResponse,
-)
 from drone_mesh.state.model import EventRecord
 from drone_mesh.world.engine import DroneState
 from drone_mesh.world.factory import DroneFactory, VirtualDrone
@@ -65,8 +58,8 @@ class EngineServer:
         self._engine.observe(self._observed)
         self._goals = rospy.Subscriber(names.goal_topic(drone.node_id), LocationMsg, self._goal)
         self._services = [
-            rospy.Service(names.gps_service(drone.node_id), RequestGPS, self._gps),
-            rospy.Service(names.mission_service(drone.node_id), FlyMission, self._mission),
+            rospy.Service(names.gps_service(drone.node_id), srv.RequestGPS, self._gps),
+            rospy.Service(names.mission_service(drone.node_id), srv.FlyMission, self._mission),
         ]
 
     def close(self) -> None:
@@ -75,9 +68,9 @@ class EngineServer:
         for service in self._services:
             service.shutdown()
 
-    def _mission(self, request: FlyMissionRequest) -> FlyMissionResponse:
+    def _mission(self, request: srv.FlyMissionRequest) -> srv.FlyMissionResponse:
         engine = self._engine
-        if request.action == FlyMissionRequest.FLY:
+        if request.action == srv.FlyMissionRequest.FLY:
             places = [(p.longitude, p.latitude, float(p.height)) for p in request.waypoints]
             why_not = engine.why_not_fly()
             try:
@@ -85,15 +78,15 @@ class EngineServer:
             except GoalRefused as error:
                 why_not = str(error)
             if why_not:
-                return FlyMissionResponse(False, f"drone {self._node_id}: {why_not}")
+                return srv.FlyMissionResponse(False, f"drone {self._node_id}: {why_not}")
             engine.fly_with(pilot)
         elif engine.pilot is None:
-            return FlyMissionResponse(False, f"drone {self._node_id} has no mission")
-        elif request.action == FlyMissionRequest.STOP:
+            return srv.FlyMissionResponse(False, f"drone {self._node_id} has no mission")
+        elif request.action == srv.FlyMissionRequest.STOP:
             engine.fly_with(None)
         else:
-            engine.pause_pilot(request.action == FlyMissionRequest.PAUSE)
-        return FlyMissionResponse(True, "")
+            engine.pause_pilot(request.action == srv.FlyMissionRequest.PAUSE)
+        return srv.FlyMissionResponse(True, "")
 
     def _goal(self, goal: LocationMsg) -> None:
         try:
@@ -107,7 +100,7 @@ class EngineServer:
         if kind is not MeshEventKind.GOAL_REFUSED:
             _log.warning("drone %d: %s%s", self._node_id, kind.value, detail and f", {detail}")
 
-    def _gps(self, _request: RequestGPSRequest) -> RequestGPSResponse:
+    def _gps(self, _request: srv.RequestGPSRequest) -> srv.RequestGPSResponse:
         return gps_response(self._engine.get_location())
 
     def _moved(self, state: DroneState) -> None:

@@ -10,6 +10,7 @@ from typing import Mapping
 
 import rospy
 
+from drone_mesh import srv
 from drone_mesh.drone.roles import Role
 from drone_mesh.errors import FleetRefused
 from drone_mesh.ros.graph import names
@@ -22,14 +23,6 @@ from drone_mesh.ros.host.mesh_host import MeshHost
 from drone_mesh.ros.world.engine_server import EngineServers
 from drone_mesh.ros.world.mesh_state import MeshStatePublisher
 from drone_mesh.ros.world.world_runner import WorldRunner
-from drone_mesh.srv import (
-    AddDrone,
-    AddDroneRequest,
-    AddDroneResponse,
-    RemoveDrone,
-    RemoveDroneRequest,
-    RemoveDroneResponse,
-)
 from drone_mesh.world.factory import DroneFactory, VirtualDrone
 
 NODE_TIMEOUT_S = 5.0  # our choice, wall: how long a node may take to start or to end
@@ -74,8 +67,8 @@ class FleetChanges:
         self._worker = ThreadPoolExecutor(1, "fleet changes")
         self._publish()
         self._services = (
-            rospy.Service(names.ADD_DRONE_SERVICE, AddDrone, self._add_requested),
-            rospy.Service(names.REMOVE_DRONE_SERVICE, RemoveDrone, self._remove_requested),
+            rospy.Service(names.ADD_DRONE_SERVICE, srv.AddDrone, self._add_requested),
+            rospy.Service(names.REMOVE_DRONE_SERVICE, srv.RemoveDrone, self._remove_requested),
         )
 
     def stop(self) -> None:
@@ -86,23 +79,23 @@ class FleetChanges:
 
     # Threads of rospy ------------------------------------------------------------------------
 
-    def _add_requested(self, request: AddDroneRequest) -> AddDroneResponse:
+    def _add_requested(self, request: srv.AddDroneRequest) -> srv.AddDroneResponse:
         try:
             return self._worker.submit(self._add, request).result()
         except FleetRefused as error:
-            return AddDroneResponse(success=False, id=request.id, message=str(error))
+            return srv.AddDroneResponse(success=False, id=request.id, message=str(error))
 
-    def _remove_requested(self, request: RemoveDroneRequest) -> RemoveDroneResponse:
+    def _remove_requested(self, request: srv.RemoveDroneRequest) -> srv.RemoveDroneResponse:
         try:
             return self._worker.submit(self._remove, request.id).result()
         except FleetRefused as error:
-            return RemoveDroneResponse(success=False, message=str(error))
+            return srv.RemoveDroneResponse(success=False, message=str(error))
 
     # The thread of the changes ---------------------------------------------------------------
 
-    def _add(self, request: AddDroneRequest) -> AddDroneResponse:
+    def _add(self, request: srv.AddDroneRequest) -> srv.AddDroneResponse:
         role = Role.GATEWAY if request.gateway else Role.ROUTER
-        wanted = None if request.id == AddDroneRequest.LOWEST_FREE else request.id
+        wanted = None if request.id == srv.AddDroneRequest.LOWEST_FREE else request.id
 
         def spawn() -> VirtualDrone:
             drone = self._factory.add(role, request.longitude, request.latitude, wanted)
@@ -124,9 +117,9 @@ class FleetChanges:
             f"{self._await_start(node_id, host)}"
         )
         _log.info("%s", message)
-        return AddDroneResponse(success=True, id=node_id, message=message)
+        return srv.AddDroneResponse(success=True, id=node_id, message=message)
 
-    def _remove(self, node_id: int) -> RemoveDroneResponse:
+    def _remove(self, node_id: int) -> srv.RemoveDroneResponse:
         drone = self._factory.check_removal(node_id)
         if node_id in self._needed:
             raise FleetRefused(f"drone {node_id} cannot be removed: {self._needed[node_id]}")
@@ -142,7 +135,7 @@ class FleetChanges:
         self._state.forget(node_id)
         message = f"removed {drone.role.word} {node_id}"
         _log.info("%s", message)
-        return RemoveDroneResponse(success=True, message=message)
+        return srv.RemoveDroneResponse(success=True, message=message)
 
     def _least_busy_host(self) -> str:
         """The host with the fewest added drones; empty: there is none."""
