@@ -27,8 +27,8 @@ class HostReports(Periodic):
     Publishes: /mesh/reports (HostReport), once or twice a second of wall time, also while time
                stands still
 
-    The workers call `add` and `drop`, any thread calls `observe`. Each node's worker makes its
-    NodeState, which does not change any more.
+    The worker calls `add` and `drop`, any thread calls `observe`. The worker makes the NodeState of
+    each node, which does not change any more.
     """
 
     def __init__(self) -> None:

@@ -32,7 +32,7 @@ class MeshHost:
 
     Figures: worst timer lag, lost in range, on /diagnostics
 
-    Any thread may call every function. The workers fill `nodes`, each with the nodes it drives.
+    Any thread may call every function. The worker fills `nodes`.
     """
 
     def __init__(

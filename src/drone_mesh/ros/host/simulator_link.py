@@ -69,7 +69,7 @@ class SimulatorLink(Radios, rospy.SubscribeListener):
         self._thread.start()
 
     def fall_silent(self) -> None:
-        """Stop looking, returns when the thread has ended; sends to a simulator stay quick."""
+        """Stop looking for a simulator; returns when the thread has ended."""
         self._stopping = True
         self._wake.set()
         if self._thread.is_alive():
