@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import functools
 import logging
-import threading
 import time
 from typing import Callable, Mapping
 
 from drone_mesh.drone.roles import Role
 from drone_mesh.errors import MeshError
-from drone_mesh.execution import MeshExecutor
+from drone_mesh.execution import ExecutorSlot, MeshExecutor
 from drone_mesh.ros.graph.figures import FiguresPublisher
 from drone_mesh.ros.graph.waiting import comes_true
 from drone_mesh.ros.host.announcements import PlaceOf
@@ -100,15 +99,16 @@ class MeshHost:
         begun_s = time.monotonic()
         if not nodes:
             return
-        left = threading.Semaphore(len(nodes) - 1)  # emulated radios start in parallel
+        for node_id, role in nodes.items():
+            slot = self.executor.slot()
+            slot.submit(functools.partial(self._start_node, node_id, role, slot))
 
-        def on_start() -> None:
-            if not left.acquire(blocking=False) and not self._stopping:
+        def report(_now_s: float) -> None:
+            if self.nodes.keys() >= nodes.keys() and not self._stopping:
                 noun = "node" if len(nodes) == 1 else "nodes"
                 _log.info("started %d %s in %.1f s", len(nodes), noun, time.monotonic() - begun_s)
 
-        for node_id, role in nodes.items():
-            self._submit_start(node_id, role, on_start)
+        self.executor.submit(report)
 
     def end_node(self, node_id: int) -> None:
         """End this node for good; returns at once. An unknown node is ignored."""
@@ -144,30 +144,19 @@ class MeshHost:
             **self._radios.figures(),
         }
 
-    def _submit_start(self, node_id: int, role: Role, on_start: Callable[[], None]) -> None:
-        slot = self.executor.slot()
-
-        def start(now_s: float) -> None:
-            if self._stopping:
-                return
-            try:
-                antenna = self._radios.antenna(node_id, slot)
-                why_not_fly = functools.partial(self._grounded.reason, node_id)
-                node = VirtualRaspberryPi(
-                    node_id,
-                    role,
-                    self._settings,
-                    self._reports.observe,
-                    antenna,
-                    slot,
-                    why_not_fly,
-                )
-                self._reports.add(role, node.component, slot, antenna.on)
-                node.start(now_s)
-            except MeshError as error:  # retrying would not help
-                self._on_failure(f"node {node_id} cannot start: {error}")
-            else:
-                self.nodes[node_id] = node
-                on_start()
-
-        slot.submit(start)
+    def _start_node(self, node_id: int, role: Role, slot: ExecutorSlot, now_s: float) -> None:
+        if self._stopping:
+            return
+        try:
+            antenna = self._radios.antenna(node_id, slot)
+            why_not_fly = functools.partial(self._grounded.reason, node_id)
+            observer = self._reports.observe
+            node = VirtualRaspberryPi(
+                node_id, role, self._settings, observer, antenna, slot, why_not_fly
+            )
+            self._reports.add(role, node.component, slot, antenna.on)
+            node.start(now_s)
+        except MeshError as error:  # retrying would not help
+            self._on_failure(f"node {node_id} cannot start: {error}")
+        else:
+            self.nodes[node_id] = node
