@@ -18,7 +18,7 @@ from drone_mesh.drone.roles import Role
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.state.condition import Condition
 from drone_mesh.view.palette import LIGHT, rgb
-from drone_mesh.view.picture import DronePicture, Scene
+from drone_mesh.view.scene import DronePicture, Scene
 from drone_mesh.view.window_process import WindowProcess, require_screen
 
 LONG_S = 60.0  # a deadline for software rendering on a busy machine

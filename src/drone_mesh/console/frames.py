@@ -38,7 +38,7 @@ from drone_mesh.state.outages import MeshSample, take_sample
 from drone_mesh.state.trouble import Trouble, find_trouble, summarise
 from drone_mesh.view.fan import fan_out
 from drone_mesh.view.palette import node_colour_name
-from drone_mesh.view.picture import shape_named
+from drone_mesh.view.scene import shape_named
 
 EVENTS_KEPT = 1000  # our choice: more than a person scrolls back
 EVENTS_PER_FRAME = 300  # of a burst of thousands only the newest are read

@@ -18,7 +18,7 @@ from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath, PlanFlight
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
 from drone_mesh.state.airspace import APART_M, Airspace
-from drone_mesh.state.model import MeshStatus, NodeStatus, position_is_known
+from drone_mesh.state.model import MeshStatus, NodeStatus, position_is_known, waypoints
 from drone_mesh.state.reach import Reach
 
 AT_PLACE_M = 0.5  # our choice: heights are rounded to whole metres, and physics moves drones
@@ -70,8 +70,7 @@ class Departures:
         self._ends: dict[int, Location] = {}  # of all drones that fly or are about to
         for node in self._nodes.values():
             if len(node.path):
-                path = list(node.path)
-                ahead = [path[corner : corner + 3] for corner in range(0, len(path), 3)]
+                ahead = waypoints(list(node.path))
                 way = [list(node.position), *ahead]
                 if rules.sway_m:  # it may be behind its path, and climbs before it goes across
                     high_m = max(corner[2] for corner in way)

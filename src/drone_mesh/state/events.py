@@ -8,13 +8,10 @@ from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.observer import MeshEvent, MeshEventKind
 from drone_mesh.state.model import EventRecord
 
-_SEVERAL_AT_ONCE = frozenset(
-    kind.value
-    for kind in (
-        MeshEventKind.NEIGHBOUR_FOUND,
-        MeshEventKind.NEIGHBOUR_LOST,
-        MeshEventKind.NODE_MISSING,
-    )
+_SEVERAL_AT_ONCE = (
+    MeshEventKind.NEIGHBOUR_FOUND,
+    MeshEventKind.NEIGHBOUR_LOST,
+    MeshEventKind.NODE_MISSING,
 )
 EVENTS_KEPT = 100_000  # our choice: twice what 254 nodes that find 200 neighbours each produce
 
@@ -36,21 +33,18 @@ class EventBatcher:
 
     def take(self) -> list[EventRecord]:
         """All events since the last call, oldest first."""
-        batch: list[EventRecord] = []
-        peers_of: list[list[int]] = []
-        latest_of: dict[int, int] = {}
+        batch: list[tuple[MeshEvent, list[int]]] = []  # each with all its peers
+        latest_of: dict[int, tuple[MeshEvent, list[int]]] = {}
         for _ in range(len(self._waiting)):
             event = self._waiting.popleft()
             peers = [] if event.peer == NO_ROUTE else [event.peer]
-            latest = latest_of.get(event.node)
-            kind = event.kind.value
-            if kind in _SEVERAL_AT_ONCE and latest is not None and batch[latest].kind == kind:
-                peers_of[latest] += [peer for peer in peers if peer not in peers_of[latest]]
-                continue
-            latest_of[event.node] = len(batch)
-            batch.append(EventRecord(event.now_s, event.node, kind, (), event.detail))
-            peers_of.append(peers)
+            latest, known = latest_of.get(event.node, (None, []))
+            if latest is not None and latest.kind is event.kind and event.kind in _SEVERAL_AT_ONCE:
+                known += [peer for peer in peers if peer not in known]
+            else:
+                latest_of[event.node] = event, peers
+                batch.append((event, peers))
         return [
-            EventRecord(event.stamp_s, event.node, event.kind, tuple(peers), event.detail)
-            for event, peers in zip(batch, peers_of)
+            EventRecord(event.now_s, event.node, event.kind.value, tuple(peers), event.detail)
+            for event, peers in batch
         ]

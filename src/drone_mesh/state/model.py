@@ -108,7 +108,7 @@ class MeshStatus:
     routing: str = ""  # name of the routing technique; empty: not known
     repair_strategy: str = ""  # name of the repair strategy; empty: not known
     obstacles: Sequence[ObstacleStatus] = ()
-    shape: str = ""  # how drones are drawn: a value of view.picture.Shape; empty: the default
+    shape: str = ""  # how drones are drawn: a value of view.scene.Shape; empty: the default
     layouts: Sequence[str] = ()  # how far each ordered layout has come, in words
 
 
@@ -136,6 +136,11 @@ def data_in_words(node: NodeStatus) -> str:
 def another_radio(node: int) -> str:
     """What is wrong if a node shares its id."""
     return f"another radio uses id {node}"
+
+
+def waypoints(path: Sequence[float]) -> list[Sequence[float]]:
+    """The places in a NodeStatus.path, each (3,) m."""
+    return [path[at : at + 3] for at in range(0, len(path), 3)]
 
 
 def position_is_known(node: NodeStatus) -> bool:

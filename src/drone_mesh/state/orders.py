@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass
-from typing import Iterable, Sequence
+from typing import Iterable
 
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.order_record import OrderState
@@ -17,7 +17,7 @@ from drone_mesh.communication.orders.book import EVENT_OF
 from drone_mesh.communication.orders.intake import ARRIVED_WITHIN_M
 from drone_mesh.drone.flight_path import CLIMB_ENDS_AT, SPEED_M_S
 from drone_mesh.drone.location import Location
-from drone_mesh.state.model import EventRecord, NodeStatus, position_is_known
+from drone_mesh.state.model import EventRecord, NodeStatus, position_is_known, waypoints
 
 _STATE_OF = {kind.value: state for state, kind in EVENT_OF.items()}
 _DEEDS = {  # of a drone, that explain why it is not where it was ordered to
@@ -84,7 +84,7 @@ def way_left(node: NodeStatus, goal: Location) -> tuple[float, float] | None:
         return None
     if Location.from_vector(node.path[-3:]).distance_m(goal) > ARRIVED_WITHIN_M:
         return None
-    corners = [node.position, *_triples(node.path)]
+    corners = [node.position, *waypoints(node.path)]
     seconds = sum(
         math.dist(one[:2], other[:2]) / _ACROSS_M_S + abs(other[2] - one[2]) / _UPRIGHT_M_S
         for one, other in zip(corners, corners[1:])
@@ -208,7 +208,3 @@ def _order_in(event: EventRecord) -> FollowedOrder | None:
     if state is None or len(event.peers) != 1 or not name:
         return None
     return FollowedOrder(event.node, name, state, reason)
-
-
-def _triples(values: Sequence[float]) -> list[Sequence[float]]:
-    return [values[at : at + 3] for at in range(0, len(values), 3)]

@@ -33,29 +33,23 @@ class MeshRoster:
 
     def __init__(self) -> None:
         self._nodes: dict[int, NodeStatus] = {}
+        self._host_of: dict[int, str] = {}
         self._heard_at_s: dict[int, float] = {}
-        self._ids_of_host: dict[str, set[int]] = {}
 
     def merge_report(self, host: str, nodes: Iterable[NodeStatus], wall_s: float) -> None:
         """Apply a report of `host`. A node that moved to another host belongs to the new one."""
         reported = {node.id: node for node in nodes}
-        for gone in self._ids_of_host.get(host, set()) - reported.keys():
-            del self._nodes[gone]
-            del self._heard_at_s[gone]
-        for other, ids in self._ids_of_host.items():
-            if other != host:
-                ids.difference_update(reported)
-        self._ids_of_host[host] = set(reported)
+        for node_id in [n for n, other in self._host_of.items() if other == host]:
+            if node_id not in reported:
+                self.forget(node_id)
         self._nodes.update(reported)
-        for node in reported:
-            self._heard_at_s[node] = wall_s
+        self._host_of.update(dict.fromkeys(reported, host))
+        self._heard_at_s.update(dict.fromkeys(reported, wall_s))
 
     def forget(self, node_id: int) -> None:
         """Drop this removed node; an unknown one is ignored."""
-        self._nodes.pop(node_id, None)
-        self._heard_at_s.pop(node_id, None)
-        for ids in self._ids_of_host.values():
-            ids.discard(node_id)
+        for known in (self._nodes, self._host_of, self._heard_at_s):
+            known.pop(node_id, None)
 
     def snapshot(self, drones: Iterable[DroneView], wall_s: float) -> list[NodeStatus]:
         """All nodes by id, with positions, paths, routes and report ages filled in.

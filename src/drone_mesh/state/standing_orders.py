@@ -112,22 +112,15 @@ class StandingProgress:
         return ", ".join(words)
 
 
+@dataclass
 class _StandingOrder:
     """One layout or formation that was ordered."""
 
-    def __init__(
-        self,
-        number: int,
-        name: str,
-        goals: Mapping[int, Location],
-        given_s: float,
-        at_once: bool,
-    ) -> None:
-        self.number = number
-        self.name = name
-        self.given_s = given_s
-        self.at_once = at_once
-        self.parts = {drone: _Part(goal) for drone, goal in goals.items()}
+    number: int
+    name: str
+    parts: Mapping[int, _Part]  # by drone
+    given_s: float
+    at_once: bool
 
     def is_moving(self) -> bool:
         """Whether a drone is still to come to its place: it may bring the others the mesh."""
@@ -164,11 +157,10 @@ class StandingOrders:
         the next `update`.
         """
         self.replace(goals)
-        self._last_number += 1
-        self._orders[self._last_number] = _StandingOrder(
-            self._last_number, name, goals, now_s, at_once
-        )
-        return self._last_number
+        number = self._last_number = self._last_number + 1
+        parts = {drone: _Part(goal) for drone, goal in goals.items()}
+        self._orders[number] = _StandingOrder(number, name, parts, now_s, at_once)
+        return number
 
     def replace(self, drones: Iterable[int]) -> None:
         """Another order for these drones followed."""
@@ -323,10 +315,10 @@ class StandingOrders:
     def restore(self, saved: Iterable[Mapping[str, Any]]) -> None:
         """Go on with what `saved` returned."""
         for entry in saved:
-            goals = {int(drone): Location(*goal) for drone, goal in entry["goals"].items()}
+            parts = {int(n): _Part(Location(*goal)) for n, goal in entry["goals"].items()}
             number = int(entry["number"])
             self._orders[number] = _StandingOrder(
-                number, str(entry["name"]), goals, -math.inf, bool(entry["at_once"])
+                number, str(entry["name"]), parts, -math.inf, bool(entry["at_once"])
             )
             self._last_number = max(self._last_number, number)
 

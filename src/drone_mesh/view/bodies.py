@@ -14,8 +14,8 @@ from drone_mesh.drone.roles import Role
 from drone_mesh.state.model import ObstacleStatus
 from drone_mesh.view.camera import Camera
 from drone_mesh.view.palette import FRAME, LIGHT, ROTOR, Colour, rgb
-from drone_mesh.view.picture import DronePicture, Scene, Shape
 from drone_mesh.view.quadrocopter import MOTORS, BodyPart, solid_of, turned_rad
+from drone_mesh.view.scene import DronePicture, Scene, Shape
 from drone_mesh.view.solids import normal
 from drone_mesh.world.bullet_world import UPRIGHT
 

@@ -45,7 +45,13 @@ class Camera:
 
     def project(self, points: Sequence[Vector]) -> np.ndarray:
         """(n, 2) pixels of these points; NaN for what lies behind the camera."""
-        clip = self._clip(points)
+        view, projection = (
+            np.array(matrix).reshape(4, 4).T
+            for matrix in (self.view_matrix(), self.projection_matrix())
+        )
+        homogeneous = np.ones((len(points), 4))
+        homogeneous[:, :3] = np.array(points, dtype=float).reshape(-1, 3)
+        clip = homogeneous @ (projection @ view).T
         behind = clip[:, 3] <= 0
         clip[behind] = np.nan
         ndc = clip[:, :2] / clip[:, 3:]
@@ -82,22 +88,6 @@ class Camera:
         aside_m = np.array([x, -y]) / (self.size[1] / 2) * half_height_m
         eye = np.array(self.target) - forward * self.distance_m
         return _vector(eye + forward * depth_m + right * aside_m[0] + up * aside_m[1])
-
-    def _matrix(self) -> np.ndarray:
-        """World to clip space, (4, 4)."""
-        view, projection = (
-            np.array(matrix).reshape(4, 4).T
-            for matrix in (self.view_matrix(), self.projection_matrix())
-        )
-        matrix: np.ndarray = projection @ view
-        return matrix
-
-    def _clip(self, points: Sequence[Vector]) -> np.ndarray:
-        """(n, 4) clip coordinates."""
-        homogeneous = np.ones((len(points), 4))
-        homogeneous[:, :3] = np.array(points, dtype=float).reshape(-1, 3)
-        clip: np.ndarray = homogeneous @ self._matrix().T
-        return clip
 
 
 class Margins(NamedTuple):

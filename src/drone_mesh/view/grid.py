@@ -6,7 +6,7 @@ import math
 
 from drone_mesh.drone.flight_path import Vector
 from drone_mesh.view.palette import AXIS, GRID, LIGHT, SHADOW
-from drone_mesh.view.picture import Scene, Shape
+from drone_mesh.view.scene import Scene, Shape
 from drone_mesh.view.sketch import OVERSAMPLING, Sketch
 from drone_mesh.view.solids import polygon
 

@@ -11,7 +11,7 @@ import math
 from typing import Tuple
 
 from drone_mesh.drone.roles import Role
-from drone_mesh.view.solids import Solid, bar, dome, normal, polygon, prism
+from drone_mesh.view.solids import Solid, bar, dome, polygon, prism
 
 MOTORS = ((0.063, 0.063), (-0.063, 0.063), (-0.063, -0.063), (0.063, -0.063))  # x, y
 ROTOR_RADIUS_M = 0.037
@@ -84,24 +84,3 @@ def _gateway_lamp() -> Solid:
     hull = prism(polygon((0.0, 0.0), 0.075, 4, math.pi / 4), 0.056, 0.1)
     mast = prism(polygon((0.0, 0.0), 0.012, 6), 0.1, 0.17)
     return hull + mast + prism(polygon((0.0, 0.0), 0.034, 8), 0.17, 0.2)
-
-
-def obj(solid: Solid) -> str:
-    """A solid as a Wavefront OBJ file, with a normal for each triangle."""
-    lines = ["# written by scripts/meshes"]
-    lines += [f"v {x:.4f} {y:.4f} {z:.4f}" for triangle in solid for x, y, z in triangle]
-    lines += ["vn {:.4f} {:.4f} {:.4f}".format(*normal(triangle)) for triangle in solid]
-    for i in range(len(solid)):
-        lines.append("f " + " ".join(f"{3 * i + corner}//{i + 1}" for corner in (1, 2, 3)))
-    return "\n".join(lines) + "\n"
-
-
-def mesh_files() -> dict[str, str]:
-    """The files of meshes/: one for each part that has its own colour in rviz, by name."""
-    frame = solid_of(Role.ROUTER, BodyPart.FRAME)
-    solids = {
-        "standing": frame + solid_of(Role.ROUTER, BodyPart.BLADES),
-        "flying": frame + solid_of(Role.ROUTER, BodyPart.DISCS),
-        **{f"{role.word}_lamp": solid_of(role, BodyPart.LAMP) for role in Role},
-    }
-    return {f"{name}.obj": obj(solid) for name, solid in solids.items()}

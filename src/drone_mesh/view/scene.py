@@ -1,20 +1,134 @@
-"""Turns the state of a mesh into a scene, for the world's window and for snapshots."""
+"""Scenes: what a picture of the world shows, made from the state of a mesh."""
 
 from __future__ import annotations
 
-from typing import Iterable
+import enum
+import math
+from dataclasses import dataclass
+from typing import Iterable, Sequence
+
+import numpy as np
 
 from drone_mesh.drone.flight_path import Vector
 from drone_mesh.drone.roles import Role
-from drone_mesh.state.condition import condition_of
-from drone_mesh.state.links import Link, links_by_use, shortest
-from drone_mesh.state.model import MeshStatus, NodeStatus, position_is_known
+from drone_mesh.state.condition import Condition, condition_of
+from drone_mesh.state.links import Link, LinkUse, links_by_use, shortest
+from drone_mesh.state.model import (
+    MeshStatus,
+    NodeStatus,
+    ObstacleStatus,
+    position_is_known,
+    waypoints,
+)
 from drone_mesh.state.roster import DroneView
 from drone_mesh.state.trouble import find_trouble, summarise
-from drone_mesh.view.fan import Slot, fan_out
-from drone_mesh.view.picture import DronePicture, LinkPicture, Scene, shape_named
+from drone_mesh.view.fan import Slot, fan_offset, fan_out
+from drone_mesh.view.palette import LIGHT, Colour
 
 MOST_LINKS = 600  # our choice, per use: more cannot be told apart
+DRONE_WIDTH_M = max(Role.ROUTER.size_m)
+HALF_DIAGONAL_M = DRONE_WIDTH_M / math.sqrt(2)
+WIDEST_OF_CROWDING = 0.3  # greatest drawn width of a drone, as a share of the drones' distance
+
+
+class Shape(enum.Enum):
+    """The appearance of drones. The value is used in launch arguments and options."""
+
+    QUADROCOPTER = "quadrocopter"
+    BOX = "box"
+
+
+def shape_named(word: str) -> Shape:
+    """The shape with this value; the default for an unknown word."""
+    return Shape.BOX if word == Shape.BOX.value else Shape.QUADROCOPTER
+
+
+@dataclass(frozen=True)
+class DronePicture:
+    """One drone in a picture."""
+
+    node_id: int
+    role: Role
+    position: Vector  # of the underside, metres, world frame; finite
+    condition: Condition = Condition.CONNECTED
+    path: Sequence[Vector] = ()  # remaining waypoints, the goal last; empty: not flying
+    slot: Slot | None = None  # among the drones at its position; None: it is the only one
+
+    @property
+    def colour(self) -> Colour:
+        """The colour of its role and condition."""
+        return LIGHT.of_node(self.role, self.condition)
+
+    def size_m(self, scale: float = 1.0) -> Vector:
+        """Edges of its box, along x, y, z."""
+        x, y, z = self.role.size_m
+        return (x * scale, y * scale, z * scale)
+
+    @property
+    def is_flying(self) -> bool:
+        """Whether it is on a flight."""
+        return bool(self.path)
+
+    def underside(self, scale: float = 1.0) -> Vector:
+        """Like `centre`, for the middle of its underside."""
+        x, y, z = self.centre(scale)
+        return (x, y, z - self.size_m(scale)[2] / 2)
+
+    def centre(self, scale: float = 1.0) -> Vector:
+        """Where to draw the centre of its box, `scale` times as large and on the same ground.
+
+        Drones at one position are fanned out around it.
+        """
+        x, y, z = self.position
+        aside_m, ahead_m = fan_offset(self.slot, HALF_DIAGONAL_M * scale) if self.slot else (0, 0)
+        return (x + aside_m, y + ahead_m, z + self.size_m(scale)[2] / 2)
+
+
+@dataclass(frozen=True)
+class LinkPicture:
+    """A link between two node ids; not drawn if one of them is not shown."""
+
+    start: int
+    end: int
+    use: LinkUse = LinkUse.KNOWN
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Everything that is visible at one moment."""
+
+    drones: Sequence[DronePicture] = ()
+    links: Sequence[LinkPicture] = ()
+    title: str = ""
+    obstacles: Sequence[ObstacleStatus] = ()
+    shape: Shape = Shape.QUADROCOPTER
+
+    def points(self) -> list[Vector]:
+        """Every point that must be inside the picture."""
+        return [drone.position for drone in self.drones] + [
+            waypoint for drone in self.drones for waypoint in drone.path
+        ]
+
+
+def crowding_m(drones: Sequence[DronePicture]) -> float:
+    """How closely drones are spaced: the median distance to the nearest other one, in metres.
+
+    Infinite for fewer than two drones. A single close pair hardly affects it.
+    """
+    positions = np.array([drone.position for drone in drones], dtype=float).reshape(-1, 3)
+    if len(positions) < 2:
+        return math.inf
+    distances_m = np.linalg.norm(positions[:, None] - positions[None, :], axis=2)
+    np.fill_diagonal(distances_m, np.inf)
+    return float(np.median(distances_m.min(axis=1)))
+
+
+def drawing_scale(drones: Sequence[DronePicture], wanted: float) -> float:
+    """How much to enlarge drones: 1..`wanted`, less where they are crowded.
+
+    At its true size a drone of 0.2 m is a dot in a fleet that spans 100 m.
+    """
+    return max(1.0, min(wanted, WIDEST_OF_CROWDING * crowding_m(drones) / DRONE_WIDTH_M))
 
 
 def scene_of(mesh: MeshStatus, lost: Iterable[Link] = (), views: Iterable[DroneView] = ()) -> Scene:
@@ -45,7 +159,7 @@ def _drone(node: NodeStatus, seen: NodeStatus | DroneView, slot: Slot | None) ->
         role=Role(node.role),
         position=_vector(seen.position),
         condition=condition_of(node),
-        path=[_vector(seen.path[i : i + 3]) for i in range(0, len(seen.path), 3)],
+        path=[_vector(place) for place in waypoints(seen.path)],
         slot=slot,
     )
 

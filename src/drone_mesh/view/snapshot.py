@@ -6,17 +6,18 @@ pybullet's software renderer draws drones and obstacles; Pillow draws lines, das
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Sequence
+from typing import Iterator, Sequence, Tuple
 
 from PIL import Image
 
+from drone_mesh.drone.roles import Role
+from drone_mesh.state.condition import Condition
 from drone_mesh.state.links import LinkUse
 from drone_mesh.view.bodies import paste_bodies
 from drone_mesh.view.camera import Camera, Margins, frame
 from drone_mesh.view.grid import draw_ground
-from drone_mesh.view.legend import legend_of
-from drone_mesh.view.palette import GROUND, LIGHT
-from drone_mesh.view.picture import (
+from drone_mesh.view.palette import GROUND, LIGHT, Colour
+from drone_mesh.view.scene import (
     DRONE_WIDTH_M,
     DronePicture,
     Scene,
@@ -30,7 +31,11 @@ LEGEND_WIDTH = 168  # pixels
 NARROWEST_WITH_LEGEND = 500  # pixels; narrower pictures have no legend
 DRONE_PIXELS = 36  # approximate width of a drone
 SMALLEST_ID, LARGEST_ID = 9.0, 15.0  # pixels: height of the text
+NODE_HEIGHT, LINK_HEIGHT, PATH_HEIGHT = 12.0, 3.0, 2.0  # pixels, of the swatch in the legend
 MARGINS = Margins(left=64, top=56, right=24, bottom=56)  # pixels
+
+
+_LegendRow = Tuple[str, Colour, float]  # meaning and colour; height of the swatch, pixels
 
 
 def render(scene: Scene, path: str | Path, size: tuple[int, int] = DEFAULT_SIZE) -> None:
@@ -99,7 +104,29 @@ def _draw_ids(sketch: Sketch, drones: Sequence[DronePicture], scale: float) -> N
 def _draw_legend(sketch: Sketch, scene: Scene) -> None:
     """In the upper right corner."""
     left = sketch.size[0] - LEGEND_WIDTH
-    for i, row in enumerate(legend_of(scene)):
+    for i, (text, colour, height) in enumerate(_legend_of(scene)):
         y = 24.0 + 22 * i
-        sketch.swatch((left, y), row.colour, row.height)
-        sketch.words((left + 24, y), row.text, 14, LIGHT.ink, "lm")
+        sketch.swatch((left, y), colour, height)
+        sketch.words((left + 24, y), text, 14, LIGHT.ink, "lm")
+
+
+def _legend_of(scene: Scene) -> Iterator[_LegendRow]:
+    """Connected gateways and routers, other conditions, obstacles, flight paths and links."""
+    for role in (Role.GATEWAY, Role.ROUTER):
+        connected = sum(
+            drone.role is role and drone.condition is Condition.CONNECTED for drone in scene.drones
+        )
+        if connected:
+            colour = LIGHT.of_node(role, Condition.CONNECTED)
+            yield f"{role.word} ({connected})", colour, NODE_HEIGHT
+    for condition in Condition:
+        count = sum(drone.condition is condition for drone in scene.drones)
+        if count and condition is not Condition.CONNECTED:
+            yield f"{condition.value} ({count})", LIGHT.of_node(Role.ROUTER, condition), NODE_HEIGHT
+    if scene.obstacles:
+        yield f"obstacle ({len(scene.obstacles)})", LIGHT.obstacle, NODE_HEIGHT
+    if any(drone.path for drone in scene.drones):
+        yield "flight path", LIGHT.path, PATH_HEIGHT
+    for use in LinkUse:
+        if any(link.use is use for link in scene.links):
+            yield use.value, LIGHT.of_link(use), LINK_HEIGHT

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import os
+import tempfile
+from pathlib import Path
 from typing import Callable
 
 import pybullet
+from PIL import Image, ImageDraw
 
 from drone_mesh.state.links import LinkUse
-from drone_mesh.view.ground import lay_ground
-from drone_mesh.view.palette import LIGHT, SKY, rgb
-from drone_mesh.view.picture import DRONE_WIDTH_M, Scene, drawing_scale
+from drone_mesh.view.palette import GROUND, LIGHT, SHADOW, SKY, rgb
+from drone_mesh.view.scene import DRONE_WIDTH_M, Scene, drawing_scale
 from drone_mesh.view.window_camera import WindowCamera
 from drone_mesh.view.window_items import Line, WindowItems
 
@@ -26,6 +29,7 @@ DRONE_PIXELS = 30  # approximate width of a drone
 RESCALE_AT = 1.25  # drones get a new size when theirs is wrong by this factor
 TURN_DEG = 2.0  # per check of the keys
 ZOOM = 1.03  # per check of the keys
+TILE_PIXELS = 256  # of a square of the ground
 
 
 class WorldWindow:
@@ -49,7 +53,7 @@ class WorldWindow:
             pybullet.COV_ENABLE_MOUSE_PICKING,
         ):
             pybullet.configureDebugVisualizer(feature, 0, physicsClientId=self.client)
-        lay_ground(self.client)
+        _lay_ground(self.client)
         self._camera = WindowCamera(self.client, SIZE)
         self._items = WindowItems(self.client)
         self._shows = {"ids": True, "known links": True, "help": True}
@@ -138,3 +142,24 @@ class WorldWindow:
 
     def _toggle(self, what: str) -> None:
         self._shows[what] = not self._shows[what]
+
+
+def _lay_ground(client: int) -> None:
+    """A plane of tiles, which pybullet draws 2 m wide, for measuring by eye."""
+    plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client)
+    ground = pybullet.createMultiBody(0.0, plane, physicsClientId=client)
+    tile = Image.new("RGB", (TILE_PIXELS, TILE_PIXELS), GROUND)
+    last = TILE_PIXELS - 1
+    ImageDraw.Draw(tile).rectangle((0, 0, last, last), None, SHADOW, 3)
+    with tempfile.TemporaryDirectory() as folder:  # pybullet reads textures only from files
+        path = Path(folder) / "tile.png"
+        tile.save(path)
+        texture = pybullet.loadTexture(os.fspath(path), physicsClientId=client)
+    pybullet.changeVisualShape(
+        ground,
+        -1,
+        rgbaColor=(1, 1, 1, 1),
+        specularColor=(0, 0, 0),
+        textureUniqueId=texture,
+        physicsClientId=client,
+    )

@@ -12,7 +12,7 @@ from drone_mesh.state.model import ObstacleStatus
 from drone_mesh.view.bodies import Bodies
 from drone_mesh.view.camera import Camera
 from drone_mesh.view.palette import LIGHT, Colour, rgb
-from drone_mesh.view.picture import DronePicture, Shape
+from drone_mesh.view.scene import DronePicture, Shape
 
 LINE_HEIGHT = 22  # pixels
 TEXT_DEPTH_M = 1.0  # distance of the text from the camera

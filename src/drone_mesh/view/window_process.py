@@ -15,7 +15,7 @@ from typing import Callable
 
 import drone_mesh
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.view.picture import Scene
+from drone_mesh.view.scene import Scene
 
 POLL_PERIOD_S = 0.05  # wall; at most 20 scenes a second
 END_TIMEOUT_S = 3.0  # wall; between the end of the pipe and the end of the process

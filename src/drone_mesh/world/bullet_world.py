@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Sequence
+
 import pybullet
 
 from drone_mesh.air.box import Box
@@ -9,10 +11,44 @@ from drone_mesh.drone.flight_path import Vector
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.world.body import GRAVITY_M_S2
 from drone_mesh.world.interfaces import World
-from drone_mesh.world.static_box import add_static_box
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)  # unit quaternion, pybullet's order x y z w
 KINEMATIC = 0.0  # physics never moves a body of mass 0
+
+
+def connect() -> int:
+    """A new pybullet client, in which nothing is drawn. Raises ConfigurationError."""
+    client: int = pybullet.connect(pybullet.DIRECT)
+    if client < 0:
+        raise ConfigurationError("pybullet has no room for another world: close one first")
+    return client
+
+
+def add_static_box(client: int, box: Box) -> int:
+    """Add a fixed box to this pybullet client; returns its body number."""
+    turned = pybullet.getQuaternionFromEuler((0.0, 0.0, box.yaw_rad))
+    return _add(client, KINEMATIC, _box_shape(client, box.size), box.center, turned)
+
+
+def _add(
+    client: int, mass_kg: float, shape: int, centre: Vector, turned: Sequence[float] = UPRIGHT
+) -> int:
+    return int(
+        pybullet.createMultiBody(
+            mass_kg,
+            shape,
+            basePosition=centre,
+            baseOrientation=turned,
+            physicsClientId=client,
+        )
+    )
+
+
+def _box_shape(client: int, size: Vector) -> int:
+    halves = [edge_m / 2 for edge_m in size]
+    return int(
+        pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=halves, physicsClientId=client)
+    )
 
 
 class BulletWorld(World):
@@ -23,9 +59,7 @@ class BulletWorld(World):
 
     def __init__(self) -> None:
         super().__init__()
-        self.client = pybullet.connect(pybullet.DIRECT)
-        if self.client < 0:
-            raise ConfigurationError("pybullet has no room for another world: close one first")
+        self.client = connect()
         self._shapes: dict[Vector, int] = {}  # by size
         pybullet.setTimeStep(self.tick_s, physicsClientId=self.client)
         pybullet.setGravity(0.0, 0.0, -GRAVITY_M_S2, physicsClientId=self.client)
@@ -33,18 +67,10 @@ class BulletWorld(World):
         self.ground = pybullet.createMultiBody(KINEMATIC, plane, physicsClientId=self.client)
 
     def add_box(self, size: Vector, centre: Vector) -> int:
-        return int(
-            pybullet.createMultiBody(
-                KINEMATIC,
-                self._shape(size),
-                basePosition=centre,
-                baseOrientation=UPRIGHT,
-                physicsClientId=self.client,
-            )
-        )
+        return _add(self.client, KINEMATIC, self._shape(size), centre)
 
     def add_obstacle(self, box: Box) -> None:
-        add_static_box(self.client, box.center, box.size, box.yaw_rad)
+        add_static_box(self.client, box)
 
     def move_box(self, box: int, centre: Vector) -> None:
         pybullet.resetBasePositionAndOrientation(box, centre, UPRIGHT, physicsClientId=self.client)
@@ -54,15 +80,7 @@ class BulletWorld(World):
 
     def add_body(self, size: Vector, centre: Vector, mass_kg: float) -> int:
         """A box that physics moves; it stays upright, as a drone's controller would keep it."""
-        body = int(
-            pybullet.createMultiBody(
-                mass_kg,
-                self._shape(size),
-                basePosition=centre,
-                baseOrientation=UPRIGHT,
-                physicsClientId=self.client,
-            )
-        )
+        body = _add(self.client, mass_kg, self._shape(size), centre)
         pybullet.changeDynamics(
             body,
             -1,
@@ -97,9 +115,5 @@ class BulletWorld(World):
     def _shape(self, size: Vector) -> int:
         """The collision shape of a box; boxes of equal size share it."""
         if size not in self._shapes:
-            self._shapes[size] = pybullet.createCollisionShape(
-                pybullet.GEOM_BOX,
-                halfExtents=[edge_m / 2 for edge_m in size],
-                physicsClientId=self.client,
-            )
+            self._shapes[size] = _box_shape(self.client, size)
         return self._shapes[size]

@@ -56,12 +56,11 @@ class DynamicEngine(DroneEngine):
         self._was_flat = False
         self._settled = True
         self._held_s = 0.0  # how long an obstacle has held it in the air
-        self._crashed = False
         world.wake(self)
 
     def why_not_fly(self) -> str:
         """Crashed, or out of battery; empty while it can fly."""
-        if self._crashed:
+        if self.crashed:
             return "crashed"
         if self._battery_percent <= LAND_AT_PERCENT:
             return f"battery at {self._battery_percent:.0f} %"
@@ -70,11 +69,6 @@ class DynamicEngine(DroneEngine):
     def battery_percent(self) -> float:
         """0..100."""
         return self._battery_percent
-
-    @property
-    def crashed(self) -> bool:
-        """Whether a hard hit has ended its flights."""
-        return self._crashed
 
     @property
     def is_flat(self) -> bool:
@@ -103,7 +97,7 @@ class DynamicEngine(DroneEngine):
             self._begin(Location.from_vector(self._goals.popleft()), position, now_s)
         self._follow_pilot(now_s)
         in_air = self._route is not None or self._hover is not None
-        if in_air and not self._crashed:
+        if in_air and not self.crashed:
             self._fly(position, passed_s)
         else:
             self._pushed = None
@@ -216,6 +210,6 @@ class DynamicEngine(DroneEngine):
             self._crash("caught in something")
 
     def _crash(self, how: str) -> None:
-        self._crashed = True
+        self.crashed = True
         self._route = self._hover = None
         self._note(MeshEventKind.CRASHED, how)

@@ -73,17 +73,13 @@ class DroneEngine(IDroneEngine):
         self._listeners: list[StateListener] = []
         self._observers: list[EngineObserver] = []
         self._state = DroneState(centre, None, world.now_s)
+        self.crashed = False  # a hard hit has ended its flights for good
         self._has_left = False  # its body has been removed from the world
 
     @property
     def state(self) -> DroneState:
         """The drone after the last step in which it moved."""
         return self._state
-
-    @property
-    def crashed(self) -> bool:
-        """Whether a hard hit has ended its flights for good."""
-        return False
 
     def observe(self, observer: EngineObserver) -> None:
         """Call `observer` at each event of the drone. World's thread."""

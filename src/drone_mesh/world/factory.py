@@ -1,22 +1,54 @@
-"""DroneFactory: creates a fleet in a world and changes it (docs/ros.md, "Fleet")."""
+"""VirtualDrone, and DroneFactory, which creates and removes them (docs/ros.md, "Fleet")."""
 
 from __future__ import annotations
 
 import functools
 import math
-from typing import Iterable
+from typing import Iterable, Sequence
 
 from drone_mesh.air.obstacles import Obstacles
-from drone_mesh.drone.fleet import MAX_DRONES, StartPlace, plan_fleet
+from drone_mesh.drone.fleet import MAX_DRONES, StartPlace
 from drone_mesh.drone.flight_path import FlightPath, PlanFlight, Vector
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.roles import Role
 from drone_mesh.errors import ConfigurationError, FleetRefused, GoalRefused
-from drone_mesh.world.drones import GatewayDrone, RouterDrone, VirtualDrone
+from drone_mesh.world.body import BodyLimits
+from drone_mesh.world.bullet_world import BulletWorld
+from drone_mesh.world.dynamic_engine import DynamicEngine
+from drone_mesh.world.engine import DroneEngine
 from drone_mesh.world.interfaces import World
 
 HALF_WIDTH_M = 0.15  # from the centre of a drone's box to its corner, plus a margin
-_KINDS = {Role.GATEWAY: GatewayDrone, Role.ROUTER: RouterDrone}
+
+
+class VirtualDrone:
+    """A box in a world, flown by its engine. Only DroneFactory, which assigns ids, creates them."""
+
+    def __init__(
+        self,
+        world: World,
+        place: StartPlace,
+        wind: Vector | None = None,
+        plan_flight: PlanFlight = FlightPath,
+    ) -> None:
+        """Create a drone on the ground at this place. World's thread.
+
+        With a `wind` (m/s) physics moves it, in a BulletWorld; without, it follows its path.
+        `plan_flight` plans its flights.
+        """
+        self.node_id, self.role = place.node_id, place.role
+        size_m = self.role.size_m
+        half_height_m = size_m[2] / 2
+        centre = (place.longitude, place.latitude, half_height_m)
+        self.engine: DroneEngine
+        if wind is not None and isinstance(world, BulletWorld):
+            self.box = world.add_body(size_m, centre, BodyLimits().mass_kg)
+            self.engine = DynamicEngine(
+                world, self.box, centre, half_height_m, wind, plan_flight=plan_flight
+            )
+        else:
+            self.box = world.add_box(size_m, centre)
+            self.engine = DroneEngine(world, self.box, centre, half_height_m, plan_flight)
 
 
 class DroneFactory:
@@ -29,28 +61,21 @@ class DroneFactory:
     def __init__(
         self,
         world: World,
-        gateways: int,
-        routers: int,
-        gridsize: int,
-        spacing: float,
-        debug: bool,
+        fleet: Sequence[StartPlace],
         wind: Vector | None = None,
         obstacles: Obstacles | None = None,
         cruise_height_m: float = math.inf,
     ) -> None:
-        """Parameters and errors as for `plan_fleet`.
+        """`fleet`: as of `plan_fleet`; `wind`: as for VirtualDrone.
 
-        `debug`: whether the nodes of the drones publish debug information; `wind`: as for
-        VirtualDrone. The `obstacles` are added to the world too; without them, `cruise_height_m` is
-        the ceiling of ordered flights. Raises ConfigurationError if a drone would start in or
-        against an obstacle.
+        The `obstacles` are added to the world too; without them, `cruise_height_m` is the ceiling
+        of ordered flights. Raises ConfigurationError if a drone would start in or against an
+        obstacle.
         """
-        self.debug = debug
         self._world = world
         self._wind = wind
         self._for_flights: Obstacles | None = None
         self._plan_flight: PlanFlight = functools.partial(FlightPath, ceiling_m=cruise_height_m)
-        fleet = plan_fleet(gateways, routers, gridsize, spacing)
         if obstacles is not None:
             check_starts(fleet, obstacles)
             self._for_flights = obstacles.for_flights(HALF_WIDTH_M)
@@ -58,6 +83,10 @@ class DroneFactory:
             for box in obstacles.boxes:
                 world.add_obstacle(box)
         self.drones: tuple[VirtualDrone, ...] = tuple(self._make(place) for place in fleet)
+
+    def get(self, node_id: int) -> VirtualDrone | None:
+        """The present drone with this id; None: there is none. Any thread."""
+        return next((drone for drone in self.drones if drone.node_id == node_id), None)
 
     def add(
         self, role: Role, longitude: float, latitude: float, node_id: int | None = None
@@ -91,16 +120,16 @@ class DroneFactory:
         The last gateway must stay while there are routers, because nothing else could send them
         orders. Any thread.
         """
-        drones = {drone.node_id: drone for drone in self.drones}
-        if node_id not in drones:
+        drone = self.get(node_id)
+        if drone is None:
             raise FleetRefused(f"drone {node_id} does not exist")
-        gateways = [n for n, drone in drones.items() if drone.ROLE is Role.GATEWAY]
-        if gateways == [node_id] and len(drones) > 1:
+        gateways = [other for other in self.drones if other.role is Role.GATEWAY]
+        if gateways == [drone] and len(self.drones) > 1:
             raise FleetRefused(
                 f"drone {node_id} is the last gateway: no order would reach a router any more; "
                 "add another gateway first, or switch this one off"
             )
-        return drones[node_id]
+        return drone
 
     def remove(self, node_id: int) -> None:
         """Remove a drone from the world. Raises FleetRefused as `check_removal` does."""
@@ -109,10 +138,7 @@ class DroneFactory:
         drone.engine.leave()
 
     def _make(self, place: StartPlace) -> VirtualDrone:
-        node_id, role, longitude, latitude = place
-        return _KINDS[role](
-            self._world, node_id, longitude, latitude, self._wind, self._plan_flight
-        )
+        return VirtualDrone(self._world, place, self._wind, self._plan_flight)
 
     def _check_place(self, place: StartPlace) -> None:
         try:

@@ -10,26 +10,21 @@ class Pace:
 
     def __init__(self, factor: float) -> None:
         """`factor`: simulated seconds per wall second; 0: as fast as possible."""
-        self._factor = factor
+        self.factor = factor
         self._simulated_s = self._wall_s = 0.0
         self._started = False
 
-    @property
-    def factor(self) -> float:
-        """Simulated seconds per wall second; 0: as fast as possible."""
-        return self._factor
-
     def restart(self, factor: float) -> None:
         """Continue at this factor from now on; earlier delays are not caught up."""
-        self._factor = factor
+        self.factor = factor
         self._started = False
 
     def wait_s(self, simulated_s: float, wall_s: float) -> float:
         """Wall seconds until the step after `simulated_s` is due; 0: now."""
-        if self._factor == 0.0:
+        if self.factor == 0.0:
             return 0.0
         if self._started:
-            due_s = self._wall_s + (simulated_s - self._simulated_s) / self._factor
+            due_s = self._wall_s + (simulated_s - self._simulated_s) / self.factor
             if wall_s - due_s <= CATCH_UP_S:
                 return max(0.0, due_s - wall_s)
         self._simulated_s, self._wall_s, self._started = simulated_s, wall_s, True

@@ -10,8 +10,7 @@ import pybullet
 
 from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.drone.flight_path import Vector
-from drone_mesh.errors import ConfigurationError
-from drone_mesh.world.static_box import add_static_box
+from drone_mesh.world.bullet_world import add_static_box, connect
 
 MISSED = -1  # pybullet's body number for a ray that hits nothing
 
@@ -28,13 +27,8 @@ class RayLinks:
     def __init__(self, obstacles: Obstacles, range_m: float) -> None:
         self._obstacles = obstacles
         self._range_m = range_m
-        self._client = pybullet.connect(pybullet.DIRECT)
-        if self._client < 0:
-            raise ConfigurationError("pybullet has no room for another world: close one first")
-        self._cut_db = {
-            add_static_box(self._client, box.center, box.size, box.yaw_rad): box.cut_db
-            for box in obstacles.boxes
-        }
+        self._client = connect()
+        self._cut_db = {add_static_box(self._client, box): box.cut_db for box in obstacles.boxes}
 
     def close(self) -> None:
         """Release the pybullet world. A second call changes nothing."""

@@ -13,10 +13,10 @@ from drone_mesh.drone.flight_path import FlightPath
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
 from drone_mesh.layouts import Layouts
+from drone_mesh.state.airspace import nearest_m, segments, ways_of
 from drone_mesh.state.departures import Departures, FlightRules
 from drone_mesh.state.formation_preview import preview
 from drone_mesh.state.model import MeshStatus, NodeStatus
-from drone_mesh.state.separation import nearest_m, segments, ways_of
 
 LAYOUTS = Layouts.shipped()
 

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+import runpy
 from collections import Counter
 from pathlib import Path
 
 import pytest
 
 from drone_mesh.drone.roles import Role
-from drone_mesh.view.quadrocopter import BodyPart, mesh_files, solid_of
+from drone_mesh.view.quadrocopter import BodyPart, solid_of
 from drone_mesh.view.solids import dome, normal, polygon, prism
 
-MESHES = Path(__file__).parents[3] / "meshes"
+ROOT = Path(__file__).parents[3]
+MESHES = ROOT / "meshes"
 
 
 def test_the_meshes_of_rviz_are_those_that_the_code_makes() -> None:
     on_disk = {path.name: path.read_text("ascii") for path in MESHES.iterdir()}
-    assert on_disk == mesh_files(), "run scripts/meshes"
+    script = runpy.run_path(str(ROOT / "scripts" / "meshes"))
+    assert on_disk == script["mesh_files"](), "run scripts/meshes"
 
 
 @pytest.mark.parametrize("role", list(Role))

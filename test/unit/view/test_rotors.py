@@ -12,8 +12,8 @@ import pytest
 from drone_mesh.drone.roles import Role
 from drone_mesh.view import window_items
 from drone_mesh.view.bodies import Bodies
-from drone_mesh.view.picture import DronePicture, Shape
 from drone_mesh.view.quadrocopter import MOTORS, turned_rad
+from drone_mesh.view.scene import DronePicture, Shape
 from drone_mesh.view.window_items import WindowItems
 
 FLYING = DronePicture(1, Role.ROUTER, (0.0, 0.0, 5.0), path=((9.0, 0.0, 0.0),))

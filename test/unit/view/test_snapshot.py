@@ -16,7 +16,7 @@ from drone_mesh.state.links import LinkUse
 from drone_mesh.state.model import ObstacleStatus
 from drone_mesh.view.camera import Camera, Margins, frame
 from drone_mesh.view.palette import LIGHT, rgb
-from drone_mesh.view.picture import (
+from drone_mesh.view.scene import (
     DronePicture,
     LinkPicture,
     Scene,

@@ -8,10 +8,12 @@ import threading
 import pytest
 from still_world import StillWorld
 
+from drone_mesh.drone.fleet import StartPlace
 from drone_mesh.drone.location import Location
+from drone_mesh.drone.roles import Role
 from drone_mesh.errors import GoalRefused, MeshError
-from drone_mesh.world.drones import RouterDrone
 from drone_mesh.world.engine import DroneState
+from drone_mesh.world.factory import VirtualDrone
 
 
 @pytest.fixture
@@ -22,7 +24,7 @@ def world():
 @pytest.fixture
 def engine(world):
     """A router that stands at (0, 0, 0); its centre is 0.05 m up."""
-    return RouterDrone(world, node_id=3, longitude=0.0, latitude=0.0).engine
+    return VirtualDrone(world, StartPlace(3, Role.ROUTER, 0.0, 0.0)).engine
 
 
 def step_until(world, now_s):
@@ -191,7 +193,9 @@ def test_a_snapshot_stays_as_it_was_while_the_drone_flies_on(world, engine):
 
 
 def test_goals_from_many_threads_all_reach_the_world(world):
-    engines = [RouterDrone(world, i, float(i), 0.0).engine for i in range(20)]
+    engines = [
+        VirtualDrone(world, StartPlace(i, Role.ROUTER, float(i), 0.0)).engine for i in range(20)
+    ]
 
     def order(engine, x):
         for latitude in range(1, 101):

@@ -9,6 +9,7 @@ from still_world import StillWorld
 
 from drone_mesh.air.box import Box
 from drone_mesh.air.obstacles import Obstacles
+from drone_mesh.drone.fleet import plan_fleet
 from drone_mesh.drone.roles import Role
 from drone_mesh.errors import FleetRefused
 from drone_mesh.world.bullet_world import BulletWorld
@@ -16,7 +17,7 @@ from drone_mesh.world.factory import DroneFactory
 
 
 def factory(world=None, gateways=1, routers=3, **more):
-    return DroneFactory(world or StillWorld(), gateways, routers, 6, 1.0, True, **more)
+    return DroneFactory(world or StillWorld(), plan_fleet(gateways, routers, 6, 1.0), **more)
 
 
 def ids(fleet):
@@ -26,7 +27,7 @@ def ids(fleet):
 def test_a_new_drone_stands_at_its_place_with_the_lowest_free_id():
     fleet = factory()
     drone = fleet.add(Role.ROUTER, longitude=14.0, latitude=-2.0)
-    assert (drone.node_id, drone.ROLE) == (4, Role.ROUTER)
+    assert (drone.node_id, drone.role) == (4, Role.ROUTER)
     assert drone.engine.state.position == (14.0, -2.0, 0.05)
     assert ids(fleet) == [0, 1, 2, 3, 4]
 
@@ -36,7 +37,7 @@ def test_an_id_that_was_removed_is_the_lowest_free_one():
     fleet.remove(2)
     assert ids(fleet) == [0, 1, 3]
     assert fleet.add(Role.GATEWAY, 14.0, 0.0).node_id == 2
-    assert [drone.ROLE for drone in fleet.drones if drone.node_id == 2] == [Role.GATEWAY]
+    assert [drone.role for drone in fleet.drones if drone.node_id == 2] == [Role.GATEWAY]
 
 
 def test_drones_are_listed_by_id_whatever_the_order_in_which_they_were_added():

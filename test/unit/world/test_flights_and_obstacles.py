@@ -7,6 +7,7 @@ from still_world import StillWorld
 
 from drone_mesh.air.box import Box
 from drone_mesh.air.obstacles import Obstacles
+from drone_mesh.drone.fleet import plan_fleet
 from drone_mesh.drone.flight_path import FlightPath
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError, GoalRefused
@@ -18,7 +19,7 @@ TOWER = Box((3.0, 0.0, 3.0), (1.0, 1.0, 6.0))  # between the two routers, higher
 
 
 def fleet(world, box, wind=None):
-    return DroneFactory(world, 0, 2, 2, 6.0, False, wind, Obstacles([box])).drones
+    return DroneFactory(world, plan_fleet(0, 2, 2, 6.0), wind, Obstacles([box])).drones
 
 
 WALL = Box((3.0, 0.0, 2.0), (1.0, 60.0, 4.0))  # too long to go round, higher than their climb

@@ -7,12 +7,14 @@ import math
 import pytest
 from still_world import StillWorld
 
+from drone_mesh.drone.fleet import StartPlace
 from drone_mesh.drone.flight_path import FlightPath
+from drone_mesh.drone.roles import Role
 from drone_mesh.mobility.pilot import TrackPilot, along
 from drone_mesh.world.body import BodyLimits
 from drone_mesh.world.bullet_world import BulletWorld
-from drone_mesh.world.drones import RouterDrone
 from drone_mesh.world.dynamic_engine import DynamicEngine
+from drone_mesh.world.factory import VirtualDrone
 
 SQUARE = [(4.0, 0.0, 2.0), (4.0, 4.0, 2.0), (0.0, 4.0, 2.0), (0.0, 0.0, 2.0)]
 
@@ -22,7 +24,7 @@ def pilot(speed_m_s=1.0, loop=True):
 
 
 def drone(world):
-    return RouterDrone(world, 3, 0.0, 0.0, (0.0, 0.0, 0.0)).engine
+    return VirtualDrone(world, StartPlace(3, Role.ROUTER, 0.0, 0.0), (0.0, 0.0, 0.0)).engine
 
 
 def run(world, seconds, engine=None):

@@ -24,52 +24,36 @@ ANSWER_TIMEOUT_S = 5.0  # wall; our choice: a node that is silent for longer is 
 FAILED = 2  # exit code: the tool could not do its work; 1 means that it did, with a bad result
 
 
-class NoMaster(MeshError):
-    """No ROS master answers."""
-
-
-class NameTaken(MeshError):
-    """A node of this name runs already, and would be ended by a second one."""
-
-
 def require_master() -> None:
-    """Raises NoMaster, which names the address that was tried and the remedy."""
+    """Raises MeshError, which names the address that was tried and the remedy."""
     if not rosgraph.is_master_online():
         uri = os.environ.get("ROS_MASTER_URI", "ROS_MASTER_URI (not set)")
-        raise NoMaster(
+        raise MeshError(
             f"no ROS master at {uri}: start the simulation (roslaunch drone_mesh factory.launch), "
             "or set ROS_MASTER_URI to the address of the running one"
         )
 
 
 def join_graph(name: str) -> None:
-    """Register as an anonymous node without rospy's signal handlers. Raises NoMaster."""
+    """Register as an anonymous node without rospy's signal handlers. Raises MeshError."""
     require_master()
-    _init_node(name, anonymous=True, disable_signals=True, disable_rosout=True)
+    rospy.init_node(name, argv=_words(), anonymous=True, disable_signals=True, disable_rosout=True)
 
 
-def _init_node(
-    name: str, *, disable_signals: bool, anonymous: bool = False, disable_rosout: bool = False
-) -> None:
-    """Register; its clock is that of its namespace."""
-    rospy.init_node(
-        name,
-        argv=[*sys.argv, *names.REMAPPINGS],
-        anonymous=anonymous,
-        disable_signals=disable_signals,
-        disable_rosout=disable_rosout,
-    )
+def _words() -> list[str]:
+    """The command line of a node, whose clock is that of its namespace."""
+    return [*sys.argv, *names.REMAPPINGS]
 
 
 def _require_free_name(name: str) -> None:
-    """Raises NameTaken: the master would end the node that has this name."""
+    """Raises MeshError: the master would end the node that has this name."""
     given = [word[len("__name:=") :] for word in sys.argv if word.startswith("__name:=")]
     full = rospy.resolve_name(given[-1] if given else name)
     if _is_taken(full):
         speaker = os.environ.get(SPEAKER_VARIABLE)
         if speaker and _is_taken(rospy.resolve_name(speaker)):
             sys.exit(FAILED)
-        raise NameTaken(
+        raise MeshError(
             f"{full} already runs on this master: stop it, give this one a namespace "
             "(namespace:=site_a for factory.launch, __ns:=site_a for rosrun), or set "
             "ROS_MASTER_URI to another master"
@@ -107,7 +91,7 @@ def start_node(about: str | None, name: str, *, disable_signals: bool = False) -
     except MeshError as error:
         print(f"{program}: {error}", file=sys.stderr)
         sys.exit(FAILED)
-    _init_node(name, disable_signals=disable_signals)
+    rospy.init_node(name, argv=_words(), disable_signals=disable_signals)
 
 
 def run_tool(name: str, work: Callable[[], int]) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Protocol, Sequence
+from dataclasses import fields
+from typing import Any, Protocol, Sequence
 
 import rospy
 
@@ -18,6 +19,7 @@ from drone_mesh.srv import OrderFormationRequest, RequestGPSResponse
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
 
 _CODES = {kind.value: number for number, kind in enumerate(MeshEventKind)}  # as in MeshEvent.msg
+_MESH_FIELDS = [field.name for field in fields(MeshStatus) if field.name != "stamp_s"]
 NO_POSITION: Vector = (0.0, 0.0, 0.0)  # of a DroneInfo that only speaks of power or topic
 
 
@@ -117,18 +119,12 @@ def event_record(message: MeshEventMsg) -> EventRecord:
 
 def state_msg(mesh: MeshStatus) -> MeshState:
     """The state as a message; nodes that already are messages are not copied."""
-    message = MeshState(
-        max_distance=mesh.max_distance,
-        real_time_factor=mesh.real_time_factor,
-        achieved_real_time_factor=mesh.achieved_real_time_factor,
-        paused=mesh.paused,
-        routing=mesh.routing,
-        repair_strategy=mesh.repair_strategy,
-        nodes=[node if isinstance(node, NodeState) else _node_msg(node) for node in mesh.nodes],
-        shape=mesh.shape,
-        layouts=list(mesh.layouts),
-        obstacles=[Obstacle(box.center, box.size, box.yaw) for box in mesh.obstacles],
-    )
+    message = MeshState(**_values(mesh, _MESH_FIELDS))
+    message.nodes = [
+        node if isinstance(node, NodeState) else NodeState(**_values(node, NodeState.__slots__))
+        for node in mesh.nodes
+    ]
+    message.obstacles = [Obstacle(box.center, box.size, box.yaw) for box in mesh.obstacles]
     message.header.stamp = ros_time(mesh.stamp_s)
     message.header.frame_id = names.MAP_FRAME
     return message
@@ -139,28 +135,14 @@ def mesh_status(message: MeshState) -> MeshStatus:
 
     A message of an older definition, from a bag, gets defaults for the fields that it lacks.
     """
-    nodes: Sequence[NodeStatus] = message.nodes
+    values = _values(message, _MESH_FIELDS)
     if message._md5sum != MeshState._md5sum:
-        nodes = [_node_status(node) for node in message.nodes]
-    return MeshStatus(
-        message.header.stamp.to_sec(),
-        nodes,
-        message.max_distance,
-        message.real_time_factor,
-        message.achieved_real_time_factor,
-        message.paused,
-        getattr(message, "routing", ""),
-        getattr(message, "repair_strategy", ""),
-        getattr(message, "obstacles", ()),
-        getattr(message, "shape", ""),
-        getattr(message, "layouts", ()),
-    )
+        values["nodes"] = [
+            NodeStatus(**_values(node, NodeState.__slots__)) for node in message.nodes
+        ]
+    return MeshStatus(message.header.stamp.to_sec(), **values)
 
 
-def _node_status(message: NodeState) -> NodeStatus:
-    known = {name: getattr(message, name) for name in NodeState.__slots__ if hasattr(message, name)}
-    return NodeStatus(**known)
-
-
-def _node_msg(node: NodeStatus) -> NodeState:
-    return NodeState(**{name: getattr(node, name) for name in NodeState.__slots__})
+def _values(source: object, names: Sequence[str]) -> dict[str, Any]:
+    """Its fields of these names, as far as it has them."""
+    return {name: getattr(source, name) for name in names if hasattr(source, name)}

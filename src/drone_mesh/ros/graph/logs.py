@@ -23,10 +23,10 @@ def show_library_logs_on_rosout() -> None:
 class ThrottledLog:
     """Counts messages by reason and logs each reason once per period. Any thread."""
 
-    def __init__(self, log: logging.Logger, period_s: float = COMPLAINT_PERIOD_S) -> None:
+    def __init__(self, log: logging.Logger) -> None:
         self._log = log
         self._lock = threading.Lock()  # guards the throttle
-        self._throttle = Throttle(period_s)
+        self._throttle = Throttle(COMPLAINT_PERIOD_S)
         self.counts = self._throttle.counts
 
     def warning(self, reason: str, text: str) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import http.client
 import logging
-import threading
 import xmlrpc.client
 from typing import Any
 
@@ -17,13 +16,15 @@ from rospy.impl.registration import (
     get_topic_manager,
 )
 
+from drone_mesh.ros.graph.periodic import Periodic
+
 PERIOD_S = 2.0  # wall; our choice
 NO_ANSWER = (OSError, http.client.HTTPException, xmlrpc.client.Error, rospy.ROSException)
 
 _log = logging.getLogger(__name__)
 
 
-class MasterWatch:
+class MasterWatch(Periodic):
     """Polls the master in a thread of its own.
 
     A new master starts empty: existing connections between nodes survive, but topics, services and
@@ -33,32 +34,30 @@ class MasterWatch:
 
     def __init__(self, *parameters: str) -> None:
         """`parameters`: names of public parameters to restore, if they exist when it starts."""
+        super().__init__("master watch", PERIOD_S)
+        self._master = rosgraph.Master(rospy.get_name())
         self._names = [rospy.resolve_name(name) for name in (rospy.get_name(), *parameters)]
         self._values: dict[str, Any] = {}  # replaced as a whole
-        self._stopped = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="master watch", daemon=True)
 
     def start(self) -> None:
         """Store the parameters and start polling; the thread ends when the node shuts down."""
         present = {name: rospy.get_param(name) for name in self._names if rospy.has_param(name)}
         self._values = {**present, **self._values}
         rospy.on_shutdown(self._stopped.set)
-        self._thread.start()
+        super().start()
 
     def keep(self, parameter: str, value: Any) -> None:
         """Also restore this value of a public parameter. After `start`, from one thread only."""
         self._values = {**self._values, rospy.resolve_name(parameter): value}
 
-    def _run(self) -> None:
-        master = rosgraph.Master(rospy.get_name())
-        while not self._stopped.wait(PERIOD_S):
-            try:
-                master.lookupNode(rospy.get_name())
-            except rosgraph.MasterException:  # a new master, which does not know this node
-                if not (self._stopped.is_set() or rospy.is_shutdown()):
-                    self._register_again()
-            except NO_ANSWER as error:
-                _log.debug("the master does not answer: %s", error)
+    def _work(self) -> None:
+        try:
+            self._master.lookupNode(rospy.get_name())
+        except rosgraph.MasterException:  # a new master, which does not know this node
+            if not (self._stopped.is_set() or rospy.is_shutdown()):
+                self._register_again()
+        except NO_ANSWER as error:
+            _log.debug("the master does not answer: %s", error)
 
     def _register_again(self) -> None:
         listeners = get_registration_listeners()

@@ -6,7 +6,6 @@ import logging
 import signal
 import sys
 import threading
-from types import FrameType
 
 import rospy
 
@@ -34,7 +33,7 @@ class OrderlyStop:
 
     def __enter__(self) -> OrderlyStop:
         for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, self._on_signal)
+            signal.signal(number, lambda _number, _frame: self._request.make())
         rospy.on_shutdown(self._on_shutdown)
         return self
 
@@ -57,9 +56,6 @@ class OrderlyStop:
     def wait(self, timeout_s: float) -> bool:
         """Wait at most `timeout_s` wall seconds; returns whether the program should stop."""
         return self._request.wait(timeout_s)
-
-    def _on_signal(self, _number: int, _frame: FrameType | None) -> None:
-        self._request.make()
 
     def _on_shutdown(self) -> None:
         """In the thread of rospy that shuts the node down, before its topics are closed."""

@@ -43,30 +43,26 @@ def factory_configuration(*keys: str) -> FactoryConfiguration:
 
 def configured_obstacles(configuration: FactoryConfiguration) -> Obstacles | None:
     """The boxes that the configuration names, or None. Raises ConfigurationError."""
-    if not configuration.obstacles:
-        return None
-    path = _absolute("obstacles", configuration.obstacles)
-    with naming_argument("obstacles: ", path):
-        return read_obstacles(path, configuration.obstacle_radio == "block")
+    blocks = configuration.obstacle_radio == "block"
+    return _named("obstacles", configuration.obstacles, lambda path: read_obstacles(path, blocks))
 
 
 def configured_missions(configuration: FactoryConfiguration) -> dict[int, Mission]:
     """The missions that the configuration names, by drone. Raises ConfigurationError."""
-    if not configuration.missions:
-        return {}
-    path = _absolute("missions", configuration.missions)
-    with naming_argument("missions: ", path):
-        return read_missions(path)
+    return _named("missions", configuration.missions, read_missions) or {}
 
 
-def _absolute(key: str, given: str) -> Path:
-    """This path; roslaunch starts nodes in another folder. Raises ConfigurationError."""
+def _named(key: str, given: str, read: Callable[[Path], Result]) -> Result | None:
+    """Read the file that this key names; None if it names none. Raises ConfigurationError."""
+    if not given:
+        return None
     path = Path(given).expanduser()
-    if not path.is_absolute():
+    if not path.is_absolute():  # roslaunch starts nodes in another folder
         raise ConfigurationError(
             f"invalid {key} {given!r}: expected an absolute path, such as $PWD/{given}"
         )
-    return path
+    with naming_argument(f"{key}: ", path):
+        return read(path)
 
 
 def manager_layouts(parameter: str = names.LAYOUTS_PARAM) -> Layouts:

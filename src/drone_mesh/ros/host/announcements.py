@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from collections import deque
 from typing import Callable, Protocol
 
 import rospy
@@ -48,8 +47,7 @@ class Announcements:
         self._place_of = place_of
         self._lock = threading.Lock()
         self._announcing = threading.Lock()
-        self._rota: deque[int] = deque()  # ids of all antennas, least recently announced first
-        self._antennas: dict[int, AnnouncedAntenna] = {}
+        self._antennas: dict[int, AnnouncedAntenna] = {}  # least recently announced first
         self._on_registered: dict[int, Callable[[], None]] = {}
         self._unregistered: set[int] = set()
 
@@ -62,7 +60,6 @@ class Announcements:
             self._antennas[antenna.node_id] = antenna
             self._on_registered[antenna.node_id] = on_registered
             self._unregistered.add(antenna.node_id)
-            self._rota.append(antenna.node_id)
         self.announce(antenna)
 
     def remove(self, antenna: AnnouncedAntenna) -> None:
@@ -71,8 +68,6 @@ class Announcements:
             self._antennas.pop(antenna.node_id, None)
             self._on_registered.pop(antenna.node_id, None)
             self._unregistered.discard(antenna.node_id)
-            if antenna.node_id in self._rota:
-                self._rota.remove(antenna.node_id)
 
     def announce(self, antenna: AnnouncedAntenna) -> None:
         """Publish where this antenna listens and is, and whether it has power."""
@@ -96,8 +91,9 @@ class Announcements:
     def announce_next(self, count: int) -> None:
         """Announce up to `count` antennas again, least recently announced first."""
         with self._lock:
-            antennas = [self._antennas[n] for n in list(self._rota)[:count]]
-            self._rota.rotate(-count)
+            antennas = list(self._antennas.values())[:count]
+            for antenna in antennas:  # to the end
+                self._antennas[antenna.node_id] = self._antennas.pop(antenna.node_id)
         for antenna in antennas:
             self.announce(antenna)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import threading
+from contextlib import ExitStack
 from typing import Callable
 
 import rospy
@@ -12,6 +13,7 @@ from drone_mesh.communication.interfaces import IMeshDebugInfo
 from drone_mesh.execution import ExecutorSlot
 from drone_mesh.msg import NodeDebugInfo
 from drone_mesh.ros.graph import names
+from drone_mesh.ros.graph.persistent_service import PersistentService, ServiceGone
 from drone_mesh.srv import PowerSwitch, PowerSwitchRequest, PowerSwitchResponse
 
 DEBUG_PERIOD_S = 1.0  # docs/ros.md, "Topics"
@@ -45,8 +47,7 @@ class AntennaPanel:
         self._is_on = is_on
         self._switch = switch
         self._service: rospy.Service | None = None
-        self._publishers: tuple[rospy.Publisher, ...] = ()
-        self._stop_debugging: Callable[[], None] | None = None
+        self._debugging = ExitStack()  # what ends with it
 
     def start(self) -> None:
         """Offer the switch."""
@@ -62,12 +63,7 @@ class AntennaPanel:
 
     def debugging_mode(self, info: IMeshDebugInfo, on: bool) -> None:
         """Start or stop publishing NodeDebugInfo."""
-        if self._stop_debugging is not None:
-            self._stop_debugging()
-            self._stop_debugging = None
-            for publisher in self._publishers:
-                publisher.unregister()
-            self._publishers = ()
+        self._debugging.close()
         if on:
             publisher = rospy.Publisher(
                 names.debug_topic(self._node_id), NodeDebugInfo, queue_size=2
@@ -82,8 +78,9 @@ class AntennaPanel:
                 if of_all.get_num_connections():
                     of_all.publish(message)
 
-            self._publishers = (publisher, of_all)
-            self._stop_debugging = self._slot.call_every(DEBUG_PERIOD_S, publish)
+            for end in (publisher.unregister, of_all.unregister):
+                self._debugging.callback(end)
+            self._debugging.callback(self._slot.call_every(DEBUG_PERIOD_S, publish))
 
     def _debug_info(self, info: IMeshDebugInfo) -> NodeDebugInfo:
         return NodeDebugInfo(
@@ -108,3 +105,14 @@ class AntennaPanel:
                     self._node_id,
                 )
         return PowerSwitchResponse()
+
+
+def node_runs(node_id: int) -> bool:
+    """Whether a process offers this node's power switch, and accepts connections."""
+    switch = PersistentService(names.power_switch(node_id), PowerSwitch)
+    try:
+        switch.connect()
+    except ServiceGone:
+        return False
+    switch.close()
+    return True

@@ -1,48 +1,100 @@
-"""EmulatedRadios: one emulated air, with one chip at the position of each drone."""
+"""Emulated radios: one air, and on each drone a chip with the real driver."""
 
 from __future__ import annotations
 
 import functools
 import logging
 import random
-from typing import Callable, Iterable
+from typing import Iterable
 
-from drone_mesh.execution import ExecutorSlot, MeshExecutor
+import rospy
+
+from drone_mesh.communication.interfaces import IMeshDebugInfo, IMeshNetwork
+from drone_mesh.execution import ExecutorSlot
+from drone_mesh.msg import NRF24
 from drone_mesh.nrf24.airtime import NS_PER_S
 from drone_mesh.nrf24.emulator.air import Air
 from drone_mesh.nrf24.emulator.chip import EmulatedChip
 from drone_mesh.nrf24.emulator.links import LogDistance
 from drone_mesh.nrf24.emulator.wall_clock import WallClock
+from drone_mesh.nrf24.high_level import NRF24HighLevelInterface
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
 from drone_mesh.nrf24.settings import DataRate, RadioSettings
+from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.packet_samples import PacketSamples
-from drone_mesh.ros.host.emulated_nrf24 import EmulatedNRF24
-from drone_mesh.world.drones import VirtualDrone
+from drone_mesh.ros.host.antenna_panel import AntennaPanel
+from drone_mesh.ros.host.radios import Radios
 from drone_mesh.world.engine import DroneState
+from drone_mesh.world.factory import VirtualDrone
+
+_RECEIVED_QUEUE = 32  # packets that may wait for a slow subscriber of /Node/<id>
 
 _log = logging.getLogger(__name__)
 
 
-class EmulatedRadios:
-    """The real driver on emulated chips, in wall time.
+class EmulatedNRF24(NRF24HighLevelInterface):
+    """The radio of one node.
 
-    The antennas queue what the nodes send, so that no send waits for its chip, and one worker
-    drives all nodes. The world's thread sets the positions, in each step in which a drone moves.
+    Publishes: /Node/<id> (NRF24): the received packets; /Nodes/<id>/debug (NodeDebugInfo)
+    Services:  /Nodes/<id>/powerSwitch (PowerSwitch)
+
+    A send only queues the packet; two threads of the antenna send and receive.
     """
-
-    own_threads = True
-    never_handed_over = 0
-    ready = True
 
     def __init__(
         self,
-        drones: Iterable[VirtualDrone],
-        max_distance_m: float,
-        rate: DataRate,
-        seed: int,
-        clock: Callable[[], float],
+        node_id: int,
+        radio: NRF24LowLevelInterface,
+        slot: ExecutorSlot,
+        samples: PacketSamples,
     ) -> None:
-        """Start the thread of the air; `close` ends it. `clock` gives simulated seconds.
+        """`slot` drives the mesh component of this node; `samples` are of what arrives."""
+        super().__init__(radio, slot.submit, on_payload=self._publish)
+        self._slot = slot
+        self._samples = samples
+        self._received = rospy.Publisher(
+            names.node_topic(node_id), NRF24, queue_size=_RECEIVED_QUEUE
+        )
+        self._panel = AntennaPanel(node_id, slot, self.on, self._switch)
+
+    def start_antenna(self, mesh: IMeshNetwork) -> None:
+        """Set the chip up and listen. Raises RadioError."""
+        super().start_antenna(mesh)
+        self._panel.start()
+
+    def stop_antenna(self) -> None:
+        """Power the chip down, and leave the ROS graph."""
+        self._panel.stop()
+        super().stop_antenna()
+        self._received.unregister()
+
+    def debugging_mode(self, info: IMeshDebugInfo, on: bool) -> None:
+        """Start or stop publishing NodeDebugInfo."""
+        self._panel.debugging_mode(info, on)
+
+    def _switch(self, on: bool) -> None:
+        self._slot.submit(lambda _now_s: self.switch_power(on))
+
+    def _publish(self, payload: bytes) -> None:
+        if self._samples.watched:
+            self._samples.note(payload)
+        if not rospy.is_shutdown():
+            self._received.publish(NRF24(payload))
+
+
+class EmulatedRadios(Radios):
+    """The real driver on emulated chips, in wall time.
+
+    The antennas queue what the nodes send, so that no send waits for its chip. The world's thread
+    sets the positions, in each step in which a drone moves.
+    """
+
+    in_wall_time = True
+
+    def __init__(
+        self, drones: Iterable[VirtualDrone], max_distance_m: float, rate: DataRate, seed: int
+    ) -> None:
+        """Start the thread of the air; `close` ends it.
 
         The edge of the range is at `max_distance_m`.
         """
@@ -53,7 +105,6 @@ class EmulatedRadios:
         self._air = Air(self._wall_clock, links, random.Random(f"{seed} air"))
         self._settings = RadioSettings(data_rate=rate)
         self._seed = seed
-        self._executor = MeshExecutor(clock, clock_notifies=True, name="mesh_node")
         self._airtime_s, self._measured_s = 0.0, 0.0
         self._samples = PacketSamples()
         self._chips: dict[int, EmulatedChip] = {}
@@ -72,11 +123,6 @@ class EmulatedRadios:
         chip = EmulatedChip(self._air, f"node {drone.node_id}", drone.engine.state.position)
         drone.engine.add_listener(functools.partial(_carry, chip))
         self._chips[drone.node_id] = chip
-
-    @property
-    def under_way(self) -> int:
-        """Always 0: the chips run in wall time, and the world does not wait for them."""
-        return 0
 
     def figures(self) -> dict[str, float]:
         """Figures of the air and all radios. One thread."""
@@ -97,13 +143,8 @@ class EmulatedRadios:
         }
 
     def start(self) -> None:
-        """Start the worker."""
-        self._executor.start()
+        """Start publishing what is in the air."""
         self._samples.start()
-
-    def slot(self) -> ExecutorSlot:
-        """A slot in the worker of all nodes."""
-        return self._executor.slot()
 
     def antenna(self, node_id: int, slot: ExecutorSlot) -> EmulatedNRF24:
         """The antenna of a node, with a driver for its chip."""
@@ -126,18 +167,13 @@ class EmulatedRadios:
         self._antennas.pop(node_id, None)
         self._chips.pop(node_id, None)
 
-    def time_advanced(self) -> None:
-        """Simulated time has advanced."""
-        self._executor.time_advanced()
-
     def fall_silent(self) -> None:
         """From now on every send of every node fails at once."""
         for antenna in list(self._antennas.values()):
             antenna.fall_silent()
 
     def close(self) -> None:
-        """Stop the worker and the air; returns when their threads have ended."""
-        self._executor.stop()
+        """Stop the air; returns when its thread has ended."""
         self._wall_clock.close()
 
 

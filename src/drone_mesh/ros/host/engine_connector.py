@@ -99,15 +99,12 @@ class RosDroneEngineConnector(IDroneEngine):
         return location_of(answer)
 
     def _ask(self) -> RequestGPSResponse:
-        if not self._gps.is_connected():
-            if time.monotonic() < self._gone_until_s:
-                raise ServiceGone(f"{self._gps.name}: no answer a moment ago")
-            try:
-                self._gps.connect()
-            except ServiceGone:
-                self._gone_until_s = time.monotonic() + CONNECT_AGAIN_AFTER_S
-                raise
+        is_connected = self._gps.is_connected()
+        if not is_connected and time.monotonic() < self._gone_until_s:
+            raise ServiceGone(f"{self._gps.name}: no answer a moment ago")
         try:
+            if not is_connected:
+                self._gps.connect()
             return self._gps.call(RequestGPSRequest())
         except ServiceGone:
             self._gone_until_s = time.monotonic() + CONNECT_AGAIN_AFTER_S

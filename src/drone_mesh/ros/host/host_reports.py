@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import threading
 from typing import Callable
 
 import rospy
 
 from drone_mesh.communication.component import MeshnetworkComponent
-from drone_mesh.communication.gateway import MeshnetworkGateway
 from drone_mesh.communication.observer import MeshEvent
+from drone_mesh.drone.roles import Role
 from drone_mesh.msg import HostReport, NodeState
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import event_msg, ros_time
+from drone_mesh.ros.graph.periodic import Periodic
 from drone_mesh.ros.host.node_snapshots import NodeSnapshots, Worker
 from drone_mesh.state.events import EventBatcher
 
@@ -21,29 +21,30 @@ REPORT_PERIOD_PER_NODE_S = 0.004  # our choice: 254 nodes with 200 neighbours ea
 REPORTS_QUEUE = 4  # reports that may wait for a slow subscriber; each one is complete in itself
 
 
-class HostReports:
+class HostReports(Periodic):
     """Reports on all nodes of this process, in one thread of its own.
 
     Publishes: /mesh/reports (HostReport), once or twice a second of wall time, also while time
                stands still
 
-    The workers call `add` and `drop`, any thread calls `observe`. Each node's worker makes its
-    NodeState, which does not change any more.
+    The worker calls `add` and `drop`, any thread calls `observe`. The worker makes the NodeState of
+    each node, which does not change any more.
     """
 
     def __init__(self) -> None:
+        super().__init__("host reports", REPORT_PERIOD_S)
         self._snapshots: NodeSnapshots[NodeState] = NodeSnapshots(REPORT_PERIOD_S)
         self._batcher = EventBatcher()
         self._publisher = rospy.Publisher(names.REPORTS_TOPIC, HostReport, queue_size=REPORTS_QUEUE)
-        self._stopped = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="host reports", daemon=True)
 
     def add(
-        self, component: MeshnetworkComponent, worker: Worker, antenna_on: Callable[[], bool]
+        self,
+        role: Role,
+        component: MeshnetworkComponent,
+        worker: Worker,
+        antenna_on: Callable[[], bool],
     ) -> None:
         """Report on this node, which `worker` drives, from now on."""
-        gateway = isinstance(component, MeshnetworkGateway)
-        role = NodeState.GATEWAY if gateway else NodeState.ROUTER
         node_id = component.get_node_id()
         self._snapshots.add(component, worker, lambda: NodeState(id=node_id, role=role), antenna_on)
 
@@ -55,33 +56,19 @@ class HostReports:
         """The observer of all components of this process."""
         self._batcher.observe(event)
 
-    def start(self) -> None:
-        """Start reporting."""
-        self._thread.start()
-
     def stop(self) -> None:
         """Stop reporting; returns when the thread has ended."""
-        self._stopped.set()
-        self._thread.join()
+        super().stop()
         self._publisher.unregister()
 
-    def _run(self) -> None:
-        while not (self._stopped.wait(self._period_s()) or rospy.is_shutdown()):
-            # Events wait for a subscriber; published without one they would be lost.
-            if self._publisher.get_num_connections():
-                self._report()
-
-    def _period_s(self) -> float:
-        return max(REPORT_PERIOD_S, REPORT_PERIOD_PER_NODE_S * len(self._snapshots))
-
-    def _report(self) -> None:
+    def _work(self) -> None:
+        self._period_s = max(REPORT_PERIOD_S, REPORT_PERIOD_PER_NODE_S * len(self._snapshots))
+        # Events wait for a subscriber; published without one they would be lost.
+        if not self._publisher.get_num_connections():
+            return
         now_s = rospy.get_time()
         report = HostReport(host=rospy.get_name())
         report.header.stamp = ros_time(now_s)
         report.nodes = self._snapshots.take()
         report.events = [event_msg(event) for event in self._batcher.take()]
-        try:
-            self._publisher.publish(report)
-        except rospy.ROSException:  # the topic was closed: the node shuts down
-            if not rospy.is_shutdown():
-                raise
+        self._publisher.publish(report)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from contextlib import ExitStack
 from functools import partial
 
 import rospy
@@ -40,9 +41,8 @@ class RosInternetMock(IInternetConnection):
         """`node_id` is the gateway's."""
         self._node_id = node_id
         self._slot = slot
-        self._subscribers: list[rospy.Subscriber] = []
+        self._open = ExitStack()  # what `disconnect` closes
         self._answers: rospy.Publisher | None = None
-        self._switch: rospy.Service | None = None
         self._limit = Allowance(MOST_ORDERS_AT_ONCE, ORDER_PERIOD_S)
         self._throttled_log = ThrottledLog(_log)
 
@@ -63,27 +63,22 @@ class RosInternetMock(IInternetConnection):
             return PowerSwitchResponse()
 
         self.disconnect()
-        self._switch = rospy.Service(names.internet_switch(self._node_id), PowerSwitch, switch)
+        service = rospy.Service(names.internet_switch(self._node_id), PowerSwitch, switch)
+        self._open.callback(service.shutdown)
         self._answers = rospy.Publisher(
             names.GATEWAY_ANSWERS_TOPIC, FlightOrderAnswer, tcp_nodelay=True, queue_size=_QUEUE
         )
-        self._subscribers = [
-            rospy.Subscriber(
+        self._open.callback(self._answers.unregister)
+        for topic, shared in ((names.GATEWAY_TOPIC, False), (names.SHARED_PLACE_TOPIC, True)):
+            subscriber = rospy.Subscriber(
                 topic, RequestGatewayDroneFlight, partial(order, shared), tcp_nodelay=True
             )
-            for topic, shared in ((names.GATEWAY_TOPIC, False), (names.SHARED_PLACE_TOPIC, True))
-        ]
+            self._open.callback(subscriber.unregister)
 
     def disconnect(self) -> None:
         """Leave the topics. A second call changes nothing."""
-        if self._switch is not None:
-            self._switch.shutdown()
-            self._switch = None
-        for subscriber in self._subscribers:
-            subscriber.unregister()
-        if self._answers is not None:
-            self._answers.unregister()
-        self._subscribers, self._answers = [], None
+        self._open.close()
+        self._answers = None
 
     def _order(
         self,

@@ -2,32 +2,26 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import logging
-import threading
 import time
 from typing import Callable, Mapping
 
 from drone_mesh.drone.roles import Role
 from drone_mesh.errors import MeshError
-from drone_mesh.execution import MeshExecutor
+from drone_mesh.execution import ExecutorSlot, MeshExecutor
 from drone_mesh.ros.graph.figures import FiguresPublisher
+from drone_mesh.ros.graph.waiting import comes_true
 from drone_mesh.ros.host.announcements import PlaceOf
-from drone_mesh.ros.host.grounded_drones import GroundedDrones
+from drone_mesh.ros.host.flown_drones import GroundedDrones
 from drone_mesh.ros.host.host_reports import HostReports
 from drone_mesh.ros.host.mesh_settings import MeshSettings
-from drone_mesh.ros.host.radios import Radios, VirtualRadios
-from drone_mesh.ros.host.virtual_raspberry_pi import (
-    VirtualRaspberryPi,
-    VirtualRaspberryPiGateway,
-    VirtualRaspberryPiRouter,
-)
+from drone_mesh.ros.host.radios import Radios
+from drone_mesh.ros.host.virtual_nrf24 import VirtualRadios
+from drone_mesh.ros.host.virtual_raspberry_pi import VirtualRaspberryPi
 from drone_mesh.state.figures import LOST_IN_RANGE, WORST_LAG
 
 RADIOS_TIMEOUT_S = 10.0  # our choice: wall seconds to wait for a simulator before starting nodes
-_POLL_PERIOD_S = 0.02  # wall; our choice
-_KINDS = {Role.GATEWAY: VirtualRaspberryPiGateway, Role.ROUTER: VirtualRaspberryPiRouter}
 
 _log = logging.getLogger(__name__)
 
@@ -37,7 +31,7 @@ class MeshHost:
 
     Figures: worst timer lag, lost in range, on /diagnostics
 
-    Any thread may call every function. The workers fill `nodes`, each with the nodes it drives.
+    Any thread may call every function. The worker fills `nodes`.
     """
 
     def __init__(
@@ -54,7 +48,7 @@ class MeshHost:
         any thread. `radios`: virtual ones by default.
         """
         self._reports = HostReports()
-        self._settings = dataclasses.replace(settings, observer=self._reports.observe)
+        self._settings = settings
         self._on_failure = on_failure
         self.executor = MeshExecutor(clock, clock_notifies=True, name="mesh_host")
         self._radios = VirtualRadios(self.executor, place_of) if radios is None else radios
@@ -75,12 +69,12 @@ class MeshHost:
 
         Nodes with emulated radios do not count, because they and their chips run in wall time.
         """
-        return self.executor.lag_s(now_s)
+        return 0.0 if self._radios.in_wall_time else self.executor.lag_s(now_s)
 
     @property
     def idle(self) -> bool:
-        """Whether the worker of the nodes waits for work."""
-        return self.executor.idle
+        """Whether the nodes wait for work; those with emulated radios do not count."""
+        return self._radios.in_wall_time or self.executor.idle
 
     @property
     def under_way(self) -> int:
@@ -90,34 +84,31 @@ class MeshHost:
     def time_advanced(self) -> None:
         """The clock has advanced."""
         self.executor.time_advanced()
-        self._radios.time_advanced()
 
     def wait_for_radios(self, give_up: Callable[[], bool]) -> None:
         """Return when packets can be sent, after RADIOS_TIMEOUT_S, or when `give_up` returns True.
 
         Nodes start without a simulator as well, but their first packets are lost then.
         """
-        deadline_s = time.monotonic() + RADIOS_TIMEOUT_S
-        while not self._radios.ready and not give_up():
-            if time.monotonic() > deadline_s:
-                _log.warning("no simulator after %g s: starting without it", RADIOS_TIMEOUT_S)
-                return
-            time.sleep(_POLL_PERIOD_S)
+        ready = comes_true(lambda: self._radios.ready, RADIOS_TIMEOUT_S, give_up)
+        if not (ready or give_up()):
+            _log.warning("no simulator after %g s: starting without it", RADIOS_TIMEOUT_S)
 
     def start_nodes(self, nodes: Mapping[int, Role]) -> None:
         """Start these nodes, given by id and role, in this order."""
         begun_s = time.monotonic()
         if not nodes:
             return
-        left = threading.Semaphore(len(nodes) - 1)  # emulated radios start in parallel
+        for node_id, role in nodes.items():
+            slot = self.executor.slot()
+            slot.submit(functools.partial(self._start_node, node_id, role, slot))
 
-        def on_start() -> None:
-            if not left.acquire(blocking=False) and not self._stopping:
+        def report(_now_s: float) -> None:
+            if self.nodes.keys() >= nodes.keys() and not self._stopping:
                 noun = "node" if len(nodes) == 1 else "nodes"
                 _log.info("started %d %s in %.1f s", len(nodes), noun, time.monotonic() - begun_s)
 
-        for node_id, role in nodes.items():
-            self._submit_start(node_id, role, on_start)
+        self.executor.submit(report)
 
     def end_node(self, node_id: int) -> None:
         """End this node for good; returns at once. An unknown node is ignored."""
@@ -130,7 +121,7 @@ class MeshHost:
                 self._radios.remove(node_id)
                 _log.info("ended node %d", node_id)
 
-        self._radios.slot().submit(end)  # runs after the start of this node
+        self.executor.submit(end)  # runs after the start of this node
 
     def stop(self) -> None:
         """Stop all threads; returns when they have ended. Nodes not started yet never start."""
@@ -141,34 +132,31 @@ class MeshHost:
         self._radios.fall_silent()
         for node in list(self.nodes.values()):
             # Only these have threads of their own; the others end with the executor.
-            if self._radios.own_threads or isinstance(node, VirtualRaspberryPiGateway):
+            if self._radios.in_wall_time or node.role is Role.GATEWAY:
                 node.slot.submit(node.stop)
-        self._radios.close()
         self.executor.stop()
+        self._radios.close()
 
     def _take_figures(self) -> dict[str, float]:
         return {
-            WORST_LAG: self.executor.take_worst_lag_s(),
+            WORST_LAG: 0.0 if self._radios.in_wall_time else self.executor.take_worst_lag_s(),
             LOST_IN_RANGE: self._radios.never_handed_over,
             **self._radios.figures(),
         }
 
-    def _submit_start(self, node_id: int, role: Role, on_start: Callable[[], None]) -> None:
-        slot = self._radios.slot()
-
-        def start(now_s: float) -> None:
-            if self._stopping:
-                return
-            try:
-                antenna = self._radios.antenna(node_id, slot)
-                why_not_fly = functools.partial(self._grounded.reason, node_id)
-                node = _KINDS[role](node_id, self._settings, antenna, slot, why_not_fly)
-                self._reports.add(node.component, slot, node.antenna.on)
-                node.start(now_s)
-            except MeshError as error:  # retrying would not help
-                self._on_failure(f"node {node_id} cannot start: {error}")
-            else:
-                self.nodes[node_id] = node
-                on_start()
-
-        slot.submit(start)
+    def _start_node(self, node_id: int, role: Role, slot: ExecutorSlot, now_s: float) -> None:
+        if self._stopping:
+            return
+        try:
+            antenna = self._radios.antenna(node_id, slot)
+            why_not_fly = functools.partial(self._grounded.reason, node_id)
+            observer = self._reports.observe
+            node = VirtualRaspberryPi(
+                node_id, role, self._settings, observer, antenna, slot, why_not_fly
+            )
+            self._reports.add(role, node.component, slot, antenna.on)
+            node.start(now_s)
+        except MeshError as error:  # retrying would not help
+            self._on_failure(f"node {node_id} cannot start: {error}")
+        else:
+            self.nodes[node_id] = node

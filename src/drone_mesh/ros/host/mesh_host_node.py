@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import logging
-import time
 from functools import partial
-from typing import Callable
+from typing import Callable, Collection
 
 import rospy
 
@@ -13,23 +12,23 @@ from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.arguments import is_whole
 from drone_mesh.configuration import FactoryConfiguration
 from drone_mesh.drone.fleet import ids_in_words
+from drone_mesh.drone.roles import Role
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import start_node
 from drone_mesh.ros.graph.fleet_parameter import get_fleet_parameter, get_present_drones
 from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
-from drone_mesh.ros.graph.master_watch import MasterWatch
-from drone_mesh.ros.graph.node_presence import node_runs
+from drone_mesh.ros.graph.master_watch import NO_ANSWER, MasterWatch
 from drone_mesh.ros.graph.orderly_stop import OrderlyStop
 from drone_mesh.ros.graph.parameters import configured_obstacles, or_exit
 from drone_mesh.ros.graph.present_drones import PresentDrones
+from drone_mesh.ros.graph.waiting import comes_true
+from drone_mesh.ros.host.antenna_panel import node_runs
+from drone_mesh.ros.host.flown_drones import ReportedPlaces
 from drone_mesh.ros.host.followed_clock import FollowedClock
-from drone_mesh.ros.host.followed_fleet import FollowedFleet
 from drone_mesh.ros.host.mesh_host import MeshHost
 from drone_mesh.ros.host.mesh_settings import MeshSettings
-from drone_mesh.ros.host.reported_places import ReportedPlaces
 
-POLL_PERIOD_S = 0.1  # wall; our choice
 WAITING_LOG_PERIOD_S = 5.0  # wall; between two log lines about what is being waited for
 PROGRESS_PERIOD_S = 0.5  # wall; the world continues without a host that is silent for two seconds
 
@@ -37,12 +36,8 @@ _log = logging.getLogger(__name__)
 
 
 def _wait_for(what: str, is_there: Callable[[], bool], give_up: Callable[[], bool]) -> None:
-    logged_s = time.monotonic()
-    while not is_there() and not give_up():
-        if time.monotonic() - logged_s >= WAITING_LOG_PERIOD_S:
-            logged_s = time.monotonic()
-            _log.info("waiting for %s", what)
-        time.sleep(POLL_PERIOD_S)
+    while not (comes_true(is_there, WAITING_LOG_PERIOD_S, give_up) or give_up()):
+        _log.info("waiting for %s", what)
 
 
 def _whole_parameter(name: str) -> int:
@@ -86,6 +81,28 @@ def share_of_host(fleet: FactoryConfiguration, drones: PresentDrones) -> range:
     if served:
         raise ConfigurationError(f"node {served[0]} is already hosted by another process")
     return ids
+
+
+class FollowedFleet:
+    """Keeps a host's nodes equal to its share of /drone_mesh/drones. One thread."""
+
+    def __init__(self, host: MeshHost, share: Collection[int]) -> None:
+        """`share`: ids of the drones that this host runs unless another host does."""
+        self._host = host
+        self._share = share
+        self._served: dict[int, Role] = {}
+
+    def follow(self) -> None:
+        """Read the parameter once; start and end the nodes that differ."""
+        try:
+            wanted = get_present_drones().of_host(rospy.get_name(), self._share)
+        except (KeyError, *NO_ANSWER) as error:  # the master is ending or has just started
+            _log.debug("the drones are not known: %s", error)
+            return
+        for node_id in self._served.keys() - wanted.keys():
+            self._host.end_node(node_id)
+        self._host.start_nodes({n: role for n, role in wanted.items() if n not in self._served})
+        self._served = wanted
 
 
 def main() -> None:

@@ -8,7 +8,6 @@ from pathlib import Path
 
 from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.communication.named_techniques import create_routing_technique
-from drone_mesh.communication.observer import MeshObserver, ignore_events
 from drone_mesh.communication.repair.named_strategies import create_repair_strategy
 from drone_mesh.communication.repair.options import LostPlace, RepairOptions
 from drone_mesh.communication.seals.key_file import read_key_file
@@ -21,17 +20,12 @@ from drone_mesh.internet.mqtt_topics import PASSWORD_VARIABLE, Broker, parse_bro
 
 @dataclass(frozen=True)
 class MeshSettings:
-    """Settings of every node of a simulation."""
+    """Settings of every node of a simulation: the configuration, and what its words stand for."""
 
-    routing: str  # name of the routing technique
-    repair: str  # name of the repair strategy
+    configuration: FactoryConfiguration
     repair_options: RepairOptions
     timing: MeshTiming
-    seed: int
-    debug: bool
-    observer: MeshObserver
     obstacles: Obstacles | None
-    internet: str  # "mock", "http" or "mqtt"
     broker: Broker  # with "mqtt"
     key: MeshKey | None  # None: packets are not sealed
 
@@ -39,15 +33,14 @@ class MeshSettings:
     def of(
         cls, configuration: FactoryConfiguration, obstacles: Obstacles | None = None
     ) -> MeshSettings:
-        """The part of the configuration that concerns the nodes. Raises ConfigurationError.
+        """The settings of this configuration. Raises ConfigurationError.
 
         `obstacles`: nodes refuse orders to places that these make unreachable.
         """
         create_routing_technique(configuration.routing)  # fail once here instead of once per node
         create_repair_strategy(configuration.repair)
         return cls(
-            routing=configuration.routing,
-            repair=configuration.repair,
+            configuration,
             repair_options=RepairOptions(
                 clearance_m=configuration.clearance,
                 range_m=configuration.max_distance,
@@ -58,11 +51,7 @@ class MeshSettings:
                 configuration.connection_lost_after,
                 report_period_s=configuration.report_period,
             ),
-            seed=configuration.seed,
-            debug=configuration.debug,
-            observer=ignore_events,
             obstacles=obstacles,
-            internet=configuration.internet,
             key=_mesh_key(configuration.key),
             broker=parse_broker(configuration.broker, os.environ.get(PASSWORD_VARIABLE, "")),
         )

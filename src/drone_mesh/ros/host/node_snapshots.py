@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import queue
 from typing import Callable, Generic, Protocol, TypeVar
 
@@ -10,6 +11,7 @@ from drone_mesh.state.model import NodeStatus
 from drone_mesh.state.observation import describe_component
 
 S = TypeVar("S", bound=NodeStatus)
+_Fill = Callable[[Callable[[int], None], float], None]  # called with what to tell, and the time
 
 
 class Worker(Protocol):
@@ -28,11 +30,11 @@ class NodeSnapshots(Generic[S]):
     def __init__(self, wait_s: float) -> None:
         """`wait_s`: wall seconds without a new state after which `take` stops waiting."""
         self._wait_s = wait_s
-        self._workers: dict[int, tuple[Worker, Callable[[float], S]]] = {}
+        self._fills: dict[int, tuple[Worker, _Fill]] = {}
         self._latest: dict[int, S] = {}
 
     def __len__(self) -> int:
-        return len(self._workers)
+        return len(self._fills)
 
     def add(
         self,
@@ -43,37 +45,31 @@ class NodeSnapshots(Generic[S]):
     ) -> None:
         """Describe this node from now on, each time in a state made by `new`."""
 
-        def describe(now_s: float) -> S:
-            state = new()
-            describe_component(state, component, antenna_on(), now_s)
-            return state
+        node_id = component.get_node_id()
 
-        self._workers[component.get_node_id()] = (worker, describe)
+        def fill(done: Callable[[int], None], now_s: float) -> None:
+            if node_id in self._fills:
+                state = new()
+                describe_component(state, component, antenna_on(), now_s)
+                self._latest[node_id] = state
+            done(node_id)
+
+        self._fills[node_id] = (worker, fill)
 
     def drop(self, node_id: int) -> None:
         """Forget this node."""
-        self._workers.pop(node_id, None)
+        self._fills.pop(node_id, None)
         self._latest.pop(node_id, None)
 
     def take(self) -> list[S]:
         """A state of each node, of now; of a node whose worker is busy, the one before."""
         done: queue.SimpleQueue[int] = queue.SimpleQueue()
-        workers = list(self._workers.items())
-        for node_id, (worker, describe) in workers:
-            worker.submit(self._filling(node_id, describe, done))
-        for _worker in workers:
+        fills = list(self._fills.values())
+        for worker, fill in fills:
+            worker.submit(functools.partial(fill, done.put))
+        for _fill in fills:
             try:
                 done.get(timeout=self._wait_s)
             except queue.Empty:
                 break
         return list(self._latest.values())
-
-    def _filling(
-        self, node_id: int, describe: Callable[[float], S], done: queue.SimpleQueue[int]
-    ) -> Callable[[float], None]:
-        def fill(now_s: float) -> None:
-            if node_id in self._workers:
-                self._latest[node_id] = describe(now_s)
-            done.put(node_id)
-
-        return fill

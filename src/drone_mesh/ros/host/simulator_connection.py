@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import struct
-from typing import Sequence
+from typing import Any, Sequence
 
 from drone_mesh.communication.messages import readdressed, receiver, sender
 from drone_mesh.ros.graph import names
@@ -15,18 +15,7 @@ from drone_mesh.ros.graph.persistent_service import (
     ServiceClass,
     ServiceGone,
 )
-from drone_mesh.srv import (
-    AreaScan,
-    AreaScanRequest,
-    AreaScanResponse,
-    Broadcast,
-    BroadcastRequest,
-    BroadcastResponse,
-    WirelessMessage,
-    WirelessMessages,
-    WirelessMessagesRequest,
-    WirelessMessagesResponse,
-)
+from drone_mesh.srv import AreaScan, Broadcast, WirelessMessage, WirelessMessages
 
 _LENGTH = struct.Struct("<I")  # of an array, as ROS serialises it
 
@@ -44,38 +33,26 @@ class SimulatorConnection:
 
     def __init__(self) -> None:
         """Connect. Raises ServiceGone."""
-        self._message = PersistentService(names.MESSAGE_SERVICE, WirelessMessage)
-        self._messages: (
-            PersistentService[WirelessMessagesRequest, WirelessMessagesResponse] | None
-        ) = None
-        self._broadcast: PersistentService[BroadcastRequest, BroadcastResponse] | None = None
-        self._others: PersistentService[AreaScanRequest, AreaScanResponse] | None = None
+        self._services: list[PersistentService[Any, Any]] = []  # those that are open
         try:
-            self._message.connect()
-            self._messages = _if_offered(names.MESSAGES_SERVICE, WirelessMessages)
-            self._broadcast = _if_offered(names.BROADCAST_SERVICE, Broadcast)
+            self._message = self._connect(names.MESSAGE_SERVICE, WirelessMessage)
+            self._messages = self._if_offered(names.MESSAGES_SERVICE, WirelessMessages)
+            self._broadcast = self._if_offered(names.BROADCAST_SERVICE, Broadcast)
             if self._broadcast is None:
-                self._others = PersistentService(names.OTHERS_IN_RANGE_SERVICE, AreaScan)
-                self._others.connect()
+                self._others = self._connect(names.OTHERS_IN_RANGE_SERVICE, AreaScan)
         except ServiceGone:
             self.close()
             raise
-
-    @property
-    def simulator(self) -> str:
-        """The name of the simulator's node; empty if unknown."""
-        return self._message.server
+        self.simulator = self._message.server  # the name of its node; empty if unknown
 
     def is_connected(self) -> bool:
         """Whether all connections are still open at the other end."""
-        services = (self._message, self._messages, self._broadcast, self._others)
-        return all(service is None or service.is_connected() for service in services)
+        return all(service.is_connected() for service in self._services)
 
     def close(self) -> None:
         """Close all connections."""
-        for service in (self._message, self._messages, self._broadcast, self._others):
-            if service is not None:
-                service.close()
+        for service in self._services:
+            service.close()
 
     def send(self, payload: bytes) -> bool:
         """Hand over a packet for the node in its byte 3. True: that node received it."""
@@ -99,19 +76,22 @@ class SimulatorConnection:
         if self._broadcast is not None:
             # The fields of a BroadcastRequest; the answer: an array of the nodes that received it.
             return len(self._broadcast.call_bytes(asker + payload)) - _LENGTH.size
-        if self._others is None:
-            return 0
         others = self._others.call_bytes(asker)[_LENGTH.size :]
         return sum(self.send(readdressed(payload, node_id)) for node_id in others)
 
-
-def _if_offered(
-    name: str, service_class: ServiceClass[Request, Response]
-) -> PersistentService[Request, Response] | None:
-    service = PersistentService(name, service_class)
-    try:
+    def _connect(
+        self, name: str, service_class: ServiceClass[Request, Response]
+    ) -> PersistentService[Request, Response]:
+        service = PersistentService(name, service_class)
         service.connect()
-    except ServiceGone as error:
-        _log.info("the simulator does not offer %s, using single messages: %s", name, error)
-        return None
-    return service
+        self._services.append(service)
+        return service
+
+    def _if_offered(
+        self, name: str, service_class: ServiceClass[Request, Response]
+    ) -> PersistentService[Request, Response] | None:
+        try:
+            return self._connect(name, service_class)
+        except ServiceGone as error:
+            _log.info("the simulator does not offer %s, using single messages: %s", name, error)
+            return None

@@ -16,6 +16,7 @@ from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.logs import ThrottledLog
 from drone_mesh.ros.graph.persistent_service import ServiceGone, ServiceRefused
 from drone_mesh.ros.host.announcements import Announcements, PlaceOf, probe_of
+from drone_mesh.ros.host.radios import Radios
 from drone_mesh.ros.host.simulator_connection import SimulatorConnection
 
 POLL_PERIOD_S = 0.1  # our choice: wall seconds between two attempts to reach a simulator
@@ -25,7 +26,7 @@ POLLS_PER_ROUND = 50  # our choice: each antenna is announced at least once in s
 _log = logging.getLogger(__name__)
 
 
-class SimulatorLink(rospy.SubscribeListener):
+class SimulatorLink(Radios, rospy.SubscribeListener):
     """Finds a simulator, announces the antennas to it, and hands packets over.
 
     Publishes: /WirelessSignalSimulator (DroneInfo)
@@ -44,8 +45,8 @@ class SimulatorLink(rospy.SubscribeListener):
         self._throttled_log = ThrottledLog(_log)
         self._wake = threading.Event()
         self._stopping = False
-        self._never_handed_over = 0  # this and the next: written by the executor's worker
-        self._under_way = 0
+        self.never_handed_over = 0  # this and the next: written by the executor's worker
+        self.under_way = 0  # the sum over all processes is what is in transit or in a queue
         self._simulator = ""  # name of the latest one; written by the link's own thread
         self._probing = False  # the worker was asked to probe and has not done so yet
         self._publisher = rospy.Publisher(
@@ -67,25 +68,12 @@ class SimulatorLink(rospy.SubscribeListener):
         """Start looking for a simulator."""
         self._thread.start()
 
-    def stop(self) -> None:
-        """Stop looking; returns when the thread has ended."""
+    def fall_silent(self) -> None:
+        """Stop looking for a simulator; returns when the thread has ended."""
         self._stopping = True
         self._wake.set()
         if self._thread.is_alive():
             self._thread.join()
-
-    @property
-    def never_handed_over(self) -> int:
-        """Packets, since the start, that no simulator accepted."""
-        return self._never_handed_over
-
-    @property
-    def under_way(self) -> int:
-        """Packets that this process handed over, minus those that its nodes have processed.
-
-        The sum over all processes is the number of packets in transit or in a queue.
-        """
-        return self._under_way
 
     def packet_processed(self, sender: str = "") -> None:
         """A node of this process has processed a packet of this ROS node. On the worker.
@@ -93,7 +81,7 @@ class SimulatorLink(rospy.SubscribeListener):
         Packets that other ROS nodes than the simulator send are not counted.
         """
         if not (sender and self._simulator) or sender == self._simulator:
-            self._under_way -= 1
+            self.under_way -= 1
 
     @property
     def ready(self) -> bool:
@@ -112,19 +100,19 @@ class SimulatorLink(rospy.SubscribeListener):
         if connection is None:
             if payloads:
                 self._throttled_log.error("packet not sent", "no simulator")
-                self._never_handed_over += len(payloads)
+                self.never_handed_over += len(payloads)
             return [False] * len(payloads)
         try:
             if len(payloads) > 1:
                 taken = connection.send_all(payloads)
             else:
                 taken = [connection.send(payload) for payload in payloads]
-            self._under_way += sum(taken)
+            self.under_way += sum(taken)
             return taken
         except ServiceRefused as error:
             self._throttled_log.warning("packet refused", str(error))
         except ServiceGone as error:
-            self._never_handed_over += len(payloads)
+            self.never_handed_over += len(payloads)
             self._lost(connection, error)
         return [False] * len(payloads)
 
@@ -133,15 +121,15 @@ class SimulatorLink(rospy.SubscribeListener):
         connection = self._connection
         if connection is None:
             self._throttled_log.error("packet not sent", "no simulator")
-            self._never_handed_over += 1
+            self.never_handed_over += 1
             return
         try:
-            self._under_way += connection.broadcast(payload)
+            self.under_way += connection.broadcast(payload)
         except ServiceRefused:
             # A new simulator, to which this antenna will soon be announced: not worth a log line.
             self._throttled_log.counts["broadcast refused"] += 1
         except ServiceGone as error:
-            self._never_handed_over += 1
+            self.never_handed_over += 1
             self._lost(connection, error)
 
     def _probe(self, _now_s: float) -> None:

@@ -120,3 +120,11 @@ class VirtualNRF24(IWirelessCommunication):
                 self._on = on
                 self._link.antennas.announce(self)
                 self._slot.submit(lambda now_s: mesh.on_antenna_power(on, now_s))
+
+
+class VirtualRadios(SimulatorLink):
+    """An ideal disc, in the process of the WirelessSignalSimulator."""
+
+    def antenna(self, node_id: int, slot: ExecutorSlot) -> VirtualNRF24:
+        """The antenna of a node."""
+        return VirtualNRF24(node_id, self, slot)

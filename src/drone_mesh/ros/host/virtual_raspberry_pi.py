@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import abc
 import random
 from typing import Callable
 
 from drone_mesh.communication.assembly import assemble_component
 from drone_mesh.communication.interfaces import IInternetConnection, IWirelessCommunication
-from drone_mesh.communication.observer import Observers
+from drone_mesh.communication.observer import MeshObserver, Observers
 from drone_mesh.communication.seals.sealed_antenna import SealedAntenna
+from drone_mesh.drone.roles import Role
 from drone_mesh.execution import ExecutorSlot
 from drone_mesh.internet import DEFAULT_PORT
 from drone_mesh.internet.http_settings import HttpSettings
@@ -22,7 +22,7 @@ from drone_mesh.ros.host.users_of_node import UsersOfNode
 from drone_mesh.users.desk import UsersDesk
 
 
-class VirtualRaspberryPi(abc.ABC):
+class VirtualRaspberryPi:
     """Routing technique, engine connector, antenna, and the mesh component built from them.
 
     For the executor's worker only: create, start and stop it there.
@@ -31,7 +31,9 @@ class VirtualRaspberryPi(abc.ABC):
     def __init__(
         self,
         node_id: int,
+        role: Role,
         settings: MeshSettings,
+        observer: MeshObserver,
         antenna: IWirelessCommunication,
         slot: ExecutorSlot,
         why_not_fly: Callable[[], str],
@@ -39,14 +41,14 @@ class VirtualRaspberryPi(abc.ABC):
         """`why_not_fly` as for RosDroneEngineConnector.
 
         Raises ConfigurationError for a routing technique that does not exist."""
+        configuration = settings.configuration
         self.node_id = node_id
-        self.settings = settings
+        self.role = role
         self.engine = RosDroneEngineConnector(node_id, why_not_fly, settings.obstacles)
-        self.antenna = antenna
         self.slot = slot
         self.users = UsersDesk(node_id, slot.submit)
         self._users_of_node = UsersOfNode(self.users)
-        self._observers = Observers(settings.observer)
+        self._observers = Observers(observer)
         if settings.key is not None:
             antenna = SealedAntenna(
                 antenna,
@@ -60,14 +62,14 @@ class VirtualRaspberryPi(abc.ABC):
             node_id,
             antenna,
             self.engine,
-            random.Random(f"{settings.seed}/{node_id}"),
-            internet=self._make_internet(),
-            routing=settings.routing,
-            repair=settings.repair,
+            random.Random(f"{configuration.seed}/{node_id}"),
+            internet=self._make_internet(settings) if role is Role.GATEWAY else None,
+            routing=configuration.routing,
+            repair=configuration.repair,
             options=settings.repair_options,
             timing=settings.timing,
             observer=self._observers,
-            debug=settings.debug,
+            debug=configuration.debug,
         )
 
     def start(self, now_s: float) -> None:
@@ -84,29 +86,16 @@ class VirtualRaspberryPi(abc.ABC):
         self.component.stop()
         self.engine.disconnect()
 
-    @abc.abstractmethod
-    def _make_internet(self) -> IInternetConnection | None:
-        """A gateway's internet side; None for a router."""
-
-
-class VirtualRaspberryPiRouter(VirtualRaspberryPi):
-    """Runs a router."""
-
-    def _make_internet(self) -> None:
-        return None
-
-
-class VirtualRaspberryPiGateway(VirtualRaspberryPi):
-    """Runs a gateway."""
-
-    def _make_internet(self) -> IInternetConnection:
+    def _make_internet(self, settings: MeshSettings) -> IInternetConnection:
+        """A gateway's internet side."""
         mock = RosInternetMock(self.node_id, self.slot)
-        if self.settings.internet == "mock":
+        internet = settings.configuration.internet
+        if internet == "mock":
             return mock
-        if self.settings.internet == "mqtt":
+        if internet == "mqtt":
             # Only one gateway forwards what is published; several would send it several times.
-            sends, broker = self.node_id == 0, self.settings.broker
-            mqtt = mqtt_internet(self.slot.submit, self.users, broker, sends=sends)
+            sends = self.node_id == 0
+            mqtt = mqtt_internet(self.slot.submit, self.users, settings.broker, sends=sends)
             self._observers.add(mqtt.observe)
             return SeveralInternets(mock, mqtt)
         http = http_internet(

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import functools
 import logging
-import time
 from typing import Sequence
 
 import actionlib
 import rospy
 
+from drone_mesh import srv
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.drone.fleet import ids_in_words
 from drone_mesh.drone.goal import check_goal
@@ -24,37 +24,14 @@ from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
 from drone_mesh.ros.graph.master_watch import MasterWatch
 from drone_mesh.ros.graph.parameters import manager_layouts, or_exit
 from drone_mesh.ros.graph.present_drones import PresentDrones
+from drone_mesh.ros.graph.waiting import comes_true
 from drone_mesh.ros.services.order_answers import OrderAnswers, Outcomes
 from drone_mesh.ros.services.order_summary import OrderSummary
 from drone_mesh.ros.services.standing_layouts import Given, StandingLayouts
-from drone_mesh.srv import (
-    Casus,
-    CasusRequest,
-    CasusResponse,
-    OrderFlight,
-    OrderFlightRequest,
-    OrderFlightResponse,
-    OrderFormation,
-    OrderFormationRequest,
-    OrderFormationResponse,
-    OrderLayout,
-    OrderLayoutRequest,
-    OrderLayoutResponse,
-    PreviewLayout,
-    PreviewLayoutRequest,
-    PreviewLayoutResponse,
-    RequestDroneFlight,
-    RequestDroneFlightRequest,
-    RequestDroneFlightResponse,
-    WithdrawLayout,
-    WithdrawLayoutRequest,
-    WithdrawLayoutResponse,
-)
 from drone_mesh.state.standing_orders import PartState
 
 WAIT_FOR_GATEWAY_S = 3.0  # of wall time (docs/ros.md, "Drone manager")
 ANSWERS_TIMEOUT_S = 1.0  # our choice, wall: a gateway answers in milliseconds, if it answers
-POLL_PERIOD_S = 0.05
 NO_GATEWAY = "no gateway is running to take the order"
 ORDERS_IN_QUEUE = 512  # two whole fleets
 
@@ -90,40 +67,36 @@ class DroneManager:
             functools.partial(self._publish, allow_shared_place=True), self._order_case
         )
         for name in (names.REQUEST_MOVEMENT_SERVICE, names.SHORT_REQUEST_MOVEMENT_SERVICE):
-            rospy.Service(name, RequestDroneFlight, self._request_movement)
+            rospy.Service(name, srv.RequestDroneFlight, self._request_movement)
         for name in (names.SET_TO_CASUS_SERVICE, names.SHORT_SET_TO_CASUS_SERVICE):
-            rospy.Service(name, Casus, self._set_to_casus)
-        rospy.Service(names.ORDER_FLIGHT_SERVICE, OrderFlight, self._order_flight)
-        rospy.Service(names.ORDER_LAYOUT_SERVICE, OrderLayout, self._order_layout)
-        rospy.Service(names.ORDER_FORMATION_SERVICE, OrderFormation, self._order_formation)
-        rospy.Service(names.PREVIEW_LAYOUT_SERVICE, PreviewLayout, self._preview_layout)
-        rospy.Service(names.WITHDRAW_LAYOUT_SERVICE, WithdrawLayout, self._withdraw_layout)
+            rospy.Service(name, srv.Casus, self._set_to_casus)
+        rospy.Service(names.ORDER_FLIGHT_SERVICE, srv.OrderFlight, self._order_flight)
+        rospy.Service(names.ORDER_LAYOUT_SERVICE, srv.OrderLayout, self._order_layout)
+        rospy.Service(names.ORDER_FORMATION_SERVICE, srv.OrderFormation, self._order_formation)
+        rospy.Service(names.PREVIEW_LAYOUT_SERVICE, srv.PreviewLayout, self._preview_layout)
+        rospy.Service(names.WITHDRAW_LAYOUT_SERVICE, srv.WithdrawLayout, self._withdraw_layout)
 
-    def _request_movement(self, request: RequestDroneFlightRequest) -> RequestDroneFlightResponse:
+    def _request_movement(
+        self, request: srv.RequestDroneFlightRequest
+    ) -> srv.RequestDroneFlightResponse:
         """Status 1: a gateway has the order; 2: no gateway has a route; 0: there is no gateway."""
-        try:
-            why_not = self._order_one(Order(request.ID, location_of(request)), False)
-        except GoalRefused as error:
-            raise rospy.ServiceException(str(error)) from None
+        why_not = self._order_one(Order(request.ID, location_of(request)), False)
         if why_not == NO_GATEWAY:
-            return RequestDroneFlightResponse(status=0)
-        return RequestDroneFlightResponse(status=2 if why_not else 1)
+            return srv.RequestDroneFlightResponse(status=0)
+        return srv.RequestDroneFlightResponse(status=2 if why_not else 1)
 
-    def _order_flight(self, request: OrderFlightRequest) -> OrderFlightResponse:
+    def _order_flight(self, request: srv.OrderFlightRequest) -> srv.OrderFlightResponse:
         order = Order(request.id, location_of(request))
-        try:
-            why_not = self._order_one(order, request.allow_shared_place)
-        except GoalRefused as error:
-            raise rospy.ServiceException(str(error)) from None
-        return OrderFlightResponse(success=not why_not, message=why_not)
+        why_not = self._order_one(order, request.allow_shared_place)
+        return srv.OrderFlightResponse(success=not why_not, message=why_not)
 
     def _order_one(self, order: Order, allow_shared_place: bool) -> str:
-        """Why the order was not sent; empty if it was. Raises GoalRefused if it was refused."""
-        drone, goal = order
+        """Why the order was not sent; empty if it was. Raises ServiceException: it was refused."""
+        drone, _goal = order
         _check(order)
         fleet = drones_if_known()
         if fleet is not None and drone not in fleet.roles:
-            raise GoalRefused(
+            raise rospy.ServiceException(
                 f"drone {drone} is not in this fleet: its ids are {ids_in_words(fleet.roles)}"
             )
         if not self._gateway_is_there():
@@ -131,34 +104,32 @@ class DroneManager:
             return NO_GATEWAY
         outcomes = self._order([order], fleet, allow_shared_place)
         for answer in outcomes.refused.values():
-            raise GoalRefused(answer.reason)
+            raise rospy.ServiceException(answer.reason)
         if not outcomes.no_route:
             self._standing.replace(drone)
             return ""
         _log.warning("drone %d: no gateway has a route to it", drone)
         return f"no gateway has a route to drone {drone}"
 
-    def _set_to_casus(self, request: CasusRequest) -> CasusResponse:
+    def _set_to_casus(self, request: srv.CasusRequest) -> srv.CasusResponse:
         self._order_case(request.caseID, at_once=True)
-        return CasusResponse()
+        return srv.CasusResponse()
 
-    def _order_layout(self, request: OrderLayoutRequest) -> OrderLayoutResponse:
+    def _order_layout(self, request: srv.OrderLayoutRequest) -> srv.OrderLayoutResponse:
         return self._order_case(request.caseID, request.at_once)
 
-    def _order_formation(self, request: OrderFormationRequest) -> OrderFormationResponse:
-        try:
-            orders = _formation(request)
-        except GoalRefused as error:
-            raise rospy.ServiceException(str(error)) from None
-        answer = self._carry_out(request.name, orders, request.at_once)
-        return OrderFormationResponse(**{name: getattr(answer, name) for name in answer.__slots__})
+    def _order_formation(self, request: srv.OrderFormationRequest) -> srv.OrderFormationResponse:
+        answer = self._carry_out(request.name, _formation(request), request.at_once)
+        return srv.OrderFormationResponse(
+            **{name: getattr(answer, name) for name in answer.__slots__}
+        )
 
-    def _preview_layout(self, request: PreviewLayoutRequest) -> PreviewLayoutResponse:
+    def _preview_layout(self, request: srv.PreviewLayoutRequest) -> srv.PreviewLayoutResponse:
         known, missing = _in_fleet(self._orders_of(request.caseID), drones_if_known())
         found = self._standing.preview(known, request.at_once)
         if found is None:
             raise rospy.ServiceException("the state of the mesh is not known")
-        return PreviewLayoutResponse(
+        return srv.PreviewLayoutResponse(
             found.duration_s,
             found.least_connected,
             found.out_of_reach,
@@ -169,15 +140,15 @@ class DroneManager:
             found.in_words(),
         )
 
-    def _withdraw_layout(self, request: WithdrawLayoutRequest) -> WithdrawLayoutResponse:
+    def _withdraw_layout(self, request: srv.WithdrawLayoutRequest) -> srv.WithdrawLayoutResponse:
         words = self._standing.withdraw(request.id)
         if words is None:
-            return WithdrawLayoutResponse(False, f"there is no standing order {request.id}")
-        return WithdrawLayoutResponse(True, words)
+            return srv.WithdrawLayoutResponse(False, f"there is no standing order {request.id}")
+        return srv.WithdrawLayoutResponse(True, words)
 
     def _order_case(
         self, case: int, at_once: bool, handle: actionlib.ServerGoalHandle | None = None
-    ) -> OrderLayoutResponse:
+    ) -> srv.OrderLayoutResponse:
         """Order a layout."""
         return self._carry_out(f"layout {case}", self._orders_of(case), at_once, handle)
 
@@ -187,7 +158,7 @@ class DroneManager:
         orders: Sequence[Order],
         at_once: bool,
         handle: actionlib.ServerGoalHandle | None = None,
-    ) -> OrderLayoutResponse:
+    ) -> srv.OrderLayoutResponse:
         """Make a standing order of these."""
         fleet = drones_if_known()
         known, missing = _in_fleet(orders, fleet)
@@ -201,7 +172,7 @@ class DroneManager:
         complete = len(summary.sent) + len(summary.later) == len(known) + len(missing)
         words = summary.in_words()
         _log.log(logging.INFO if complete else logging.WARNING, "%s: %s", name, words)
-        return OrderLayoutResponse(
+        return srv.OrderLayoutResponse(
             given.progress.number,
             summary.sent,
             summary.later,
@@ -278,16 +249,13 @@ class DroneManager:
 
     def _gateway_is_there(self) -> bool:
         """Whether a gateway subscribes; waits for one, which may be starting."""
-        deadline_s = time.monotonic() + WAIT_FOR_GATEWAY_S
-        while not rospy.is_shutdown():
+
+        def is_there() -> bool:
             if self._gateways.impl is not None:
                 self._gateways.impl.check()  # drops what a killed gateway left behind
-            if self._gateways.get_num_connections() > 0:
-                return True
-            if time.monotonic() >= deadline_s:
-                return False
-            time.sleep(POLL_PERIOD_S)
-        return False
+            return self._gateways.get_num_connections() > 0
+
+        return comes_true(is_there, WAIT_FOR_GATEWAY_S)
 
 
 def _in_fleet(
@@ -298,13 +266,15 @@ def _in_fleet(
     return known, [order.node_id for order in orders if order not in known]
 
 
-def _formation(request: OrderFormationRequest) -> list[Order]:
-    """The orders by descending id, as those of a layout. Raises GoalRefused."""
+def _formation(request: srv.OrderFormationRequest) -> list[Order]:
+    """The orders by descending id, as those of a layout. Raises ServiceException."""
     if not (request.name.isprintable() and 0 < len(request.name) <= MAX_NAME):
-        raise GoalRefused(f"invalid name: must be 1..{MAX_NAME} printable characters")
+        raise rospy.ServiceException(f"invalid name: must be 1..{MAX_NAME} printable characters")
     goals = dict(zip(request.drones, map(location_of, request.places)))
     if not len(goals) == len(request.drones) == len(request.places) > 0:
-        raise GoalRefused("a formation needs drones, each once, and a place for each of them")
+        raise rospy.ServiceException(
+            "a formation needs drones, each once, and a place for each of them"
+        )
     orders = [Order(*item) for item in sorted(goals.items(), reverse=True)]
     for order in orders:
         _check(order)
@@ -312,10 +282,13 @@ def _formation(request: OrderFormationRequest) -> list[Order]:
 
 
 def _check(order: Order) -> None:
-    """Raises GoalRefused for an order that no drone can be given."""
+    """Raises ServiceException for an order that no drone can be given."""
     if order.node_id > MAX_NODE_ID:
-        raise GoalRefused(f"invalid drone id {order.node_id}: must be 0..{MAX_NODE_ID}")
-    check_goal(*order.goal)
+        raise rospy.ServiceException(f"invalid drone id {order.node_id}: must be 0..{MAX_NODE_ID}")
+    try:
+        check_goal(*order.goal)
+    except GoalRefused as error:
+        raise rospy.ServiceException(str(error)) from None
 
 
 def main() -> None:

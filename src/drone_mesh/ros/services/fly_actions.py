@@ -82,7 +82,7 @@ class FlyActions:
         self._flights: list[_Flight] = []
         self._states: rospy.Subscriber | None = None
         self._nodes: dict[int, NodeState] = {}
-        rospy.Subscriber(names.EVENTS_TOPIC, MeshEvent, self._event_came)
+        rospy.Subscriber(names.EVENTS_TOPIC, MeshEvent, self._later(self._take_event))
 
     def run(self, ended: Callable[[], bool]) -> None:
         """Serve until `ended`."""
@@ -97,19 +97,9 @@ class FlyActions:
                 continue
             work()
 
-    # Threads of rospy ------------------------------------------------------------------------
-
-    def _event_came(self, event: MeshEvent) -> None:
-        self._work.put(lambda: self._take_event(event))
-
-    def _state_came(self, state: MeshState) -> None:
-        self._work.put(lambda: self._take_state(state))
-
-    def _goal_came(self, drone: int, handle: actionlib.ServerGoalHandle) -> None:
-        self._work.put(lambda: self._begin(drone, handle))
-
-    def _cancel_came(self, handle: actionlib.ServerGoalHandle) -> None:
-        self._work.put(lambda: self._cancel(handle))
+    def _later(self, work: Callable[..., None], *first: object) -> Callable[[object], None]:
+        """A handler for a thread of rospy: it lets the thread of `run` do the work."""
+        return lambda came: self._work.put(functools.partial(work, *first, came))
 
     # The thread of `run` ---------------------------------------------------------------------
 
@@ -140,8 +130,8 @@ class FlyActions:
         self._servers[drone] = server = actionlib.ActionServer(
             names.fly_action(drone),
             FlyAction,
-            functools.partial(self._goal_came, drone),
-            self._cancel_came,
+            self._later(self._begin, drone),
+            self._later(self._cancel),
             auto_start=False,
         )
         server.start()
@@ -170,7 +160,7 @@ class FlyActions:
         self._flights.append(flight)
         if self._states is None:
             self._states = rospy.Subscriber(
-                names.STATE_TOPIC, MeshState, self._state_came, queue_size=1
+                names.STATE_TOPIC, MeshState, self._later(self._take_state), queue_size=1
             )
 
     def _cancel(self, handle: actionlib.ServerGoalHandle) -> None:

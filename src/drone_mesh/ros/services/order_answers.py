@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-import time
 from typing import Callable, Collection, NamedTuple
 
 import rospy
@@ -20,26 +19,12 @@ class Outcomes(NamedTuple):
     refused: dict[int, FlightOrderAnswer]  # by drone: one of the answers
 
 
-class _Waiter:
-    """The answers to one batch of orders. `condition` guards `answers`."""
-
-    def __init__(self, drones: Collection[int]) -> None:
-        self.condition = threading.Condition()
-        self.answers: dict[int, list[FlightOrderAnswer]] = {drone: [] for drone in drones}
-
-    def take(self, answer: FlightOrderAnswer) -> None:
-        with self.condition:
-            if answer.drone in self.answers:
-                self.answers[answer.drone].append(answer)
-                self.condition.notify()
-
-
 class OrderAnswers:
-    """Any thread. `_lock` guards the set of waiting callers."""
+    """Any thread. `_changed` guards the answers to the orders that are being waited for."""
 
     def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._waiters: set[_Waiter] = set()
+        self._changed = threading.Condition()
+        self._awaited: list[dict[int, list[FlightOrderAnswer]]] = []  # by drone, for each caller
         rospy.Subscriber(
             names.GATEWAY_ANSWERS_TOPIC, FlightOrderAnswer, self._answered, tcp_nodelay=True
         )
@@ -53,18 +38,23 @@ class OrderAnswers:
         a route when all `gateways` have answered otherwise. A drone without a full set of answers
         after `timeout_s` (wall) counts as sent, because a gateway need not answer.
         """
-        waiter = _Waiter(drones)
-        with self._lock:
-            self._waiters.add(waiter)
+        awaited: dict[int, list[FlightOrderAnswer]] = {drone: [] for drone in drones}
+
+        def is_complete() -> bool:
+            answers = awaited.values()
+            return rospy.is_shutdown() or all(_is_sent(a) or len(a) >= gateways for a in answers)
+
+        with self._changed:
+            self._awaited.append(awaited)
         try:
             order()
-            self._wait(waiter, gateways, time.monotonic() + timeout_s)
+            with self._changed:
+                self._changed.wait_for(is_complete, timeout_s)
         finally:
-            with self._lock:
-                self._waiters.discard(waiter)
+            with self._changed:  # by identity: another caller may wait for the same drones
+                self._awaited = [other for other in self._awaited if other is not awaited]
         outcomes = Outcomes([], [], {})
-        for drone in drones:
-            answers = waiter.answers[drone]
+        for drone, answers in awaited.items():
             refusals = [answer for answer in answers if answer.outcome in _REFUSALS]
             if _is_sent(answers) or len(answers) < max(1, gateways):
                 outcomes.sent.append(drone)
@@ -74,25 +64,12 @@ class OrderAnswers:
                 outcomes.no_route.append(drone)
         return outcomes
 
-    @staticmethod
-    def _wait(waiter: _Waiter, gateways: int, deadline_s: float) -> None:
-        def is_complete() -> bool:
-            return all(
-                _is_sent(answers) or len(answers) >= gateways for answers in waiter.answers.values()
-            )
-
-        with waiter.condition:
-            while not is_complete() and not rospy.is_shutdown():
-                left_s = deadline_s - time.monotonic()
-                if left_s <= 0.0:
-                    return
-                waiter.condition.wait(left_s)
-
     def _answered(self, answer: FlightOrderAnswer) -> None:
-        with self._lock:
-            waiters = list(self._waiters)
-        for waiter in waiters:
-            waiter.take(answer)
+        with self._changed:
+            for awaited in self._awaited:
+                if answer.drone in awaited:
+                    awaited[answer.drone].append(answer)
+            self._changed.notify_all()
 
 
 _REFUSALS = (FlightOrderAnswer.REFUSED, FlightOrderAnswer.PLACE_TAKEN)

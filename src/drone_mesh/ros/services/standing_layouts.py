@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import logging
 import threading
@@ -11,6 +12,8 @@ from typing import Callable, NamedTuple, Sequence
 import actionlib
 import rospy
 
+from drone_mesh.drone.flight_path import FlightPath, PlanFlight
+from drone_mesh.errors import ConfigurationError
 from drone_mesh.layouts import Order
 from drone_mesh.msg import (
     LayoutAction,
@@ -22,8 +25,10 @@ from drone_mesh.msg import (
 )
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import event_record, mesh_status
-from drone_mesh.ros.graph.flight_rules import flight_rules
+from drone_mesh.ros.graph.fleet_parameter import get_fleet_parameter
 from drone_mesh.ros.graph.master_watch import NO_ANSWER
+from drone_mesh.ros.graph.parameters import configured_obstacles
+from drone_mesh.state.airspace import SWAY_M
 from drone_mesh.state.departures import FlightRules
 from drone_mesh.state.formation_preview import FormationPreview, preview
 from drone_mesh.state.model import MeshStatus
@@ -116,7 +121,7 @@ class StandingLayouts:
         Without a state of the mesh, as beside the world of another program, that is all of them.
         `handle` is the accepted goal of the action, if it was ordered by one.
         """
-        rules = flight_rules()
+        rules = _flight_rules()
         with self._lock:
             number = self._orders.give(name, dict(orders), rospy.get_time(), at_once)
             if handle is not None:
@@ -137,7 +142,7 @@ class StandingLayouts:
             return None
         with self._lock:
             standing = self._orders.goals(mesh)
-        return preview(mesh, dict(orders), flight_rules(), at_once, standing)
+        return preview(mesh, dict(orders), _flight_rules(), at_once, standing)
 
     def replace(self, drone: int) -> None:
         """This drone is ordered elsewhere."""
@@ -167,7 +172,7 @@ class StandingLayouts:
         mesh = mesh_status(state)
         with self._lock:
             is_idle = not self._orders.all_progress()
-        rules = FlightRules() if is_idle else flight_rules()
+        rules = FlightRules() if is_idle else _flight_rules()
         with self._lock:
             self._mesh = mesh
             wanted = self._orders.update(mesh, rules)
@@ -276,3 +281,16 @@ def _tell(handle: actionlib.ServerGoalHandle, progress: StandingProgress) -> Non
         handle.set_succeeded(result, words)
     else:
         handle.set_aborted(result, words)
+
+
+def _flight_rules() -> FlightRules:
+    """The rules of the present factory; those of kinematic drones if there is none."""
+    try:
+        fleet = get_fleet_parameter()
+        obstacles = configured_obstacles(fleet)
+    except (KeyError, ConfigurationError, *NO_ANSWER):
+        return FlightRules()
+    plan: PlanFlight = functools.partial(FlightPath, ceiling_m=fleet.cruise_height)
+    if obstacles is not None:
+        plan = obstacles.plan_flight
+    return FlightRules(plan, SWAY_M if fleet.flight == "dynamic" else 0.0)

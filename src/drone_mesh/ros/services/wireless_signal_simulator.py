@@ -11,6 +11,7 @@ import threading
 import rospy
 from std_msgs.msg import Bool
 
+from drone_mesh import srv
 from drone_mesh.air.node import AirError
 from drone_mesh.air.node_table import NodeTable, Sees
 from drone_mesh.communication.interfaces import PAYLOAD_BYTES
@@ -18,29 +19,40 @@ from drone_mesh.communication.messages import readdressed, receiver
 from drone_mesh.msg import NRF24, DroneInfo
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import start_node
+from drone_mesh.ros.graph.direct_publisher import DirectPublisher
 from drone_mesh.ros.graph.figures import FiguresPublisher
 from drone_mesh.ros.graph.logs import ThrottledLog, show_library_logs_on_rosout
 from drone_mesh.ros.graph.master_watch import MasterWatch
 from drone_mesh.ros.graph.packet_samples import PacketSamples
 from drone_mesh.ros.graph.parameters import configured_obstacles, factory_configuration, or_exit
-from drone_mesh.ros.services.antenna_topic import AntennaTopic
-from drone_mesh.srv import (
-    AreaScan,
-    AreaScanRequest,
-    AreaScanResponse,
-    Broadcast,
-    BroadcastRequest,
-    BroadcastResponse,
-    WirelessMessage,
-    WirelessMessageRequest,
-    WirelessMessageResponse,
-    WirelessMessages,
-    WirelessMessagesRequest,
-    WirelessMessagesResponse,
-)
 from drone_mesh.state.figures import DELIVERED, LOST_IN_RANGE
 
+STUCK_RECEIVER_S = 0.2  # our choice: a receiver that does not read for this long is disconnected
+
 _log = logging.getLogger(__name__)
+
+
+class AntennaTopic(DirectPublisher):
+    """Publishes: the topic of one antenna, usually /Node/<id> (NRF24). Any thread."""
+
+    def __init__(self, topic: str) -> None:
+        self.has_listened = False  # set by rospy's thread: the first receiver has connected
+        super().__init__(topic, NRF24, STUCK_RECEIVER_S)
+
+    def peer_subscribe(self, topic: str, publish: object, peer_publish: object) -> None:
+        """A receiver has connected (a thread of rospy)."""
+        self.has_listened = True
+        super().peer_subscribe(topic, publish, peer_publish)
+
+    def deliver(self, message: NRF24) -> bool:
+        """Publish this packet; returns False if there is no receiver."""
+        if not self.has_subscriber():
+            return False
+        try:
+            self.publish(message)
+        except rospy.ROSException:  # the topic has been closed
+            return False
+        return bool(self.connections())
 
 
 class WirelessSignalSimulator:
@@ -76,10 +88,10 @@ class WirelessSignalSimulator:
         self._samples = PacketSamples()
         self._samples.start()
         # The services first: a host that sees the subscription may call at once.
-        rospy.Service(names.MESSAGE_SERVICE, WirelessMessage, self._message)
-        rospy.Service(names.MESSAGES_SERVICE, WirelessMessages, self._messages)
-        rospy.Service(names.OTHERS_IN_RANGE_SERVICE, AreaScan, self._others_in_range)
-        rospy.Service(names.BROADCAST_SERVICE, Broadcast, self._broadcast)
+        rospy.Service(names.MESSAGE_SERVICE, srv.WirelessMessage, self._message)
+        rospy.Service(names.MESSAGES_SERVICE, srv.WirelessMessages, self._messages)
+        rospy.Service(names.OTHERS_IN_RANGE_SERVICE, srv.AreaScan, self._others_in_range)
+        rospy.Service(names.BROADCAST_SERVICE, srv.Broadcast, self._broadcast)
         rospy.Subscriber(names.SIGNAL_TOPIC, DroneInfo, self._drone_info, tcp_nodelay=True)
         rospy.Subscriber(names.JAMMER_TOPIC, Bool, self._jam)
         FiguresPublisher("air", self._figures).start()
@@ -135,19 +147,19 @@ class WirelessSignalSimulator:
             if topic == rospy.resolve_name(info.sub) and kind != NRF24._type:
                 raise AirError(f"node {info.nodeID}: {info.sub[:60]} is a topic of type {kind}")
 
-    def _message(self, request: WirelessMessageRequest) -> WirelessMessageResponse:
+    def _message(self, request: srv.WirelessMessageRequest) -> srv.WirelessMessageResponse:
         with self._lock:
             topic = self._nodes.link(request.from_, request.to)
         if topic is None:
-            return WirelessMessageResponse(False)
+            return srv.WirelessMessageResponse(False)
         if request.from_ == request.to:  # an antenna's probe for its own registration
             listener = self._antenna_topics.get(topic)
-            return WirelessMessageResponse(
+            return srv.WirelessMessageResponse(
                 listener is not None and listener.deliver(request.message)
             )
-        return WirelessMessageResponse(self._carry(topic, request.message))
+        return srv.WirelessMessageResponse(self._carry(topic, request.message))
 
-    def _messages(self, request: WirelessMessagesRequest) -> WirelessMessagesResponse:
+    def _messages(self, request: srv.WirelessMessagesRequest) -> srv.WirelessMessagesResponse:
         joined = request.packets
         if len(joined) % PAYLOAD_BYTES:
             raise rospy.ServiceException(
@@ -156,39 +168,35 @@ class WirelessSignalSimulator:
         packets = [joined[at : at + PAYLOAD_BYTES] for at in range(0, len(joined), PAYLOAD_BYTES)]
         with self._lock:
             topics = [self._nodes.link(request.from_, receiver(packet)) for packet in packets]
-        return WirelessMessagesResponse(
+        return srv.WirelessMessagesResponse(
             [
                 topic is not None and self._carry(topic, NRF24(packet))
                 for packet, topic in zip(packets, topics)
             ]
         )
 
-    def _broadcast(self, request: BroadcastRequest) -> BroadcastResponse:
-        with self._lock:
-            nodes = self._in_range(request.from_)
-            topics = [self._nodes.link(request.from_, node) for node in nodes]
+    def _broadcast(self, request: srv.BroadcastRequest) -> srv.BroadcastResponse:
         packet = request.message.payload
-        return BroadcastResponse(
+        return srv.BroadcastResponse(
             [
                 node
-                for node, topic in zip(nodes, topics)
+                for node, topic in self._topics_in_range(request.from_)
                 if topic is not None and self._carry(topic, NRF24(readdressed(packet, node)))
             ]
         )
 
-    def _others_in_range(self, request: AreaScanRequest) -> AreaScanResponse:
-        with self._lock:
-            nodes = self._in_range(request.id)
-            topics = [self._nodes.link(request.id, node) for node in nodes]
-        return AreaScanResponse(
-            [node for node, topic in zip(nodes, topics) if self._is_heard(topic)]
-        )
+    def _others_in_range(self, request: srv.AreaScanRequest) -> srv.AreaScanResponse:
+        topics = self._topics_in_range(request.id)
+        return srv.AreaScanResponse([node for node, topic in topics if self._is_heard(topic)])
 
-    def _in_range(self, node_id: int) -> tuple[int, ...]:
-        try:
-            return self._nodes.in_range(node_id)
-        except AirError as error:
-            raise rospy.ServiceException(str(error)) from None
+    def _topics_in_range(self, node_id: int) -> list[tuple[int, str | None]]:
+        """The nodes in range of this one, and the topic of each."""
+        with self._lock:
+            try:
+                nodes = self._nodes.in_range(node_id)
+            except AirError as error:
+                raise rospy.ServiceException(str(error)) from None
+            return [(node, self._nodes.link(node_id, node)) for node in nodes]
 
     def _is_heard(self, topic: str | None) -> bool:
         listener = None if topic is None else self._antenna_topics.get(topic)

@@ -39,9 +39,8 @@ def read_states(path: Path) -> Iterator[MeshStatus]:
     if is_gateway_record(path):
         yield from (real_mesh(answer)[0] for answer in _answers(path))
         return
-    with _open(path) as bag:
-        for _topic, message, _time in bag.read_messages([_namespace(bag) + names.STATE_TOPIC]):
-            yield mesh_status(message)
+    for message, _at_s in _messages(path, names.STATE_TOPIC):
+        yield mesh_status(message)
 
 
 def read_events(path: Path) -> Iterator[EventRecord]:
@@ -50,19 +49,17 @@ def read_events(path: Path) -> Iterator[EventRecord]:
         for answer in _answers(path):
             yield from events_of(answer)
         return
-    with _open(path) as bag:
-        for _topic, message, _time in bag.read_messages([_namespace(bag) + names.EVENTS_TOPIC]):
-            yield event_record(message)
+    for message, _at_s in _messages(path, names.EVENTS_TOPIC):
+        yield event_record(message)
 
 
 def read_packets(path: Path) -> Iterator[RecordedDots]:
     """Every sample of packets in the bag, oldest first. Raises BagUnusable."""
     if is_gateway_record(path):
         return  # a gateway does not see the packets of others
-    with _open(path) as bag:
-        for _topic, message, time in bag.read_messages([_namespace(bag) + names.PACKETS_TOPIC]):
-            dots = make_dots(message.senders, message.receivers, message.types, message.ages)
-            yield RecordedDots.of(time.to_sec(), message.carried, dots)
+    for message, at_s in _messages(path, names.PACKETS_TOPIC):
+        dots = make_dots(message.senders, message.receivers, message.types, message.ages)
+        yield RecordedDots.of(at_s, message.carried, dots)
 
 
 def origin_in(path: Path) -> Origin | None:
@@ -117,6 +114,13 @@ def topics_in_bag(path: Path) -> tuple[str, set[str]]:
 def no_states(path: Path) -> BagUnusable:
     """The error for a bag without states."""
     return BagUnusable(f"{path}: contains no /{names.STATE_TOPIC}, which {_RECORDER} records")
+
+
+def _messages(path: Path, topic: str) -> Iterator[tuple[Any, float]]:
+    """Each message of the mesh on this topic, oldest first, and its time."""
+    with _open(path) as bag:
+        for _topic, message, time in bag.read_messages([_namespace(bag) + topic]):
+            yield message, time.to_sec()
 
 
 def _namespace(bag: rosbag.Bag) -> str:

@@ -7,6 +7,7 @@ from typing import Protocol, Sequence
 
 import rospy
 
+from drone_mesh import srv
 from drone_mesh.console.controls import MeshControls, OrderRefused
 from drone_mesh.drone.location import Location as Place
 from drone_mesh.layouts import Order
@@ -24,25 +25,6 @@ from drone_mesh.ros.graph.persistent_service import (
     call_once,
 )
 from drone_mesh.ros.services.flight_request import FlightNotOrdered, request_flight
-from drone_mesh.srv import (
-    AddDrone,
-    AddDroneRequest,
-    FlyMission,
-    FlyMissionRequest,
-    OrderFormation,
-    OrderFormationResponse,
-    OrderLayout,
-    OrderLayoutRequest,
-    OrderLayoutResponse,
-    PowerSwitch,
-    PowerSwitchRequest,
-    PreviewLayout,
-    PreviewLayoutRequest,
-    RemoveDrone,
-    RemoveDroneRequest,
-    SetSpeed,
-    SetSpeedRequest,
-)
 from drone_mesh.state.formation_preview import FormationPreview
 
 log = logging.getLogger(__name__)
@@ -53,7 +35,7 @@ class RosControls(MeshControls):
 
     def power(self, node: int, on: bool) -> str:
         """Switch the antenna of a node."""
-        _call(names.power_switch(node), PowerSwitch, PowerSwitchRequest(power=on))
+        _call(names.power_switch(node), srv.PowerSwitch, srv.PowerSwitchRequest(power=on))
         return f"node {node} is {'on' if on else 'off'}"
 
     def fly(self, node: int, x: float, y: float, z: float, allow_shared_place: bool = False) -> str:
@@ -66,20 +48,20 @@ class RosControls(MeshControls):
 
     def layout(self, case: int) -> str:
         """Order all drones of a layout to their positions."""
-        request = OrderLayoutRequest(caseID=case)
-        answer = _call(names.ORDER_LAYOUT_SERVICE, OrderLayout, request)
+        request = srv.OrderLayoutRequest(caseID=case)
+        answer = _call(names.ORDER_LAYOUT_SERVICE, srv.OrderLayout, request)
         return _outcome(f"layout {case}", answer)
 
     def formation(self, name: str, orders: Sequence[Order]) -> str:
         """Order these drones to their positions, as those of a layout."""
         request = formation_request(name, orders)
-        answer = _call(names.ORDER_FORMATION_SERVICE, OrderFormation, request)
+        answer = _call(names.ORDER_FORMATION_SERVICE, srv.OrderFormation, request)
         return _outcome(name, answer)
 
     def preview(self, case: int) -> FormationPreview:
         """What would happen if this layout were ordered now."""
-        request = PreviewLayoutRequest(caseID=case)
-        answer = _call(names.PREVIEW_LAYOUT_SERVICE, PreviewLayout, request)
+        request = srv.PreviewLayoutRequest(caseID=case)
+        answer = _call(names.PREVIEW_LAYOUT_SERVICE, srv.PreviewLayout, request)
         return FormationPreview(
             answer.duration,
             list(answer.out_of_reach),
@@ -90,8 +72,8 @@ class RosControls(MeshControls):
 
     def speed(self, paused: bool, factor: float) -> str:
         """Pause or resume simulated time, or change its speed."""
-        request = SetSpeedRequest(paused=paused, real_time_factor=factor)
-        _done(_call(names.SPEED_SERVICE, SetSpeed, request))
+        request = srv.SetSpeedRequest(paused=paused, real_time_factor=factor)
+        _done(_call(names.SPEED_SERVICE, srv.SetSpeed, request))
         if paused:
             return "paused"
         return (
@@ -102,33 +84,35 @@ class RosControls(MeshControls):
 
     def add(self, node: int | None, gateway: bool, x: float, y: float) -> str:
         """Add a drone to the simulation; None: it gets the lowest free id."""
-        wanted = AddDroneRequest.LOWEST_FREE if node is None else node
-        request = AddDroneRequest(id=wanted, gateway=gateway, latitude=y, longitude=x)
-        return _done(_call(names.ADD_DRONE_SERVICE, AddDrone, request))
+        wanted = srv.AddDroneRequest.LOWEST_FREE if node is None else node
+        request = srv.AddDroneRequest(id=wanted, gateway=gateway, latitude=y, longitude=x)
+        return _done(_call(names.ADD_DRONE_SERVICE, srv.AddDrone, request))
 
     def remove(self, node: int) -> str:
         """Remove a drone from the simulation."""
-        return _done(_call(names.REMOVE_DRONE_SERVICE, RemoveDrone, RemoveDroneRequest(id=node)))
+        return _done(
+            _call(names.REMOVE_DRONE_SERVICE, srv.RemoveDrone, srv.RemoveDroneRequest(id=node))
+        )
 
     def mission(self, nodes: Sequence[int], mission: Mission) -> str:
         """Let the pilots of these drones fly this mission."""
         waypoints = [
             Location(latitude=y, longitude=x, height=round(z)) for x, y, z in mission.waypoints
         ]
-        request = FlyMissionRequest(
-            FlyMissionRequest.FLY, waypoints, mission.speed_m_s, mission.loop
+        request = srv.FlyMissionRequest(
+            srv.FlyMissionRequest.FLY, waypoints, mission.speed_m_s, mission.loop
         )
         for node in nodes:
-            _done(_call(names.mission_service(node), FlyMission, request))
+            _done(_call(names.mission_service(node), srv.FlyMission, request))
         who = f"drone {nodes[0]}" if len(nodes) == 1 else f"{len(nodes)} drones"
         return f"the mission of {who} has begun"
 
     def pilots(self, action: str) -> str:
         """Pause, resume or stop all missions."""
         drones = drones_if_known()
-        request = FlyMissionRequest(action=_ACTIONS[action])
+        request = srv.FlyMissionRequest(action=_ACTIONS[action])
         done = sum(
-            _call(names.mission_service(node), FlyMission, request).success
+            _call(names.mission_service(node), srv.FlyMission, request).success
             for node in (drones.roles if drones else ())
         )
         if not done:
@@ -137,14 +121,14 @@ class RosControls(MeshControls):
 
 
 _ACTIONS = {
-    "pause": FlyMissionRequest.PAUSE,
-    "resume": FlyMissionRequest.RESUME,
-    "stop": FlyMissionRequest.STOP,
+    "pause": srv.FlyMissionRequest.PAUSE,
+    "resume": srv.FlyMissionRequest.RESUME,
+    "stop": srv.FlyMissionRequest.STOP,
 }
 _DONE = {"pause": "paused", "resume": "resumed", "stop": "ended"}
 
 
-def _outcome(name: str, answer: OrderLayoutResponse | OrderFormationResponse) -> str:
+def _outcome(name: str, answer: srv.OrderLayoutResponse | srv.OrderFormationResponse) -> str:
     if not (answer.sent or answer.later or answer.no_route):  # the manager keeps those
         raise OrderRefused(f"{name}: {answer.message}")
     return f"{name}: {answer.message}"

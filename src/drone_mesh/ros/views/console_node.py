@@ -29,6 +29,7 @@ from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import run_tool, start_node
 from drone_mesh.ros.graph.conversions import event_record, mesh_status
 from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
+from drone_mesh.ros.graph.master_watch import MasterWatch
 from drone_mesh.ros.graph.parameters import earth_origin, manager_layouts
 from drone_mesh.ros.views.console_controls import RosControls
 from drone_mesh.ros.views.recording import Recording
@@ -50,8 +51,7 @@ class MeshFeed:
     Subscribes: /mesh/state (MeshState), /mesh/events (MeshEvent); while a page draws packets,
                 /mesh/packets (PacketSample)
 
-    A restarted master does not know our subscriptions, so they are renewed. `_latest` passes from
-    the subscriber's thread to the loop; a loop that lags behind skips states.
+    `_latest` passes from the subscriber's thread to the loop; a loop that lags behind skips states.
     """
 
     def __init__(self, store: FrameStore, server: ConsoleServer, runner: ConsoleRunner) -> None:
@@ -60,37 +60,21 @@ class MeshFeed:
         self._runner = runner
         self._latest: MeshState | None = None
         self._heard_s = float("-inf")
-        self._run_id: str | None = None
-        self._subscribers: list[rospy.Subscriber] = []
         self._packets: rospy.Subscriber | None = None
+        rospy.Subscriber(names.STATE_TOPIC, MeshState, self._on_state, queue_size=1)
+        rospy.Subscriber(names.EVENTS_TOPIC, MeshEvent, self._on_event)
 
-    def watch_master(self, stop: StopRequest) -> None:
-        """Keep the subscriptions alive until the program ends; for the main thread."""
+    def watch(self, stop: StopRequest) -> None:
+        """Say on the pages when nothing is heard, until the program ends; for the main thread."""
         while not stop.wait(CHECK_PERIOD_S) and not rospy.is_shutdown():
             is_silent = time.monotonic() - self._heard_s > OLD_STATE_S
-            try:
-                run_id = rosgraph.Master(rospy.get_name()).getParam("/run_id")
-            except (OSError, rosgraph.MasterException):
+            if not rosgraph.is_master_online():
                 if is_silent:  # without a master, nodes that are connected still hear each other
                     self._report("no ROS master: waiting for the simulation to start")
                 continue
-            if run_id != self._run_id:
-                self._run_id = run_id
-                self._subscribe()
-            elif is_silent:
+            if is_silent:
                 self._report("no data from the simulation")
             self._watch_packets()
-
-    def _subscribe(self) -> None:
-        for subscriber in self._subscribers:
-            subscriber.unregister()
-        if self._packets is not None:
-            self._packets.unregister()
-            self._packets = None
-        self._subscribers = [
-            rospy.Subscriber(names.STATE_TOPIC, MeshState, self._on_state, queue_size=1),
-            rospy.Subscriber(names.EVENTS_TOPIC, MeshEvent, self._on_event),
-        ]
 
     def _watch_packets(self) -> None:
         """Subscribe while a page draws packets; the simulator samples only with a subscriber."""
@@ -194,7 +178,8 @@ def _run() -> int:
     try:
         if reading is not None:
             reading.start()
-        MeshFeed(store, server, runner).watch_master(stop)
+        MasterWatch().start()
+        MeshFeed(store, server, runner).watch(stop)
     finally:
         if reading is not None:
             reading.stop()

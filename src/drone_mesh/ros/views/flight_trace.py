@@ -10,12 +10,11 @@ from typing import Iterator, Sequence
 import rospy
 
 from drone_mesh.earth_files import WRITERS, tracks_of
-from drone_mesh.errors import ConfigurationError
+from drone_mesh.errors import ConfigurationError, MeshError
 from drone_mesh.mobility.trace_files import write_csv
 from drone_mesh.ros.graph.command_line import run_tool
 from drone_mesh.ros.graph.parameters import earth_origin
 from drone_mesh.ros.views.bag import no_states, origin_in, read_states
-from drone_mesh.ros.views.report import CannotWrite
 from drone_mesh.state.model import known_positions
 
 
@@ -64,7 +63,7 @@ def _run(bag: Path, trace: Path, given: str) -> int:
         else:
             write_csv(trace, ((at_s, node, x, y, z) for at_s, node, (x, y, z) in positions))
     except OSError as error:
-        raise CannotWrite(f"{trace}: {error.strerror}") from error
+        raise MeshError(f"{trace}: {error.strerror}") from error
     drones = len({node for _at_s, node, _place in positions})
     print(f"{trace}: {drones} drones, {positions[-1][0]:.1f} s")
     return 0

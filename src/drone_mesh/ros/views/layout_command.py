@@ -10,6 +10,7 @@ from pathlib import Path
 
 import rospy
 
+from drone_mesh import srv
 from drone_mesh.arguments import whole
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
@@ -21,17 +22,8 @@ from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import join_graph, run_tool
 from drone_mesh.ros.graph.conversions import formation_request
 from drone_mesh.ros.graph.parameters import earth_origin
-from drone_mesh.ros.graph.persistent_service import ServiceGone, ServiceRefused, call_once
+from drone_mesh.ros.graph.persistent_service import ServiceGone, call_once
 from drone_mesh.ros.views.state_source import live_state
-from drone_mesh.srv import (
-    OrderFormation,
-    OrderFormationResponse,
-    OrderLayout,
-    OrderLayoutRequest,
-    OrderLayoutResponse,
-    WithdrawLayout,
-    WithdrawLayoutRequest,
-)
 from drone_mesh.state.model import position_is_known
 from drone_mesh.stopping import StopRequest
 from drone_mesh.yaml_file import read_text
@@ -80,24 +72,22 @@ def _run(options: argparse.Namespace) -> int:
     with StopRequest() as stop:  # from here on Ctrl-C finds a layout that it can withdraw
         signal.signal(signal.SIGINT, lambda _number, _frame: stop.make())
         try:
-            answer: OrderLayoutResponse | OrderFormationResponse
+            answer: srv.OrderLayoutResponse | srv.OrderFormationResponse
             if options.file is None:
-                request = OrderLayoutRequest(options.case, options.at_once)
-                answer = call_once(names.ORDER_LAYOUT_SERVICE, OrderLayout, request)
+                request = srv.OrderLayoutRequest(options.case, options.at_once)
+                answer = call_once(names.ORDER_LAYOUT_SERVICE, srv.OrderLayout, request)
             else:
                 drawn = formation_request(options.file.name[:MAX_NAME], orders, options.at_once)
-                answer = call_once(names.ORDER_FORMATION_SERVICE, OrderFormation, drawn)
+                answer = call_once(names.ORDER_FORMATION_SERVICE, srv.OrderFormation, drawn)
         except ServiceGone as error:
             raise MeshError(f"{error}: is the simulation running?") from None
-        except ServiceRefused as error:
-            raise MeshError(str(error)) from None
         print(answer.message, flush=True)
         over = _follow(heard, answer.id, stop)
         if over is not None:
             missing = over.waiting + over.refused + over.replaced + over.not_in_fleet
             return 1 if missing else 0
         words = call_once(
-            names.WITHDRAW_LAYOUT_SERVICE, WithdrawLayout, WithdrawLayoutRequest(answer.id)
+            names.WITHDRAW_LAYOUT_SERVICE, srv.WithdrawLayout, srv.WithdrawLayoutRequest(answer.id)
         ).message
     print(f"withdrawn, drones in flight fly on: {words}", file=sys.stderr)
     raise KeyboardInterrupt

@@ -22,10 +22,9 @@ from drone_mesh.state.links import (
     links_by_use,
     shortest,
 )
-from drone_mesh.state.model import NodeStatus, ObstacleStatus, position_is_known
+from drone_mesh.state.model import NodeStatus, ObstacleStatus, position_is_known, waypoints
 from drone_mesh.view.fan import fanned_positions
 from drone_mesh.view.palette import DARK, Colour, rgb  # rviz has a dark background
-from drone_mesh.view.picture import Shape, shape_named
 from drone_mesh.view.quadrocopter import (
     BLADE_WIDTH_M,
     MOTORS,
@@ -33,6 +32,7 @@ from drone_mesh.view.quadrocopter import (
     blade_ends,
     turned_rad,
 )
+from drone_mesh.view.scene import Shape, shape_named
 
 MOST_LINKS = 1500  # our choice, per use: 254 drones 1 m apart have 18,000 links
 TIMES_LARGER = 4.0  # how much larger than life drones are drawn
@@ -226,8 +226,8 @@ def _path_lines(
 ) -> list[tuple[Sequence[float], ...]]:
     lines: list[tuple[Sequence[float], ...]] = []
     for node in nodes:
-        waypoints = [positions[node.id], *zip(*[iter(node.path)] * 3)]
-        lines += zip(waypoints, waypoints[1:])
+        way = [positions[node.id], *waypoints(node.path)]
+        lines += zip(way, way[1:])
     return lines
 
 

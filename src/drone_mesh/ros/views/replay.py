@@ -20,16 +20,6 @@ from drone_mesh.ros.views.bag import playable, topics_in_bag
 NOT_PLAYED = {"/rosout", "/rosout_agg"}
 
 
-class AlreadyATime(MeshError):
-    """A simulation or another recording already publishes this clock."""
-
-    def __init__(self, nodes: list[str], clock: str) -> None:
-        super().__init__(
-            f"{', '.join(nodes)} already publishes {clock}: stop it, play in another namespace "
-            "(__ns:=again), or set ROS_MASTER_URI to another master"
-        )
-
-
 def main() -> None:
     """Entry point of nodes/replay."""
     options = _parser().parse_args(rospy.myargv()[1:])
@@ -71,7 +61,10 @@ def _run(options: argparse.Namespace) -> int:
     publishers, _subscribers, _services = rosgraph.Master("/replay").getSystemState()
     others = dict(publishers).get(clock, [])
     if others:
-        raise AlreadyATime(others, clock)
+        raise MeshError(
+            f"{', '.join(others)} already publishes {clock}: stop it, play in another namespace "
+            "(__ns:=again), or set ROS_MASTER_URI to another master"
+        )
     rospy.set_param(names.SIM_TIME_PARAM, True)
     command = ["rosrun", "rosbag", "play", "--clock", "--keep-alive"]
     command += ["--rate", str(options.rate), "--start", str(options.start), str(bag)]

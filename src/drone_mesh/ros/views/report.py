@@ -16,10 +16,6 @@ from drone_mesh.ros.graph.command_line import run_tool
 from drone_mesh.ros.views.bag import BagUnusable, read_events, read_states
 
 
-class CannotWrite(MeshError):
-    """A file of the report could not be written; the message names it and the reason."""
-
-
 def main() -> None:
     """Entry point of nodes/report."""
     options = _parser().parse_args(rospy.myargv()[1:])
@@ -62,7 +58,7 @@ def _run(options: argparse.Namespace) -> int:
         page.write_text(html, encoding="utf-8")
         written = [page] + (write_csv(story, options.csv) if options.csv else [])
     except OSError as error:
-        raise CannotWrite(f"{error.filename}: {error.strerror}") from error
+        raise MeshError(f"{error.filename}: {error.strerror}") from error
     for path in written:
         print(path)
     return 0

@@ -15,10 +15,6 @@ from drone_mesh.view.snapshot import DEFAULT_SIZE, render
 SMALLEST, LARGEST = 200, 8000  # pixels
 
 
-class CannotDraw(MeshError):
-    """The picture could not be written; the message is the reason."""
-
-
 def main() -> None:
     """Entry point of nodes/snapshot."""
     options = parse_with_bag(_parser())
@@ -68,6 +64,6 @@ def _run(options: argparse.Namespace) -> int:
     try:
         render(scene_of(mesh), options.picture, options.size)
     except (OSError, ValueError) as error:
-        raise CannotDraw(f"{options.picture}: {error}") from error
+        raise MeshError(f"{options.picture}: {error}") from error
     print(options.picture)
     return 0

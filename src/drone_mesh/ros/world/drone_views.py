@@ -4,34 +4,25 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Iterable, Sequence
+from typing import Iterable
 
 from drone_mesh.state.observation import describe_drone
 from drone_mesh.state.roster import DroneView
-from drone_mesh.world.drones import VirtualDrone
-from drone_mesh.world.engine import DroneEngine
+from drone_mesh.world.factory import VirtualDrone
 
 
 def drone_views(drones: Iterable[VirtualDrone], now_s: float) -> list[DroneView]:
     """The positions and flight paths of these drones. Any thread."""
-    views = []
-    for drone in drones:
-        state = drone.engine.state
-        engine = drone.engine
-        battery = engine.battery_percent()
-        view = describe_drone(drone.node_id, drone.ROLE, state.position, state.path, now_s)
-        views.append(
-            replace(
-                view,
-                heading=_heading(engine),
-                battery=math.nan if battery is None else battery,
-                crashed=engine.crashed,
-                why_not_fly=engine.why_not_fly(),
-            )
-        )
-    return views
+    return [_view(drone, now_s) for drone in drones]
 
 
-def _heading(engine: DroneEngine) -> Sequence[float]:
-    pilot = engine.pilot
-    return () if pilot is None or engine.state.path else pilot.heading or ()
+def _view(drone: VirtualDrone, now_s: float) -> DroneView:
+    engine = drone.engine
+    state, pilot, battery = engine.state, engine.pilot, engine.battery_percent()
+    return replace(
+        describe_drone(drone.node_id, drone.role, state.position, state.path, now_s),
+        heading=() if pilot is None or state.path else pilot.heading or (),
+        battery=math.nan if battery is None else battery,
+        crashed=engine.crashed,
+        why_not_fly=engine.why_not_fly(),
+    )

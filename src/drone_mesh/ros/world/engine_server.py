@@ -1,78 +1,30 @@
-"""EngineServer: the ROS side of a drone's engine (docs/ros.md, "World and flights")."""
+"""The ROS side of the drones' engines, or of those of others (docs/ros.md, "World and flights")."""
 
 from __future__ import annotations
 
 import logging
 import math
-from typing import Callable, Sequence
+from typing import Callable
 
 import rospy
 
+from drone_mesh import srv
 from drone_mesh.communication.observer import MeshEventKind
-from drone_mesh.drone.flight_path import Vector
 from drone_mesh.errors import GoalRefused
 from drone_mesh.missions import Mission
 from drone_mesh.msg import DroneInfo
 from drone_mesh.msg import Location as LocationMsg
 from drone_mesh.ros.graph import names
-from drone_mesh.ros.graph.conversions import engine_info, gps_response, power_off_info
+from drone_mesh.ros.graph.conversions import NO_POSITION, engine_info, gps_response, power_off_info
 from drone_mesh.ros.graph.logs import ThrottledLog
-from drone_mesh.srv import (
-    FlyMission,
-    FlyMissionRequest,
-    FlyMissionResponse,
-    RequestGPS,
-    RequestGPSRequest,
-    RequestGPSResponse,
-)
 from drone_mesh.state.model import EventRecord
-from drone_mesh.world.drones import VirtualDrone
 from drone_mesh.world.engine import DroneState
+from drone_mesh.world.factory import DroneFactory, VirtualDrone
 
 INFO_PERIOD_S = 0.05  # at most 20 DroneInfo per simulated second
 _ROUNDING_S = 1e-6  # simulated time moves in hundredths, which floats do not hold exactly
 
 _log = logging.getLogger(__name__)
-
-
-class PositionReporter(rospy.SubscribeListener):
-    """Reports the positions of all drones to every simulator, with one publisher.
-
-    Publishes /WirelessSignalSimulator (DroneInfo). Any thread.
-    """
-
-    def __init__(self, drones: Callable[[], Sequence[VirtualDrone]]) -> None:
-        """`drones` returns all current drones."""
-        self._drones = drones
-        self._publisher = rospy.Publisher(
-            names.SIGNAL_TOPIC, DroneInfo, tcp_nodelay=True, queue_size=names.SIGNAL_QUEUE
-        )
-        # Added once the publisher exists; the report below reaches earlier subscribers.
-        implementation = self._publisher.impl
-        assert implementation is not None  # it is not closed yet
-        implementation.add_subscriber_listener(self)
-        self._report_all()
-
-    def report_position(self, node_id: int, position: Vector, is_flat: bool) -> None:
-        """Publish to all current subscribers; a drone with a flat battery has no power either."""
-        self._publisher.publish(engine_info(node_id, position))
-        if is_flat:
-            self._publisher.publish(power_off_info(node_id))
-
-    def peer_subscribe(self, _topic: str, _publish: object, _peer_publish: object) -> None:
-        """A new subscriber, perhaps a simulator that was restarted: report all positions.
-
-        Goes to all subscribers: rospy's way to reach only the new one is not thread-safe.
-        """
-        self._report_all()
-
-    def _report_all(self) -> None:
-        for drone in self._drones():
-            self.report_drone(drone)
-
-    def report_drone(self, drone: VirtualDrone) -> None:
-        """Report the position of this drone now."""
-        self.report_position(drone.node_id, drone.engine.state.position, drone.engine.is_flat)
 
 
 class EngineServer:
@@ -86,14 +38,18 @@ class EngineServer:
     def __init__(
         self,
         drone: VirtualDrone,
-        reporter: PositionReporter,
+        report: Callable[[VirtualDrone], None],
         happened: Callable[[EventRecord], None],
     ) -> None:
-        """`happened` is called in any thread with each event of the drone."""
+        """`report` publishes its position.
+
+        `happened` is called in any thread with each event of the drone.
+        """
         self._happened = happened
+        self._drone = drone
         self._node_id = drone.node_id
         self._engine = drone.engine
-        self._reporter = reporter
+        self._report = report
         # The world's thread:
         self._reported_s = -math.inf
         self._reported = (False, False)  # whether it flew, whether it was flat
@@ -102,8 +58,8 @@ class EngineServer:
         self._engine.observe(self._observed)
         self._goals = rospy.Subscriber(names.goal_topic(drone.node_id), LocationMsg, self._goal)
         self._services = [
-            rospy.Service(names.gps_service(drone.node_id), RequestGPS, self._gps),
-            rospy.Service(names.mission_service(drone.node_id), FlyMission, self._mission),
+            rospy.Service(names.gps_service(drone.node_id), srv.RequestGPS, self._gps),
+            rospy.Service(names.mission_service(drone.node_id), srv.FlyMission, self._mission),
         ]
 
     def close(self) -> None:
@@ -112,9 +68,9 @@ class EngineServer:
         for service in self._services:
             service.shutdown()
 
-    def _mission(self, request: FlyMissionRequest) -> FlyMissionResponse:
+    def _mission(self, request: srv.FlyMissionRequest) -> srv.FlyMissionResponse:
         engine = self._engine
-        if request.action == FlyMissionRequest.FLY:
+        if request.action == srv.FlyMissionRequest.FLY:
             places = [(p.longitude, p.latitude, float(p.height)) for p in request.waypoints]
             why_not = engine.why_not_fly()
             try:
@@ -122,15 +78,15 @@ class EngineServer:
             except GoalRefused as error:
                 why_not = str(error)
             if why_not:
-                return FlyMissionResponse(False, f"drone {self._node_id}: {why_not}")
+                return srv.FlyMissionResponse(False, f"drone {self._node_id}: {why_not}")
             engine.fly_with(pilot)
         elif engine.pilot is None:
-            return FlyMissionResponse(False, f"drone {self._node_id} has no mission")
-        elif request.action == FlyMissionRequest.STOP:
+            return srv.FlyMissionResponse(False, f"drone {self._node_id} has no mission")
+        elif request.action == srv.FlyMissionRequest.STOP:
             engine.fly_with(None)
         else:
-            engine.pause_pilot(request.action == FlyMissionRequest.PAUSE)
-        return FlyMissionResponse(True, "")
+            engine.pause_pilot(request.action == srv.FlyMissionRequest.PAUSE)
+        return srv.FlyMissionResponse(True, "")
 
     def _goal(self, goal: LocationMsg) -> None:
         try:
@@ -144,7 +100,7 @@ class EngineServer:
         if kind is not MeshEventKind.GOAL_REFUSED:
             _log.warning("drone %d: %s%s", self._node_id, kind.value, detail and f", {detail}")
 
-    def _gps(self, _request: RequestGPSRequest) -> RequestGPSResponse:
+    def _gps(self, _request: srv.RequestGPSRequest) -> srv.RequestGPSResponse:
         return gps_response(self._engine.get_location())
 
     def _moved(self, state: DroneState) -> None:
@@ -152,25 +108,75 @@ class EngineServer:
         is_due = state.now_s - self._reported_s >= INFO_PERIOD_S - _ROUNDING_S
         if is_due or kind != self._reported:
             self._reported_s, self._reported = state.now_s, kind
-            self._reporter.report_position(self._node_id, state.position, self._engine.is_flat)
+            self._report(self._drone)
 
 
-class EngineServers:
-    """The engines of all drones. After the start, one thread offers and withdraws them."""
+class EngineServers(rospy.SubscribeListener):
+    """The engines of all drones. After the start, one thread offers and withdraws them.
 
-    def __init__(
-        self, drones: Callable[[], Sequence[VirtualDrone]], happened: Callable[[EventRecord], None]
-    ) -> None:
-        """`drones` returns all current drones; `happened` as for EngineServer."""
-        self._reporter = PositionReporter(drones)
+    Publishes /WirelessSignalSimulator (DroneInfo): the positions of all drones, to every simulator,
+    with one publisher. Any thread.
+    """
+
+    def __init__(self, factory: DroneFactory, happened: Callable[[EventRecord], None]) -> None:
+        """`happened` as for EngineServer."""
+        self._factory = factory
         self._happened = happened
         self._servers: dict[int, EngineServer] = {}
+        self._publisher = rospy.Publisher(
+            names.SIGNAL_TOPIC, DroneInfo, tcp_nodelay=True, queue_size=names.SIGNAL_QUEUE
+        )
+        # Added once the publisher exists; the report below reaches earlier subscribers.
+        implementation = self._publisher.impl
+        assert implementation is not None  # it is not closed yet
+        implementation.add_subscriber_listener(self)
+        self._report_all()
 
     def offer(self, drone: VirtualDrone) -> None:
         """Offer the engine of this drone, and report its position."""
-        self._servers[drone.node_id] = EngineServer(drone, self._reporter, self._happened)
-        self._reporter.report_drone(drone)
+        self._servers[drone.node_id] = EngineServer(drone, self._report, self._happened)
+        self._report(drone)
 
     def withdraw(self, node_id: int) -> None:
         """Withdraw the engine of this drone."""
         self._servers.pop(node_id).close()
+
+    def peer_subscribe(self, _topic: str, _publish: object, _peer_publish: object) -> None:
+        """A new subscriber, perhaps a simulator that was restarted: report all positions.
+
+        Goes to all subscribers: rospy's way to reach only the new one is not thread-safe.
+        """
+        self._report_all()
+
+    def _report_all(self) -> None:
+        for drone in self._factory.drones:
+            self._report(drone)
+
+    def _report(self, drone: VirtualDrone) -> None:
+        """Publish its position; a drone with a flat battery has no power either."""
+        self._publisher.publish(engine_info(drone.node_id, drone.engine.state.position))
+        if drone.engine.is_flat:
+            self._publisher.publish(power_off_info(drone.node_id))
+
+
+class ExternalEngines:
+    """Subscribes /WirelessSignalSimulator (DroneInfo): reports of the nodes that fly the drones.
+
+    Those nodes offer what an engine of the world offers: they subscribe /Drones/<id>/goal, offer
+    /Drones/<id>/gps, and publish DroneInfo without `sub`. Callbacks run in threads of rospy.
+    """
+
+    def __init__(self, factory: DroneFactory) -> None:
+        self._factory = factory
+        rospy.Subscriber(
+            names.SIGNAL_TOPIC, DroneInfo, self._reported, queue_size=names.SIGNAL_QUEUE
+        )
+
+    def _reported(self, info: DroneInfo) -> None:
+        x, y, z = info.position
+        has_position = (x, y, z) != NO_POSITION or info.on
+        if info.sub or not has_position or not math.isfinite(x + y + z):
+            return
+        drone = self._factory.get(info.nodeID)
+        if drone is not None:
+            drone.engine.follow((x, y, z))

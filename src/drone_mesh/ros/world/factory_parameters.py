@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Mapping
+from typing import Mapping, Sequence
 
 import rospy
 
 from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.arguments import is_whole
 from drone_mesh.configuration import FactoryConfiguration
-from drone_mesh.drone.fleet import plan_fleet
+from drone_mesh.drone.fleet import StartPlace, plan_fleet
 from drone_mesh.drone.goal import MAX_HEIGHT_M
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.missions import Mission
@@ -31,6 +31,7 @@ class FactoryParameters:
 
     configuration: FactoryConfiguration
     settings: MeshSettings
+    fleet: Sequence[StartPlace]
     obstacles: Obstacles | None
     missions: Mapping[int, Mission]
     hosts: int  # 1: the nodes run in this process; otherwise in others
@@ -72,7 +73,7 @@ class FactoryParameters:
         if configuration.radio == "nrf24":
             _check_emulated_radio(configuration, int(hosts))
         settings = MeshSettings.of(configuration, obstacles)
-        return cls(configuration, settings, obstacles, missions, int(hosts))
+        return cls(configuration, settings, fleet, obstacles, missions, int(hosts))
 
 
 def _check_emulated_radio(configuration: FactoryConfiguration, hosts: int) -> None:

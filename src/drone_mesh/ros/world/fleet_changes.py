@@ -2,33 +2,30 @@
 
 from __future__ import annotations
 
+import functools
 import logging
-import time
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
-from typing import Callable, Mapping
+from typing import Mapping
 
 import rospy
 
+from drone_mesh import srv
 from drone_mesh.drone.roles import Role
 from drone_mesh.errors import FleetRefused
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.master_watch import MasterWatch
-from drone_mesh.ros.graph.node_presence import node_runs
 from drone_mesh.ros.graph.present_drones import PresentDrones
-from drone_mesh.ros.world.drone_spawner import DroneSpawner
-from drone_mesh.srv import (
-    AddDrone,
-    AddDroneRequest,
-    AddDroneResponse,
-    RemoveDrone,
-    RemoveDroneRequest,
-    RemoveDroneResponse,
-)
-from drone_mesh.world.factory import DroneFactory
+from drone_mesh.ros.graph.waiting import comes_true
+from drone_mesh.ros.host.antenna_panel import node_runs
+from drone_mesh.ros.host.emulated_radios import EmulatedRadios
+from drone_mesh.ros.host.mesh_host import MeshHost
+from drone_mesh.ros.world.engine_server import EngineServers
+from drone_mesh.ros.world.mesh_state import MeshStatePublisher
+from drone_mesh.ros.world.world_runner import WorldRunner
+from drone_mesh.world.factory import DroneFactory, VirtualDrone
 
 NODE_TIMEOUT_S = 5.0  # our choice, wall: how long a node may take to start or to end
-_POLL_PERIOD_S = 0.02  # wall
 
 _log = logging.getLogger(__name__)
 
@@ -39,30 +36,39 @@ class FleetChanges:
     Sets /drone_mesh/drones, from which other processes learn of each change.
 
     One thread makes all changes in sequence; the first request starts it. Threads of rospy wait for
-    it.
+    it. It changes the world in the world's thread.
     """
 
     def __init__(
         self,
         factory: DroneFactory,
-        spawner: DroneSpawner,
+        runner: WorldRunner,
+        state: MeshStatePublisher,
+        engines: EngineServers | None,
+        host: MeshHost | None,
+        radios: EmulatedRadios | None,
         watch: MasterWatch,
         needed: Mapping[int, str],
     ) -> None:
-        """`watch` restores the parameter after a restart of the master.
+        """`engines` is None if other nodes fly the drones, `host` if others run all nodes.
 
-        `needed`: drones that cannot be removed, with the reason.
+        `watch` restores the parameter after a restart of the master. `needed`: drones that cannot
+        be removed, with the reason.
         """
-        self._needed = needed
         self._factory = factory
-        self._spawner = spawner
+        self._runner = runner
+        self._state = state
+        self._engines = engines
+        self._host = host
+        self._radios = radios
         self._watch = watch
+        self._needed = needed
         self._hosts: dict[int, str] = {}  # drone added here -> ROS node that runs its node
         self._worker = ThreadPoolExecutor(1, "fleet changes")
         self._publish()
         self._services = (
-            rospy.Service(names.ADD_DRONE_SERVICE, AddDrone, self._add_requested),
-            rospy.Service(names.REMOVE_DRONE_SERVICE, RemoveDrone, self._remove_requested),
+            rospy.Service(names.ADD_DRONE_SERVICE, srv.AddDrone, self._add_requested),
+            rospy.Service(names.REMOVE_DRONE_SERVICE, srv.RemoveDrone, self._remove_requested),
         )
 
     def stop(self) -> None:
@@ -73,54 +79,69 @@ class FleetChanges:
 
     # Threads of rospy ------------------------------------------------------------------------
 
-    def _add_requested(self, request: AddDroneRequest) -> AddDroneResponse:
+    def _add_requested(self, request: srv.AddDroneRequest) -> srv.AddDroneResponse:
         try:
             return self._worker.submit(self._add, request).result()
         except FleetRefused as error:
-            return AddDroneResponse(success=False, id=request.id, message=str(error))
+            return srv.AddDroneResponse(success=False, id=request.id, message=str(error))
 
-    def _remove_requested(self, request: RemoveDroneRequest) -> RemoveDroneResponse:
+    def _remove_requested(self, request: srv.RemoveDroneRequest) -> srv.RemoveDroneResponse:
         try:
             return self._worker.submit(self._remove, request.id).result()
         except FleetRefused as error:
-            return RemoveDroneResponse(success=False, message=str(error))
+            return srv.RemoveDroneResponse(success=False, message=str(error))
 
     # The thread of the changes ---------------------------------------------------------------
 
-    def _add(self, request: AddDroneRequest) -> AddDroneResponse:
+    def _add(self, request: srv.AddDroneRequest) -> srv.AddDroneResponse:
         role = Role.GATEWAY if request.gateway else Role.ROUTER
-        wanted = None if request.id == AddDroneRequest.LOWEST_FREE else request.id
-        drone = self._spawner.spawn(role, request.longitude, request.latitude, wanted)
+        wanted = None if request.id == srv.AddDroneRequest.LOWEST_FREE else request.id
+
+        def spawn() -> VirtualDrone:
+            drone = self._factory.add(role, request.longitude, request.latitude, wanted)
+            if self._radios is not None:
+                self._radios.place(drone)
+            return drone
+
+        drone = self._runner.between_steps(spawn)
+        if self._engines is not None:
+            self._engines.offer(drone)
         node_id = drone.node_id
         host = self._least_busy_host()
         self._hosts[node_id] = host
         self._publish()
-        self._spawner.start_node(node_id, role)
+        if self._host is not None:
+            self._host.start_nodes({node_id: role})
         message = (
             f"added {role.word} {node_id} at x {request.longitude:g} m, y {request.latitude:g} m; "
             f"{self._await_start(node_id, host)}"
         )
         _log.info("%s", message)
-        return AddDroneResponse(success=True, id=node_id, message=message)
+        return srv.AddDroneResponse(success=True, id=node_id, message=message)
 
-    def _remove(self, node_id: int) -> RemoveDroneResponse:
+    def _remove(self, node_id: int) -> srv.RemoveDroneResponse:
         drone = self._factory.check_removal(node_id)
         if node_id in self._needed:
             raise FleetRefused(f"drone {node_id} cannot be removed: {self._needed[node_id]}")
         self._hosts.pop(node_id, None)
         self._publish(without=node_id)
-        self._spawner.end_node(node_id)
-        if not _comes_true(lambda: not node_runs(node_id)):
+        if self._host is not None:
+            self._host.end_node(node_id)
+        if not comes_true(lambda: not node_runs(node_id), NODE_TIMEOUT_S):
             _log.warning("the process that hosts node %d has not ended it", node_id)
-        self._spawner.despawn(drone)
-        message = f"removed {drone.ROLE.word} {node_id}"
+        if self._engines is not None:
+            self._engines.withdraw(node_id)
+        self._runner.between_steps(functools.partial(self._factory.remove, node_id))
+        self._state.forget(node_id)
+        message = f"removed {drone.role.word} {node_id}"
         _log.info("%s", message)
-        return RemoveDroneResponse(success=True, message=message)
+        return srv.RemoveDroneResponse(success=True, message=message)
 
     def _least_busy_host(self) -> str:
         """The host with the fewest added drones; empty: there is none."""
         busy = Counter(self._hosts.values())
-        return min(self._spawner.hosts(), key=lambda host: (busy[host], host), default="")
+        hosts = self._runner.hosts() if self._host is None else [rospy.get_name()]
+        return min(hosts, key=lambda host: (busy[host], host), default="")
 
     def _await_start(self, node_id: int, host: str) -> str:
         if not host:
@@ -128,21 +149,12 @@ class FleetChanges:
                 "no host process runs its node; start one: "
                 f"roslaunch drone_mesh host.launch first:={node_id} last:={node_id}"
             )
-        if _comes_true(lambda: node_runs(node_id)):
+        if comes_true(lambda: node_runs(node_id), NODE_TIMEOUT_S):
             return f"{host} runs its node"
         return f"{host} has not started its node yet"
 
     def _publish(self, without: int | None = None) -> None:
-        roles = {d.node_id: d.ROLE for d in self._factory.drones if d.node_id != without}
+        roles = {d.node_id: d.role for d in self._factory.drones if d.node_id != without}
         value = PresentDrones(roles, self._hosts).to_parameter()
         rospy.set_param(names.DRONES_PARAM, value)
         self._watch.keep(names.DRONES_PARAM, value)
-
-
-def _comes_true(condition: Callable[[], bool]) -> bool:
-    deadline_s = time.monotonic() + NODE_TIMEOUT_S
-    while not condition():
-        if time.monotonic() > deadline_s or rospy.is_shutdown():
-            return False
-        time.sleep(_POLL_PERIOD_S)
-    return True

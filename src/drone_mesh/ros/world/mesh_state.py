@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import threading
 import time
 from collections import deque
-from dataclasses import dataclass
-from typing import Callable, Iterable, Sequence
+from dataclasses import replace
+from typing import Callable, Sequence, Tuple
 
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
@@ -14,8 +13,9 @@ from diagnostic_msgs.msg import DiagnosticArray
 from drone_mesh.msg import GroundedDrones, HostReport, LayoutProgress, MeshEvent, MeshState
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import event_msg, state_msg
+from drone_mesh.ros.graph.periodic import Periodic
 from drone_mesh.ros.world.diagnostics import diagnostics_msg
-from drone_mesh.state.model import EventRecord, MeshStatus, ObstacleStatus
+from drone_mesh.state.model import EventRecord, MeshStatus
 from drone_mesh.state.roster import DroneView, MeshRoster
 
 WATCHED_PERIOD_S = 0.2  # wall time between two states with a subscriber: flights look smooth
@@ -25,17 +25,11 @@ REPORTS_KEPT = 64  # of all hosts between two rounds; only the newest of each co
 EVENTS_QUEUE = 1000
 
 
-@dataclass(frozen=True)
-class WorldView:
-    """The world's share of one state."""
-
-    stamp_s: float
-    drones: Iterable[DroneView]
-    real_time_factor: float
-    paused: bool
+WorldView = Tuple[MeshStatus, Sequence[DroneView]]
+"""The world's share of one state: all but nodes, achieved factor and layouts; and the drones."""
 
 
-class MeshStatePublisher:
+class MeshStatePublisher(Periodic):
     """Merges the hosts' reports with the world's positions and flights.
 
     Subscribes: /mesh/reports (HostReport), /DroneManager/layouts (LayoutProgress)
@@ -47,31 +41,19 @@ class MeshStatePublisher:
     rospy's handlers only put messages into queues; the object's thread owns everything else.
     """
 
-    def __init__(
-        self,
-        read_view: Callable[[], WorldView],
-        max_distance_m: float,
-        routing: str,
-        repair_strategy: str,
-        happened: deque[EventRecord],
-        obstacles: Sequence[ObstacleStatus] = (),
-        shape: str = "",
-    ) -> None:
+    def __init__(self, read_view: Callable[[], WorldView], happened: deque[EventRecord]) -> None:
         """`read_view` is called in the thread of this object and must not wait for the world.
 
-        Any thread fills `happened` with events of the drones; this object empties it. `routing` and
-        `repair_strategy` are the names of what the nodes use.
+        Any thread fills `happened` with events of the drones; this object empties it.
         """
+        super().__init__("mesh state", WATCHED_PERIOD_S)
         self._read_view = read_view
-        self._max_distance_m = max_distance_m
-        self._routing, self._repair_strategy = routing, repair_strategy
-        self._obstacles, self._shape = obstacles, shape
         self._roster = MeshRoster()
         self._reports: deque[tuple[HostReport, float]] = deque(maxlen=REPORTS_KEPT)
         self._forgotten: deque[int] = deque()
         self._last_state: tuple[float, float] | None = None  # wall, simulated
-        self._latest: MeshStatus | None = None
-        self._diagnosed_s = float("-inf")
+        self.latest: MeshStatus | None = None  # the last one; the next round changes its nodes
+        self._published_s = self._diagnosed_s = float("-inf")
         self._state = rospy.Publisher(names.STATE_TOPIC, MeshState, queue_size=1, latch=True)
         self._events = rospy.Publisher(names.EVENTS_TOPIC, MeshEvent, queue_size=EVENTS_QUEUE)
         self._diagnostics = rospy.Publisher(names.DIAGNOSTICS_TOPIC, DiagnosticArray, queue_size=4)
@@ -80,8 +62,6 @@ class MeshStatePublisher:
         )
         self._grounded_now: dict[int, str] = {}
         self._happened = happened
-        self._stopped = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="mesh state", daemon=True)
         self._progress: deque[LayoutProgress] = deque()
         self._layouts: dict[int, LayoutProgress] = {}  # by standing order
         self._subscribers = (
@@ -89,44 +69,28 @@ class MeshStatePublisher:
             rospy.Subscriber(names.LAYOUTS_TOPIC, LayoutProgress, self._progress.append),
         )
 
-    @property
-    def latest(self) -> MeshStatus | None:
-        """The last published state, None before the first. The next round changes its nodes."""
-        return self._latest
-
     def forget(self, node_id: int) -> None:
         """Stop showing this removed node, even if its host ended before. Any thread."""
         self._forgotten.append(node_id)
-
-    def start(self) -> None:
-        """Start publishing."""
-        self._thread.start()
 
     def stop(self) -> None:
         """Stop publishing; returns when the thread has ended."""
         for subscriber in self._subscribers:
             subscriber.unregister()
-        self._stopped.set()
-        self._thread.join()
+        super().stop()
         for publisher in (self._state, self._events, self._diagnostics, self._grounded):
             publisher.unregister()
 
     def _reported(self, report: HostReport) -> None:
         self._reports.append((report, time.monotonic()))
 
-    def _run(self) -> None:
-        published_s = float("-inf")
-        while not (self._stopped.wait(WATCHED_PERIOD_S) or rospy.is_shutdown()):
-            now_s = time.monotonic()
-            try:
-                self._merge()
-                watched = self._state.get_num_connections() > 0
-                if watched or now_s - published_s >= UNWATCHED_PERIOD_S:
-                    published_s = now_s
-                    self._publish(now_s)
-            except rospy.ROSException:  # the topic was closed: the node shuts down
-                if not rospy.is_shutdown():
-                    raise
+    def _work(self) -> None:
+        now_s = time.monotonic()
+        self._merge()
+        watched = self._state.get_num_connections() > 0
+        if watched or now_s - self._published_s >= UNWATCHED_PERIOD_S:
+            self._published_s = now_s
+            self._publish(now_s)
 
     def _merge(self) -> None:
         while self._reports:
@@ -147,24 +111,14 @@ class MeshStatePublisher:
         self._layouts[progress.id] = progress
 
     def _publish(self, now_s: float) -> None:
-        view = self._read_view()
-        drones = list(view.drones)
+        world, drones = self._read_view()
         self._publish_grounded(drones)
-        nodes = self._roster.snapshot(drones, now_s)
-        mesh = MeshStatus(
-            view.stamp_s,
-            nodes,
-            self._max_distance_m,
-            view.real_time_factor,
-            self._achieved(now_s, view),
-            view.paused,
-            self._routing,
-            self._repair_strategy,
-            self._obstacles,
-            self._shape,
-            [f"{p.name}: {p.message}" for p in self._layouts.values()],
+        self.latest = mesh = replace(
+            world,
+            nodes=self._roster.snapshot(drones, now_s),
+            achieved_real_time_factor=self._achieved(now_s, world),
+            layouts=[f"{p.name}: {p.message}" for p in self._layouts.values()],
         )
-        self._latest = mesh
         self._state.publish(state_msg(mesh))
         if now_s - self._diagnosed_s >= DIAGNOSTICS_PERIOD_S:
             self._diagnosed_s = now_s
@@ -176,8 +130,8 @@ class MeshStatePublisher:
             self._grounded_now = grounded
             self._grounded.publish(GroundedDrones(list(grounded), list(grounded.values())))
 
-    def _achieved(self, now_s: float, view: WorldView) -> float:
-        before, self._last_state = self._last_state, (now_s, view.stamp_s)
-        if before is None or view.paused:
+    def _achieved(self, now_s: float, world: MeshStatus) -> float:
+        before, self._last_state = self._last_state, (now_s, world.stamp_s)
+        if before is None or world.paused:
             return 0.0
-        return max(0.0, (view.stamp_s - before[1]) / (now_s - before[0]))
+        return max(0.0, (world.stamp_s - before[1]) / (now_s - before[0]))

@@ -5,13 +5,14 @@ from __future__ import annotations
 import logging
 import math
 import time
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import rospy
 
 from drone_mesh.msg import HostProgress
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.logs import ThrottledLog
+from drone_mesh.ros.host.mesh_host import MeshHost
 from drone_mesh.world.under_way import UnderWay
 
 # Our choice, simulated: a timer is late by at most this plus one step of the world, and so is the
@@ -21,24 +22,6 @@ HOST_TIMEOUT_S = 2.0  # wall seconds; the world continues without a host that is
 ASK_AGAIN_AFTER_S = 1.0  # wall seconds; between two checks whether a stranger is a host
 
 _log = logging.getLogger(__name__)
-
-
-class PacedNodes(Protocol):
-    """Nodes that run in the time of the world."""
-
-    @property
-    def idle(self) -> bool:
-        """Whether they wait for packets or for time to advance."""
-
-    @property
-    def under_way(self) -> int:
-        """Packets that they handed over, minus those that they have processed."""
-
-    def lag_s(self, now_s: float) -> float:
-        """How long the oldest pending work has been waiting, in simulated seconds."""
-
-    def time_advanced(self) -> None:
-        """The world has made a step."""
 
 
 class _Progress(NamedTuple):
@@ -62,7 +45,7 @@ class PacedHosts:
     Threads of rospy fill `_progress` and `_strangers`; the world's thread owns everything else.
     """
 
-    def __init__(self, nodes: PacedNodes | None) -> None:
+    def __init__(self, nodes: MeshHost | None) -> None:
         """`nodes` are those of this process, or None."""
         self._nodes = nodes
         self._progress: dict[str, _Progress] = {}

@@ -10,7 +10,7 @@ from drone_mesh.drone.roles import Role
 from drone_mesh.missions import Mission
 from drone_mesh.mobility import Area, Mobility, tracks_of
 from drone_mesh.mobility.pilot import TrackPilot
-from drone_mesh.world.drones import VirtualDrone
+from drone_mesh.world.factory import VirtualDrone
 
 MEAN_DEGREE = 10.0  # our choice: neighbours on average, if drones were uniform in the area
 HEIGHT_M = 2.0  # our choice: of the models' flights
@@ -31,7 +31,7 @@ def start_pilots(
         configuration.mobility, (speed_m_s, speed_m_s), height_m=HEIGHT_M, steady=False
     )
     places = {node: drone.engine.get_location().to_vector() for node, drone in by_id.items()}
-    gateways = {node for node, drone in by_id.items() if drone.ROLE is Role.GATEWAY}
+    gateways = {node for node, drone in by_id.items() if drone.role is Role.GATEWAY}
     if places:
         area = area_around(list(places.values()), configuration.max_distance)
         for node, track in tracks_of(mobility, places, gateways, area, configuration.seed).items():

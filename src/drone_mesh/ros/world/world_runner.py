@@ -18,7 +18,8 @@ from drone_mesh.errors import FleetRefused
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import ros_time
 from drone_mesh.ros.graph.direct_publisher import DirectPublisher
-from drone_mesh.ros.world.paced_hosts import PacedHosts, PacedNodes
+from drone_mesh.ros.host.mesh_host import MeshHost
+from drone_mesh.ros.world.paced_hosts import PacedHosts
 from drone_mesh.srv import SetSpeed, SetSpeedRequest, SetSpeedResponse
 from drone_mesh.world.interfaces import World
 from drone_mesh.world.pace import Pace
@@ -45,30 +46,20 @@ class WorldRunner:
     Services:  /DroneFactory/setSpeed (SetSpeed)
 
     The world never runs ahead of pending work of the nodes: when the machine is too slow, simulated
-    time slows down, and no timer is late. Threads of rospy set `_paused` and `_wanted`.
+    time slows down, and no timer is late. Threads of rospy set `paused` and `wanted_factor`.
     """
 
-    def __init__(self, world: World, factor: float, nodes: PacedNodes | None) -> None:
+    def __init__(self, world: World, factor: float, nodes: MeshHost | None) -> None:
         """`nodes` are those of this process, or None."""
         self._world = world
         self._hosts = PacedHosts(nodes)
-        self._paused = False
-        self._wanted = factor
+        self.paused = False  # this and the next: read by any thread
+        self.wanted_factor = factor  # simulated seconds per wall second; 0: as fast as possible
         self._tasks: deque[tuple[Callable[[], Any], Future[Any]]] = deque()
         self._over = threading.Event()
         self._clock = DirectPublisher(names.CLOCK_TOPIC, Clock, STUCK_SUBSCRIBER_S)
         self._factor = rospy.Publisher(names.FACTOR_TOPIC, Float32, latch=True, queue_size=1)
         rospy.Service(names.SPEED_SERVICE, SetSpeed, self._set_speed)
-
-    @property
-    def wanted_factor(self) -> float:
-        """Requested simulated seconds per wall second; 0: as fast as possible. Any thread."""
-        return self._wanted
-
-    @property
-    def paused(self) -> bool:
-        """Whether simulated time is paused. Any thread."""
-        return self._paused
 
     def hosts(self) -> list[str]:
         """The ROS nodes that run nodes of the mesh outside this process. Any thread."""
@@ -90,7 +81,7 @@ class WorldRunner:
 
     def run(self, is_over: Callable[[], bool]) -> None:
         """Step until `is_over` returns True."""
-        pace = Pace(self._wanted)
+        pace = Pace(self.wanted_factor)
         measured_s = self._world.now_s, time.monotonic()
         logged_s = measured_s
         try:
@@ -116,9 +107,9 @@ class WorldRunner:
     def _step_when_due(self, pace: Pace) -> None:
         """Make a step, or sleep briefly if none is due."""
         now_s = self._world.now_s
-        if self._paused or self._wanted != pace.factor:
-            pace.restart(self._wanted)
-        if self._paused:
+        if self.paused or self.wanted_factor != pace.factor:
+            pace.restart(self.wanted_factor)
+        if self.paused:
             time.sleep(_LONGEST_NAP_S)
         elif self._hosts.are_behind(now_s):
             time.sleep(_NAP_S)
@@ -140,12 +131,12 @@ class WorldRunner:
 
     def _log_factor(self, before_s: tuple[float, float], now_s: tuple[float, float]) -> None:
         achieved = (now_s[0] - before_s[0]) / (now_s[1] - before_s[1])
-        if self._paused:
+        if self.paused:
             return
-        if self._wanted == 0.0:
+        if self.wanted_factor == 0.0:
             _log.info("real-time factor %.1f", achieved)
-        elif achieved < _TOO_SLOW * self._wanted:
-            _log.warning("real-time factor %.2f instead of %g", achieved, self._wanted)
+        elif achieved < _TOO_SLOW * self.wanted_factor:
+            _log.warning("real-time factor %.2f instead of %g", achieved, self.wanted_factor)
 
     def _set_speed(self, request: SetSpeedRequest) -> SetSpeedResponse:
         factor = request.real_time_factor
@@ -155,7 +146,7 @@ class WorldRunner:
                 f"invalid real_time_factor {factor:g}: must be {MIN_REAL_TIME_FACTOR:g}.."
                 f"{MAX_REAL_TIME_FACTOR:g}, or 0 to keep it",
             )
-        self._paused = request.paused
+        self.paused = request.paused
         if factor > 0.0:
-            self._wanted = factor
+            self.wanted_factor = factor
         return SetSpeedResponse(True, "")

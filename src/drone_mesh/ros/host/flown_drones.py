@@ -1,4 +1,4 @@
-"""ReportedPlaces: where the engines of other processes say that their drones are."""
+"""What the processes that fly the drones report: where each drone is, and which cannot fly."""
 
 from __future__ import annotations
 
@@ -7,10 +7,30 @@ import struct
 import rospy
 
 from drone_mesh.drone.flight_path import Vector
+from drone_mesh.msg import GroundedDrones as GroundedDronesMsg
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import NO_POSITION
 
 _ID_POSITION_SUB_BYTES = struct.Struct("<B3fI")  # how a DroneInfo begins on the wire
+
+
+class GroundedDrones:
+    """Subscribes: /Drones/grounded (GroundedDrones). Any thread may ask."""
+
+    def __init__(self) -> None:
+        self._reasons: dict[int, str] = {}  # replaced as a whole by rospy's thread
+        self._subscriber = rospy.Subscriber(names.GROUNDED_TOPIC, GroundedDronesMsg, self._changed)
+
+    def reason(self, node_id: int) -> str:
+        """Why this drone cannot fly now; empty if it can, or if that is unknown."""
+        return self._reasons.get(node_id, "")
+
+    def stop(self) -> None:
+        """Leave the topic."""
+        self._subscriber.unregister()
+
+    def _changed(self, message: GroundedDronesMsg) -> None:
+        self._reasons = dict(zip(message.ids, message.reasons))
 
 
 class ReportedPlaces:
