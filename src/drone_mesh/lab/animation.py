@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Sequence
 
 from drone_mesh.communication.interfaces import NO_ROUTE
@@ -146,10 +147,10 @@ def _visible(start: int, stop: int, frames: int, seconds: float) -> str:
 
 def _runs(items: Sequence[str]) -> list[tuple[int, int, str]]:
     """Runs of equal items: first index, index after the last, item."""
-    found: list[tuple[int, int, str]] = []
-    for index, item in enumerate(items):
-        if found and found[-1][2] == item:
-            found[-1] = (found[-1][0], index + 1, item)
-        else:
-            found.append((index, index + 1, item))
+    found = []
+    start = 0
+    for item, same in itertools.groupby(items):
+        stop = start + len(list(same))
+        found.append((start, stop, item))
+        start = stop
     return found

@@ -18,7 +18,7 @@ from drone_mesh.lab.merge import merge
 from drone_mesh.lab.plan import Plan
 from drone_mesh.lab.progress import as_duration
 from drone_mesh.lab.proofs.command import add_proofs
-from drone_mesh.lab.status import describe_folder
+from drone_mesh.lab.store import describe_folder
 from drone_mesh.lab.template import write_template
 from drone_mesh.stopping import ends_as
 from drone_mesh.web.listening import MAX_PORT

@@ -109,7 +109,7 @@ def load_experiment(
         raise source.error((), "expected 'key: value' lines")
     for override in overrides:
         _override(content, override, source)
-    extensions.add_search_folder(source.folder)
+    extensions.add_search_path(str(source.folder.resolve()))
     try:
         experiment = Experiment.model_validate(content)
     except ValidationError as error:

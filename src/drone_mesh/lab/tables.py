@@ -185,9 +185,8 @@ def paired_table(results: Results) -> Table | None:
         if base is None:
             continue
         for metric in results.metrics:
-            pairs = _pairs(results.of_cell(base), results.of_cell(index), metric)
-            paired = paired_difference([a for a, _ in pairs], [b for _, b in pairs])
-            found.append((cell.values, metric, len(pairs), paired))
+            xs, ys = results.paired(base, index, metric)
+            found.append((cell.values, metric, len(xs), paired_difference(xs, ys)))
     adjusted = holm([paired.p for *_, paired in found])
     rows = [
         [
@@ -243,11 +242,6 @@ def _baseline_of(
     wanted = {**values, over: baseline}
     cells = results.loaded.cells
     return next((i for i, cell in enumerate(cells) if dict(cell.values) == wanted), None)
-
-
-def _pairs(a: Mapping[int, Row], b: Mapping[int, Row], metric: str) -> list[tuple[float, float]]:
-    pairs = ((number(a[r], metric), number(b[r], metric)) for r in sorted(a.keys() & b.keys()))
-    return [(x, y) for x, y in pairs if x is not None and y is not None]
 
 
 def _verdict(difference: Interval, p: float, metric: str) -> str:

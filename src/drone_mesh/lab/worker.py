@@ -16,19 +16,11 @@ from drone_mesh.lab.metrics import METRICS, measure_all
 from drone_mesh.lab.plan import RunSpec
 from drone_mesh.lab.provenance import code_version
 from drone_mesh.lab.quiet import quiet_nodes
-from drone_mesh.lab.record import RunRecord
+from drone_mesh.lab.record import RunRecord, ServiceGap
 from drone_mesh.lab.scenario import Scenario
 from drone_mesh.lab.sequence import SequenceRun
-from drone_mesh.lab.simulation import Simulation, Stopwatch
+from drone_mesh.lab.simulation import Simulation
 from drone_mesh.lab.streams import Streams
-
-
-class OutageRow(NamedTuple):
-    """One row of outages.csv, without the run's id; seconds of simulated time."""
-
-    node: int
-    lost_s: float
-    restored_s: float | None
 
 
 class Outcome(NamedTuple):
@@ -39,7 +31,7 @@ class Outcome(NamedTuple):
     code: str  # version of the code that ran it
     values: dict[str, float]  # metric -> value; empty after a failure
     event_hash: str
-    outages: tuple[OutageRow, ...]
+    outages: tuple[ServiceGap, ...]
     failure: str  # kind; empty: none
     message: str
     traceback: str
@@ -77,24 +69,23 @@ def execute(spec: RunSpec) -> Outcome:
     return Outcome(spec, wall_s, code_version(), values, event_hash, outages, "", "", "")
 
 
-def _measure(spec: RunSpec) -> tuple[dict[str, float], str, tuple[OutageRow, ...]]:
+def _measure(spec: RunSpec) -> tuple[dict[str, float], str, tuple[ServiceGap, ...]]:
     if scenario_of(spec.scenario).model == "ideal":
         from drone_mesh.lab.ideal import run_ideal  # needs scipy, which a mesh does not
 
         return (*run_ideal(scenario_of(spec.scenario), Streams(spec.seed, spec.repetition)), ())
     simulation = simulation_of(spec)
     record = simulation.run()
-    gaps = tuple(OutageRow(gap.node, gap.lost_s, gap.restored_s) for gap in record.gaps())
-    return measured(record, spec.own_metrics), simulation.event_hash(), gaps
+    return measured(record, spec.own_metrics), simulation.event_hash(), tuple(record.gaps())
 
 
-def simulation_of(spec: RunSpec, stopwatch: Stopwatch = time.process_time) -> Simulation:
+def simulation_of(spec: RunSpec) -> Simulation:
     """The run, before its start. Raises ConfigurationError for a layout that cannot be drawn."""
     if spec.search_path:
         extensions.add_search_path(spec.search_path)
     scenario = scenario_of(spec.scenario)
     kind = Simulation if scenario.sequence is None else SequenceRun
-    return kind(scenario, Streams(spec.seed, spec.repetition), stopwatch)
+    return kind(scenario, Streams(spec.seed, spec.repetition))
 
 
 def measured(record: RunRecord, own_metrics: tuple[str, ...]) -> dict[str, float]:
