@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.lab.figures import axis_drawing, series_axis
+from drone_mesh.lab.figures import axis_drawing
 from drone_mesh.lab.healing_figures import (
     HEALED,
     PHASES_OF_REPAIR,
@@ -23,8 +23,7 @@ def draw_alone(results: Results, name: str, out: Path) -> None:
     """
     with in_style():
         if name in results.loaded.axes:
-            series = series_axis(results)
-            drawing = axis_drawing(results, name, None if series == name else series)
+            drawing = axis_drawing(results, name)
         elif name in (HEALED, PHASES_OF_REPAIR):
             found = survival_drawing(results) if name == HEALED else phases_drawing(results)
             if found is None:

@@ -123,24 +123,26 @@ def cells_table(results: Results) -> Table:
 
 def healing_table(results: Results) -> Table | None:
     """Share healed by certain times, and the censored time to heal; None without faults."""
-    rows = []
+    cells = []
     for index, cell in enumerate(results.loaded.cells):
-        counted = results.of_cell(index)
-        if not any(number(row, "observed_s") is not None for row in counted.values()):
-            continue
-        found = survival_of(counted)
+        counted = results.of_cell(index).values()
+        times = [(number(row, "t_total_s"), number(row, "observed_s")) for row in counted]
+        if any(observed_s is not None for _, observed_s in times):
+            healed = [math.inf if total_s is None else total_s for total_s, _ in times]
+            end_s = min(observed_s or 0.0 for _, observed_s in times)
+            cells.append((cell, healed, end_s, survival_of(results.of_cell(index))))
+    if not cells:
+        return None
+    columns = [by_s for by_s in HEALED_BY_S if any(by_s <= end_s for _, _, end_s, _ in cells)]
+    rows = []
+    for cell, healed, end_s, found in cells:
         n = found.events + found.censored
-        watched = [number(row, "observed_s") or 0.0 for row in counted.values()]
-        shares = []
-        for by_s in HEALED_BY_S:
-            if by_s > min(watched):
-                shares.append("-")  # the runs end earlier
-                continue
-            healed = sum(
-                (t := number(row, "t_total_s")) is not None and t <= by_s
-                for row in counted.values()
-            )
-            shares.append(_percent(share_interval(healed, n)))
+        shares = [
+            "-"  # the runs end earlier
+            if by_s > end_s
+            else _percent(share_interval(sum(total_s <= by_s for total_s in healed), n))
+            for by_s in columns
+        ]
         rows.append(
             [
                 *map(as_text, cell.values.values()),
@@ -151,19 +153,10 @@ def healing_table(results: Results) -> Table | None:
                 f"{found.restricted_mean} to {found.until:.3g}",
             ]
         )
-    if not rows:
-        return None
     header = [
-        *results.axis_names.values(), "n", *(f"healed in {by_s:g} s" for by_s in HEALED_BY_S),
+        *results.axis_names.values(), "n", *(f"healed in {by_s:g} s" for by_s in columns),
         "healed at all", "median, s", "restricted mean, s",
     ]  # fmt: skip
-    unwatched = [
-        place
-        for place, word in enumerate(header)
-        if word.startswith("healed in") and all(row[place] == "-" for row in rows)
-    ]
-    header = [word for place, word in enumerate(header) if place not in unwatched]
-    rows = [[word for place, word in enumerate(row) if place not in unwatched] for row in rows]
     caption = (
         "Shares with Wilson intervals. Runs that did not heal are censored at their end and never "
         "averaged in: median of Kaplan-Meier (- if less than half healed), and the mean time up "
