@@ -13,7 +13,7 @@ import tempfile
 import threading
 import time
 from pathlib import Path
-from typing import Callable, Iterable, Iterator, Sequence
+from typing import Callable, Iterable, Sequence
 
 import psutil
 
@@ -22,6 +22,7 @@ from drone_mesh.bench.observation import PROBE, WATCH, StateSample, Watch, from_
 from drone_mesh.bench.processes import Use, family, take_use
 from drone_mesh.bench.progress import ProgressLine
 from drone_mesh.errors import MeshError
+from drone_mesh.stopping import ignored
 from drone_mesh.web import LOOPBACK
 
 PART_WITHIN_S = 30.0  # wall; our choice, for master and probe
@@ -215,7 +216,7 @@ class System:
 
         Signals are ignored meanwhile; otherwise processes could be left behind.
         """
-        with _signals_ignored():
+        with ignored(signal.SIGINT, signal.SIGTERM):
             self._close()
 
     def _close(self) -> None:
@@ -272,22 +273,6 @@ class System:
     def _log_of(self, name: str) -> str:
         text = self._log_path(name).read_text(encoding="utf-8", errors="replace")
         return "\n".join(text.splitlines()[-LOG_LINES_SHOWN:])
-
-
-@contextlib.contextmanager
-def _signals_ignored() -> Iterator[None]:
-    """Ignore Ctrl-C and TERM. Has no effect outside the main thread."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    handlers = {
-        number: signal.signal(number, signal.SIG_IGN) for number in (signal.SIGINT, signal.SIGTERM)
-    }
-    try:
-        yield
-    finally:
-        for number, handler in handlers.items():
-            signal.signal(number, handler)
 
 
 def _end(started: subprocess.Popen[bytes]) -> None:

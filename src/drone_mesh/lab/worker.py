@@ -9,7 +9,7 @@ import math
 import threading
 import time
 import traceback
-from typing import NamedTuple
+from typing import Mapping, NamedTuple, Sequence
 
 from drone_mesh.lab import extensions
 from drone_mesh.lab.metrics import METRICS, measure_all
@@ -29,12 +29,12 @@ class Outcome(NamedTuple):
     spec: RunSpec
     wall_s: float
     code: str  # version of the code that ran it
-    values: dict[str, float]  # metric -> value; empty after a failure
-    event_hash: str
-    outages: tuple[ServiceGap, ...]
-    failure: str  # kind; empty: none
-    message: str
-    traceback: str
+    values: Mapping[str, float] = {}  # by metric; empty after a failure
+    event_hash: str = ""
+    outages: Sequence[ServiceGap] = ()
+    failure: str = ""  # kind; empty: none
+    message: str = ""
+    traceback: str = ""
 
 
 class RunTimeout(Exception):
@@ -61,22 +61,20 @@ def execute(spec: RunSpec) -> Outcome:
             message = f"{type(error).__name__}: {message}"
         else:
             message = f"still running after {spec.timeout_s:g} s of wall time"
-        return Outcome(
-            spec, time.perf_counter() - started, code_version(), {}, "", (), kind, message,
-            traceback.format_exc(),
-        )  # fmt: skip
+        wall_s, words = time.perf_counter() - started, traceback.format_exc()
+        return Outcome(spec, wall_s, code_version(), failure=kind, message=message, traceback=words)
     wall_s = time.perf_counter() - started
-    return Outcome(spec, wall_s, code_version(), values, event_hash, outages, "", "", "")
+    return Outcome(spec, wall_s, code_version(), values, event_hash, outages)
 
 
-def _measure(spec: RunSpec) -> tuple[dict[str, float], str, tuple[ServiceGap, ...]]:
+def _measure(spec: RunSpec) -> tuple[dict[str, float], str, Sequence[ServiceGap]]:
     if scenario_of(spec.scenario).model == "ideal":
         from drone_mesh.lab.ideal import run_ideal  # needs scipy, which a mesh does not
 
         return (*run_ideal(scenario_of(spec.scenario), Streams(spec.seed, spec.repetition)), ())
     simulation = simulation_of(spec)
     record = simulation.run()
-    return measured(record, spec.own_metrics), simulation.event_hash(), tuple(record.gaps())
+    return measured(record, spec.own_metrics), simulation.event_hash(), record.gaps()
 
 
 def simulation_of(spec: RunSpec) -> Simulation:
