@@ -14,7 +14,6 @@ from drone_mesh.lab.metrics.registry import METRICS, is_censored, unit_of
 from drone_mesh.lab.results import Results, is_share
 from drone_mesh.lab.statistics import Interval
 from drone_mesh.lab.tables import summary_of
-from drone_mesh.report.drawing import svg_element
 from drone_mesh.view.palette import LIGHT
 
 WIDTH_IN = 7.2  # the text width of A4; the page scales it
@@ -32,10 +31,6 @@ class Drawing(NamedTuple):
     title: str
     caption: str
     figure: Figure
-
-    def to_svg(self) -> str:
-        """The same rows produce the same SVG text."""
-        return svg_element(self.figure)
 
 
 def panels(count: int, row_in: float) -> tuple[Figure, list[Axes]]:

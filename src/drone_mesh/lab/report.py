@@ -16,6 +16,7 @@ from drone_mesh.lab.results import Results, load_results, number
 from drone_mesh.lab.show import replay
 from drone_mesh.lab.store import EXPERIMENT
 from drone_mesh.lab.tables import Table, all_tables
+from drone_mesh.report.drawing import svg_element
 
 _TEMPLATE = Path(__file__).resolve().parent / "report.html"
 PNG_DPI = 200
@@ -59,7 +60,7 @@ def _render(results: Results, tables: Sequence[Table], drawings: Sequence[Drawin
         failures=results.failures,
         draws=experiment.draws,
         tables={table.name: table for table in tables},
-        drawings=[(drawing, drawing.to_svg()) for drawing in drawings],
+        drawings=[(drawing, svg_element(drawing.figure)) for drawing in drawings],
         animation=animation,
         animated_run=run,
         folder=results.folder,

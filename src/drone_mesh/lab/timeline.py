@@ -14,7 +14,7 @@ from drone_mesh.inprocess import Network
 from drone_mesh.lab.faults import Fault, StartCondition, parse_condition
 from drone_mesh.lab.flights import Flights
 from drone_mesh.lab.formations import Formations
-from drone_mesh.lab.impairments import Impairments, Jamming
+from drone_mesh.lab.impairments import Impairments
 from drone_mesh.lab.network_sample import NetworkSample, gateways_of
 from drone_mesh.lab.picking import pick_drones
 from drone_mesh.lab.propagation import put_noise
@@ -181,9 +181,8 @@ class Timeline:
             stop = put_noise(self._network, what, self._scenario.range_m, rng)
             self._after(what.for_s, lambda _: stop())
             return []
-        jamming = Jamming((what.center[0], what.center[1]), what.radius_m, what.loss)
-        jams.append(jamming)
-        self._after(what.for_s, lambda _: jams.remove(jamming))
+        jams.append(what)
+        self._after(what.for_s, lambda _: jams.remove(what))
         return []
 
     def _gateway_off(self, fault: Fault, _rng: random.Random) -> list[int]:
