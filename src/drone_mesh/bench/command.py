@@ -173,7 +173,8 @@ class Benchmark:
             self._print_results()
             return EXIT_INTERRUPTED
         self._print_results()
-        grew = self._soak is not None and (verdict := self._soak.verdict()) and not verdict.steady
+        verdict = soak.judge(self._soak.samples) if self._soak else None
+        grew = verdict is not None and not verdict.steady
         lost = any(result.disconnected for result in self._overload)
         return EXIT_FAILED if self._failed or grew or lost else 0
 

@@ -69,10 +69,6 @@ class SoakResult:
     spacing_m: float
     samples: list[Sample]
 
-    def verdict(self) -> Verdict | None:
-        """The verdict; None if the run is too short for one."""
-        return judge(self.samples)
-
 
 def judge(samples: Sequence[Sample]) -> Verdict | None:
     """The verdict on these samples; None if the run was too short.
@@ -138,7 +134,7 @@ def _take_sample(system: System, sample: StateSample) -> Sample:
 
 def as_json(result: SoakResult) -> dict[str, object]:
     """The samples and their verdict."""
-    verdict = result.verdict()
+    verdict = judge(result.samples)
     return {
         **asdict(result),
         "verdict": None if verdict is None else {**asdict(verdict), "steady": verdict.steady},

@@ -64,24 +64,20 @@ class Campaign:
         cluster: str | None,
         shard: tuple[int, int] | None,
     ) -> None:
-        missing = [
-            planned
+        missing: dict[str, PlannedRun] = {
+            planned.spec.run: planned
             for place, planned in enumerate(plan)
             if planned.spec.run not in store.done and planned.spec.run not in store.failed
             if shard is None or place % shard[1] == shard[0]
-        ]
+        }
         if not missing:
             return
-        planned_of: dict[str, PlannedRun] = {planned.spec.run: planned for planned in missing}
-        progress = Progress(len(planned_of))
-        outcomes = run_all(
-            (planned.spec for planned in planned_of.values()),
-            min(workers, len(planned_of)),
-            cluster,
-        )
+        progress = Progress(len(missing))
+        specs = (planned.spec for planned in missing.values())
+        outcomes = run_all(specs, min(workers, len(missing)), cluster)
         try:
             for outcome in outcomes:
-                planned = planned_of[outcome.spec.run]
+                planned = missing[outcome.spec.run]
                 label = plan.cells[planned.cell].label
                 store.add(outcome, label, self.show_command(outcome.spec.run))
                 progress.count(bool(outcome.failure))

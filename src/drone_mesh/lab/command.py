@@ -262,7 +262,7 @@ def _tables(options: argparse.Namespace) -> int:
 
 
 def _plot(options: argparse.Namespace) -> int:
-    from drone_mesh.lab.plot import draw_alone
+    from drone_mesh.lab.report import draw_alone
     from drone_mesh.lab.results import load_results
 
     results = load_results(options.results).only(options.cells, options.metric)

@@ -217,8 +217,8 @@ class Simulation:
             node_id: self.network.location(node_id).to_vector() for node_id in self.network.nodes
         }
 
-    def _scene(self, sample: NetworkSample | None) -> Topology:
-        hops = {} if sample is None else route_hops(self.network, sample.served)
+    def _scene(self, sample: NetworkSample) -> Topology:
+        hops = route_hops(self.network, sample.served)
         return Topology(physical_graph(self.network), hops, self._places())
 
     def _watch_distances(self) -> None:

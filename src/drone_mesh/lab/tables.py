@@ -6,7 +6,7 @@ import csv
 import io
 import math
 from dataclasses import dataclass
-from typing import Any, Mapping, Sequence
+from typing import Mapping, Sequence
 
 from drone_mesh.lab.experiment import as_text
 from drone_mesh.lab.metrics.registry import METRICS, is_censored, unit_of
@@ -171,10 +171,12 @@ def paired_table(results: Results) -> Table | None:
     if compare is None:
         return None
     found = []
-    for index, cell in enumerate(results.loaded.cells):
+    cells = results.loaded.cells
+    for index, cell in enumerate(cells):
         if cell.values[compare.over] == compare.baseline:
             continue
-        base = _baseline_of(results, cell.values, compare.over, compare.baseline)
+        wanted = {**cell.values, compare.over: compare.baseline}
+        base = next((i for i, other in enumerate(cells) if other.values == wanted), None)
         if base is None:
             continue
         for metric in results.metrics:
@@ -227,14 +229,6 @@ def worst_table(results: Results) -> Table | None:
         f"show {results.folder} RUN, with --page FILE for a page about it."
     )
     return Table("worst", "Worst seeds", caption, header, rows)
-
-
-def _baseline_of(
-    results: Results, values: Mapping[str, Any], over: str, baseline: Any
-) -> int | None:
-    wanted = {**values, over: baseline}
-    cells = results.loaded.cells
-    return next((i for i, cell in enumerate(cells) if dict(cell.values) == wanted), None)
 
 
 def _verdict(difference: Interval, p: float, metric: str) -> str:

@@ -75,7 +75,6 @@ class Stranger(IMeshNetwork):
     def __init__(self, network: Network, node_id: int, x: float, y: float) -> None:
         """At (x, y) metres on the ground, with a radio like those of the network."""
         self.node_id = node_id
-        self._x, self._y = x, y
         self.network = network
         self.mute = False  # True: it does nothing
         self.record: list[RecordedPacket] = []
@@ -124,7 +123,8 @@ class Stranger(IMeshNetwork):
             relay = max(sorted(relays), key=relays.__getitem__)
         else:
             relay = BESIDE
-            network.add_router(relay, self._x, self._y, network.now_s())
+            x, y, _ = self.drone.get_location().to_vector()
+            network.add_router(relay, x, y, network.now_s())
             network.run_for(0.0)
         node = network.nodes[relay]
         node.receiver = Hole(network, relay, [])
