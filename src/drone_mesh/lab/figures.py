@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import Any, Literal, Mapping, NamedTuple, Sequence
 
 from matplotlib.axes import Axes
@@ -89,7 +90,9 @@ def axis_drawing(results: Results, axis: str) -> Drawing:
         caption += f" Drawn for {held}; the tables have all cells."
     if any(map(is_censored, results.metrics)):
         caption += " Times to heal include only runs that healed; compare the share healed as well."
-    return Drawing(f"axis_{_file_name(axis)}", f"Over {results.axis_names[axis]}", caption, figure)
+    return Drawing(
+        re.sub(r"\W", "_", f"axis_{axis}"), f"Over {results.axis_names[axis]}", caption, figure
+    )
 
 
 def _draw_metric(
@@ -189,10 +192,6 @@ def metric_title(metric: str) -> str:
 def short(text: str) -> str:
     text = text.rpartition(":")[2]
     return text if len(text) <= 22 else f"{text[:20]}..."
-
-
-def _file_name(axis: str) -> str:
-    return "".join(letter if letter.isalnum() else "_" for letter in axis)
 
 
 def line_style(order: int) -> str:

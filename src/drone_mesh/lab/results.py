@@ -75,8 +75,16 @@ class Results(NamedTuple):
         ]
 
     def of_cell(self, cell: int) -> dict[int, Row]:
-        """The rows of one cell that count in the report, by repetition."""
-        return {r: row for r, row in self.drawn(cell).items() if self.counts(row)}
+        """The rows of one cell that count in the report, by repetition.
+
+        `draws:` may exclude split runs, or all others.
+        """
+        draws = self.loaded.experiment.draws
+        return {
+            repetition: row
+            for repetition, row in self.drawn(cell).items()
+            if draws == "all" or (row.get("split") == "1") == (draws == "split")
+        }
 
     def drawn(self, cell: int) -> dict[int, Row]:
         """All rows of one cell, by repetition."""
@@ -90,11 +98,6 @@ class Results(NamedTuple):
         )
         whole = [(x, y) for x, y in pairs if x is not None and y is not None]
         return [x for x, _ in whole], [y for _, y in whole]
-
-    def counts(self, row: Row) -> bool:
-        """Whether the report counts this run: `draws:` may exclude split runs, or all others."""
-        draws = self.loaded.experiment.draws
-        return draws == "all" or (row.get("split") == "1") == (draws == "split")
 
     @property
     def axis_names(self) -> dict[str, str]:

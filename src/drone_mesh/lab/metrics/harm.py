@@ -51,17 +51,17 @@ def flew_connected(run: RunRecord) -> float:
 
 @metric("", "repair flights of drones that cannot fly", better="less")
 def flew_grounded(run: RunRecord) -> float:
-    return sum(node in run.grounded for node in _repair_flights(run))
+    return sum(node in run.grounded for node in _nodes_with(run, MeshEventKind.FLIGHT_DECIDED))
 
 
 @metric("", "flights that repairs decided on", better="less")
 def repair_flights(run: RunRecord) -> float:
-    return len(_repair_flights(run))
+    return len(_nodes_with(run, MeshEventKind.FLIGHT_DECIDED))
 
 
-def _repair_flights(run: RunRecord) -> list[int]:
-    kind = MeshEventKind.FLIGHT_DECIDED.value
-    return [event.node for event in run.events if event.kind == kind]
+def _nodes_with(run: RunRecord, kind: MeshEventKind) -> list[int]:
+    """The node of each event of this kind."""
+    return [event.node for event in run.events if event.kind == kind.value]
 
 
 @metric("drones", "live routers that are not connected at the end", better="less")
@@ -76,8 +76,7 @@ def left_able(run: RunRecord) -> float:
 
 @metric("drones", "of left_behind: those that were connected, and know no place", better="less")
 def left_placeless(run: RunRecord) -> float:
-    kind = MeshEventKind.CONNECTED.value
-    connected = {event.node for event in run.events if event.kind == kind}
+    connected = set(_nodes_with(run, MeshEventKind.CONNECTED))
     return sum(
         node in connected and "knows no place" in why for node, why in run.left_behind.items()
     )
