@@ -33,7 +33,17 @@ setup(
     packages=find_packages("src"),
     package_dir={"": "src"},
     package_data={
-        "": ["*.csv", "*.html", "*.lua", "*.pyi", "*.service", "py.typed", "leaflet/*", "static/*"]
+        "": [
+            "*.csv",
+            "*.html",
+            "*.lua",
+            "*.pyi",
+            "*.service",
+            "*.yaml",
+            "py.typed",
+            "leaflet/*",
+            "static/*",
+        ]
     },
     install_requires=requirements("base"),
     extras_require={extra: requirements(extra) for extra in EXTRAS},

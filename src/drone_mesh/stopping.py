@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import os
 import select
+import signal
 import sys
-from typing import Any, Callable, TypeVar, cast
+import threading
+from typing import Any, Callable, Iterator, TypeVar, cast
 
 from drone_mesh.errors import MeshError
 
@@ -57,6 +60,20 @@ class StopRequest:
         self._made = True
         os.close(self._read_end)
         os.close(self._write_end)
+
+
+@contextlib.contextmanager
+def ignored(*signals: signal.Signals) -> Iterator[None]:
+    """Ignore these signals meanwhile. Has no effect outside the main thread, where none arrives."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    handlers = {number: signal.signal(number, signal.SIG_IGN) for number in signals}
+    try:
+        yield
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
 
 
 def ends_as(program: str, failed: int = 1) -> Callable[[Main], Main]:

@@ -9,14 +9,14 @@ import signal
 import sys
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, Iterator, Sequence
+from typing import Any, Callable, Sequence
 
 from drone_mesh.arguments import MOST, whole
 from drone_mesh.bench import cases, inprocess, overload, report, soak
 from drone_mesh.bench.cases import Case
 from drone_mesh.bench.measurement import RosResult, measure
 from drone_mesh.bench.progress import ProgressLine
-from drone_mesh.bench.system import BenchmarkError, check_environment, free_port
+from drone_mesh.bench.system import BenchmarkError, System, check_environment, free_port
 from drone_mesh.communication.seals.key_file import read_key_file
 from drone_mesh.errors import ConfigurationError, naming_argument
 from drone_mesh.web.listening import MAX_PORT
@@ -157,9 +157,11 @@ class Benchmark:
         options = self._options
         try:
             if options.hours is not None:
-                self._run_soak()
+                self._run_one_fleet(
+                    cases.SOAK, f"{options.hours:g} h of simulated time", self._run_soak
+                )
             elif options.busy is not None:
-                self._run_overload()
+                self._run_one_fleet(cases.OVERLOAD, "busy loops", self._run_overload)
             else:
                 if options.only != INPROCESS:
                     self._run_ros()
@@ -171,7 +173,8 @@ class Benchmark:
             self._print_results()
             return EXIT_INTERRUPTED
         self._print_results()
-        grew = self._soak is not None and (verdict := self._soak.verdict()) and not verdict.steady
+        verdict = soak.judge(self._soak.samples) if self._soak else None
+        grew = verdict is not None and not verdict.steady
         lost = any(result.disconnected for result in self._overload)
         return EXIT_FAILED if self._failed or grew or lost else 0
 
@@ -182,12 +185,25 @@ class Benchmark:
         window_s = options.seconds or (QUICK_WINDOW_S if options.quick else WINDOW_S)
         for number, case in enumerate(sizes, start=1):
             self._progress.begin(f"[{number}/{len(sizes)}] {case}")
-            try:
-                result = measure(case, options.launch, self._port(), window_s, self._progress)
-            except BenchmarkError as error:
-                self._fail(case, error)
-            else:
-                self._ros.append(result)
+            self._run_fleet(case, lambda system: self._ros.append(measure(system, window_s)))
+
+    def _run_one_fleet(self, usual: Case, what: str, use: Callable[[System], None]) -> None:
+        check_environment()
+        case = self._options.sizes[0] if self._options.sizes else usual
+        self._progress.begin(f"{case}: {what}")
+        self._run_fleet(case, use)
+
+    def _run_fleet(self, case: Case, use: Callable[[System], None]) -> None:
+        """Start a fleet, use and stop it; if it fails, note that."""
+        options = self._options
+        port = options.port or free_port()
+        try:
+            with System(case, options.launch, port, self._progress) as system:
+                use(system)
+        except BenchmarkError as error:
+            self._progress.clear()
+            self._failed.append({"case": str(case), "reason": str(error)})
+            print(f"bench: {case}: {error}", file=sys.stderr)
 
     def _run_inprocess(self) -> None:
         runs = QUICK_RUNS if self._options.quick else RUNS
@@ -200,54 +216,18 @@ class Benchmark:
             self._seal_cost = inprocess.seal_cost(drones, runs, self._progress.say, self._key)
         self._progress.clear()
 
-    def _run_soak(self) -> None:
-        options = self._options
-        with self._one_fleet(cases.SOAK, f"{options.hours:g} h of simulated time") as case:
-            self._soak = soak.soak(
-                case,
-                options.hours,
-                options.launch,
-                self._port(),
-                self._progress,
-                lambda sample: print(report.sample_line(sample), flush=True),
-            )
+    def _run_soak(self, system: System) -> None:
+        result = soak.SoakResult(system.case.drones, system.case.spacing_m, [])
+        for sample in soak.soak(system, self._options.hours):
+            result.samples.append(sample)
+            print(report.sample_line(sample), flush=True)
+        self._soak = result
 
-    def _run_overload(self) -> None:
-        options = self._options
-
-        def show(result: overload.OverloadResult) -> None:
+    def _run_overload(self, system: System) -> None:
+        seconds = self._options.seconds or overload.SIMULATED_S
+        for result in overload.overload(system, self._options.busy, seconds):
             self._overload.append(result)
             print(report.overload_line(result), flush=True)
-
-        with self._one_fleet(cases.OVERLOAD, "busy loops") as case:
-            overload.overload(
-                case,
-                options.busy,
-                options.launch,
-                self._port(),
-                self._progress,
-                show,
-                options.seconds or overload.SIMULATED_S,
-            )
-
-    @contextlib.contextmanager
-    def _one_fleet(self, usual: Case, what: str) -> Iterator[Case]:
-        check_environment()
-        case = self._options.sizes[0] if self._options.sizes else usual
-        self._progress.begin(f"{case}: {what}")
-        try:
-            yield case
-        except BenchmarkError as error:
-            self._fail(case, error)
-
-    def _port(self) -> int:
-        port: int = self._options.port or free_port()
-        return port
-
-    def _fail(self, case: Case, error: BenchmarkError) -> None:
-        self._progress.clear()
-        self._failed.append({"case": str(case), "reason": str(error)})
-        print(f"bench: {case}: {error}", file=sys.stderr)
 
     def _print_results(self) -> None:
         sections = [f"Measured on {self._machine}."]

@@ -55,20 +55,19 @@ class _Pace:
     packets_per_cpu_s: float
 
 
-def _pace(network: Network, simulated_s: float) -> _Pace:
+def _pace(network: Network) -> _Pace:
     delivered = network.air.delivered
     wall_s, cpu_s = time.perf_counter(), time.process_time()
-    network.run_for(simulated_s)
+    network.run_for(SIMULATED_S)
     wall_s, cpu_s = time.perf_counter() - wall_s, time.process_time() - cpu_s
     packets_per_cpu_s = (network.air.delivered - delivered) / cpu_s
-    return _Pace(simulated_s / cpu_s, simulated_s / wall_s, packets_per_cpu_s)
+    return _Pace(SIMULATED_S / cpu_s, SIMULATED_S / wall_s, packets_per_cpu_s)
 
 
 def measure(
     drones: int,
     runs: int,
     say: Callable[[str], None],
-    simulated_s: float = SIMULATED_S,
     key: Keys | None = None,
 ) -> InProcessResult:
     """Start a network `runs` times and measure two phases of each run.
@@ -84,15 +83,15 @@ def measure(
         say(f"{drones} drones in process: run {run + 1} of {runs}")
         network = Network(seed=run, key=key)
         network.add_fleet(1, case.routers, case.gridsize, SPACING_M)
-        starting.append(_pace(network, simulated_s))
-        running.append(_pace(network, simulated_s))
+        starting.append(_pace(network))
+        running.append(_pace(network))
         packets = network.air.delivered
         connected = connected and network.all_connected()
     return InProcessResult(
         drones=drones,
         spacing_m=SPACING_M,
         runs=runs,
-        simulated_s=simulated_s,
+        simulated_s=SIMULATED_S,
         from_start_per_cpu_s=statistics.median(pace.per_cpu_s for pace in starting),
         from_start_per_wall_s=statistics.median(pace.per_wall_s for pace in starting),
         from_start_best_per_cpu_s=max(pace.per_cpu_s for pace in starting),
@@ -115,7 +114,7 @@ def seal_cost(drones: int, runs: int, say: Callable[[str], None], key: Keys) -> 
             network = Network(seed=run, key=keys)
             network.add_fleet(1, case.routers, case.gridsize, SPACING_M)
             network.run_for(SIMULATED_S)
-            pace = _pace(network, SIMULATED_S).packets_per_cpu_s
+            pace = _pace(network).packets_per_cpu_s
             if keys is None:
                 without_key = max(without_key, pace)
             else:

@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-import contextlib
 import time
 from dataclasses import dataclass
-from typing import Iterator
 
-from drone_mesh.bench.cases import Case
 from drone_mesh.bench.observation import REST, TAKE_OFF, WATCH, StateSample
 from drone_mesh.bench.processes import Use, cores_between
-from drone_mesh.bench.progress import ProgressLine
 from drone_mesh.bench.system import BenchmarkError, System
 from drone_mesh.state.figures import DELIVERED, LOST_IN_RANGE, WORST_LAG
 
-ON_WITHIN_S = 180.0  # wall; our choice: six times the allowed time for 254 drones
-CONNECTED_WITHIN_S = 120.0  # wall; the same limit as for the original
 SETTLE_S = 5.0  # wall; the start costs more than later seconds
 SAMPLE_WITHIN_S = 20.0  # wall
 MEGABYTE = 1e6
@@ -61,69 +55,31 @@ class _Moment:
     lost: float | None
 
 
-def measure(
-    case: Case, launch_args: list[str], port: int, window_s: float, progress: ProgressLine
-) -> RosResult:
-    """Start a fleet, wait until all are connected, measure `window_s` wall seconds, stop it.
+def measure(system: System, window_s: float) -> RosResult:
+    """Wait until all are connected, and measure `window_s` wall seconds.
 
-    Raises BenchmarkError when it does not start or ends by itself.
+    Raises BenchmarkError when the fleet ends by itself.
     """
-    with running_fleet(case, launch_args, port, progress) as system:
-        await_connected(system, case, progress)
-        _sleep(system, SETTLE_S, progress, "waiting for the start to settle")
-        if case.flying:
-            system.order(TAKE_OFF)
-            _sleep(system, SETTLE_S, progress, "waiting for the flights to begin")
-        first = _take_moment(system)
-        system.order(REST)
-        _sleep(system, window_s, progress, "measuring")
-        system.order(WATCH)
-        last = _take_moment(system)
-        result = _result(case, system, first, last)
-        progress.say("stopping")
+    system.await_connected()
+    _sleep(system, SETTLE_S, "waiting for the start to settle")
+    if system.case.flying:
+        system.order(TAKE_OFF)
+        _sleep(system, SETTLE_S, "waiting for the flights to begin")
+    first = _take_moment(system)
+    system.order(REST)
+    _sleep(system, window_s, "measuring")
+    system.order(WATCH)
+    last = _take_moment(system)
+    result = _result(system, first, last)
+    system.progress.say("stopping")
     return result
-
-
-@contextlib.contextmanager
-def running_fleet(
-    case: Case, launch_args: list[str], port: int, progress: ProgressLine
-) -> Iterator[System]:
-    """A fleet whose nodes are all on. Raises BenchmarkError after a time limit."""
-    with System(case.drones, [*case.launch_args(), *launch_args], port) as system:
-        watch = system.watch
-
-        def on() -> str:
-            return f"{watch.last.on if watch.last else 0} of {case.drones} nodes"
-
-        def say() -> None:
-            progress.say(f"{on()} on, {time.monotonic() - system.launched_s:.0f} s")
-
-        if not system.wait_for(lambda: watch.all_on is not None, ON_WITHIN_S, say):
-            raise BenchmarkError(f"only {on()} are on after {ON_WITHIN_S:g} s")
-        yield system
-    progress.clear()
-
-
-def await_connected(system: System, case: Case, progress: ProgressLine) -> bool:
-    """Whether all routers are connected within a time limit."""
-    watch = system.watch
-
-    def say() -> None:
-        connected = watch.last.connected if watch.last else 0
-        progress.say(f"{connected} of {case.routers} routers connected")
-
-    connected = system.wait_for(lambda: watch.all_connected is not None, CONNECTED_WITHIN_S, say)
-    if watch.all_on and watch.all_connected:
-        after_s = watch.all_connected.wall_s - watch.all_on.wall_s
-        progress.say(f"all connected after {after_s:.1f} s")
-    return connected
 
 
 def _take_moment(system: System) -> _Moment:
     """The current figures. The first state may be old, so wait for the second."""
     watch = system.watch
     seen = len(watch.samples)
-    if not system.wait_for(lambda: len(watch.samples) >= seen + 2, SAMPLE_WITHIN_S, lambda: None):
+    if not system.wait_for(lambda: len(watch.samples) >= seen + 2, SAMPLE_WITHIN_S):
         raise BenchmarkError(f"no /mesh/state for {SAMPLE_WITHIN_S:g} s")
     sample = watch.samples[-1]
     return _Moment(
@@ -135,8 +91,8 @@ def _take_moment(system: System) -> _Moment:
     )
 
 
-def _result(case: Case, system: System, first: _Moment, last: _Moment) -> RosResult:
-    watch = system.watch
+def _result(system: System, first: _Moment, last: _Moment) -> RosResult:
+    case, watch = system.case, system.watch
     assert watch.all_on is not None
     wall_s = last.sample.wall_s - first.sample.wall_s
     sim_s = last.sample.sim_s - first.sample.sim_s
@@ -145,7 +101,7 @@ def _result(case: Case, system: System, first: _Moment, last: _Moment) -> RosRes
     lost = _increase(first.lost, last.lost)
     cores, links = cores_between(first.use, last.use), last.sample.links
     cpu_ms = 1000.0 * sum(cores.values()) * wall_s
-    connected = watch.all_connected
+    connected, processes = watch.all_connected, last.use.processes.values()
     return RosResult(
         drones=case.drones,
         spacing_m=case.spacing_m,
@@ -166,10 +122,10 @@ def _result(case: Case, system: System, first: _Moment, last: _Moment) -> RosRes
         cores=cores,
         links=links,
         cpu_ms_per_sim_s_and_link=cpu_ms / sim_s / links if sim_s and links else None,
-        pss_mb=last.use.pss_bytes / MEGABYTE,
-        rss_mb=last.use.rss_bytes / MEGABYTE,
-        threads=last.use.threads,
-        open_files=last.use.open_files,
+        pss_mb=sum(process.pss_bytes for process in processes) / MEGABYTE,
+        rss_mb=sum(process.rss_bytes for process in processes) / MEGABYTE,
+        threads=sum(process.threads for process in processes),
+        open_files=sum(process.open_files for process in processes),
         reached_real_time_factor=sim_s / wall_s,
         worst_timer_lag_s=watch.worst.get(WORST_LAG),
     )
@@ -189,10 +145,10 @@ def _share(lost: float | None, delivered: float | None) -> float | None:
     return lost / (lost + delivered)
 
 
-def _sleep(system: System, seconds: float, progress: ProgressLine, what: str) -> None:
+def _sleep(system: System, seconds: float, what: str) -> None:
     until_s = time.monotonic() + seconds
     system.wait_for(
         lambda: time.monotonic() >= until_s,
         seconds + 1.0,
-        lambda: progress.say(f"{what}: {max(0.0, until_s - time.monotonic()):.0f} s"),
+        lambda: f"{what}: {max(0.0, until_s - time.monotonic()):.0f} s",
     )

@@ -6,12 +6,9 @@ import contextlib
 import subprocess
 import sys
 from dataclasses import dataclass
-from typing import Callable, Iterator, Sequence
+from typing import Iterator, Sequence
 
-from drone_mesh.bench.cases import Case
-from drone_mesh.bench.measurement import CONNECTED_WITHIN_S, await_connected, running_fleet
-from drone_mesh.bench.progress import ProgressLine
-from drone_mesh.bench.system import BenchmarkError, System
+from drone_mesh.bench.system import CONNECTED_WITHIN_S, BenchmarkError, System
 
 SIMULATED_S = 300.0
 SECOND_WITHIN_S = 60.0  # wall, for each simulated second; slower counts as stopped
@@ -53,42 +50,29 @@ def busy_loops(count: int) -> Iterator[None]:
             loop.wait()
 
 
-def overload(
-    case: Case,
-    counts: Sequence[int],
-    launch_args: list[str],
-    port: int,
-    progress: ProgressLine,
-    on_result: Callable[[OverloadResult], None],
-    simulated_s: float = SIMULATED_S,
-) -> None:
-    """Run one fleet, once all are connected, beside each number of busy loops in turn.
+def overload(system: System, counts: Sequence[int], simulated_s: float) -> Iterator[OverloadResult]:
+    """Run a fleet, once all are connected, beside each number of busy loops in turn.
 
-    `on_result` gets each result at once.
-
-    Raises BenchmarkError if the fleet does not start or connect, ends by itself or stops.
+    Raises BenchmarkError if the fleet does not connect, ends by itself or stops.
     """
-    with running_fleet(case, launch_args, port, progress) as system:
-        if not await_connected(system, case, progress):
-            raise BenchmarkError(f"not all connected after {CONNECTED_WITHIN_S:g} s")
-        for count in counts:
-            with busy_loops(count):
-                result = _run(system, case, count, simulated_s, progress)
-            progress.clear()
-            on_result(result)
+    if not system.await_connected():
+        raise BenchmarkError(f"not all connected after {CONNECTED_WITHIN_S:g} s")
+    for count in counts:
+        with busy_loops(count):
+            result = _run(system, count, simulated_s)
+        system.progress.clear()
+        yield result
 
 
-def _run(
-    system: System, case: Case, count: int, simulated_s: float, progress: ProgressLine
-) -> OverloadResult:
-    watch = system.watch
+def _run(system: System, count: int, simulated_s: float) -> OverloadResult:
+    case, watch = system.case, system.watch
     first = last = watch.last
     assert first is not None
     assert last is not None
     passed_s = 0.0
 
-    def say() -> None:
-        progress.say(
+    def words() -> str:
+        return (
             f"{count} busy loops: simulated {passed_s:.0f} s of {simulated_s:g} s, "
             f"{watch.disconnected_since(first.sim_s)} disconnected"
         )
@@ -96,7 +80,7 @@ def _run(
     while passed_s < simulated_s:
         passed_s = min(simulated_s, passed_s + 1.0)
         second = f"{count} busy loops: a simulated second"
-        last = system.wait_until_s(first.sim_s + passed_s, SECOND_WITHIN_S, say, second)
+        last = system.wait_until_s(first.sim_s + passed_s, SECOND_WITHIN_S, words, second)
     return OverloadResult(
         drones=case.drones,
         spacing_m=case.spacing_m,

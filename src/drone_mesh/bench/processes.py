@@ -18,7 +18,7 @@ class ProcessUse:
     name: str
     cpu_s: float  # since it started, user and system
     pss_bytes: int  # memory; shared pages are divided among the processes
-    rss_bytes: int
+    rss_bytes: int  # memory; shared pages count in each process
     threads: int
     open_files: int  # including sockets
 
@@ -29,26 +29,6 @@ class Use:
 
     wall_s: float  # time.monotonic
     processes: Mapping[int, ProcessUse]
-
-    @property
-    def pss_bytes(self) -> int:
-        """Memory of all processes, shared pages counted once."""
-        return sum(process.pss_bytes for process in self.processes.values())
-
-    @property
-    def rss_bytes(self) -> int:
-        """Memory of all processes, shared pages counted once per process."""
-        return sum(process.rss_bytes for process in self.processes.values())
-
-    @property
-    def threads(self) -> int:
-        """Threads of all processes."""
-        return sum(process.threads for process in self.processes.values())
-
-    @property
-    def open_files(self) -> int:
-        """Open files and connections of all processes."""
-        return sum(process.open_files for process in self.processes.values())
 
 
 def family(pid: int) -> list[psutil.Process]:

@@ -12,7 +12,7 @@ from typing import Callable, Sequence, TypeVar
 from drone_mesh.bench.inprocess import InProcessResult, SealCost
 from drone_mesh.bench.measurement import RosResult
 from drone_mesh.bench.overload import OverloadResult
-from drone_mesh.bench.soak import Sample, SoakResult
+from drone_mesh.bench.soak import Sample, SoakResult, judge
 
 R = TypeVar("R")
 
@@ -210,7 +210,7 @@ def sample_line(sample: Sample) -> str:
 
 def verdict_lines(result: SoakResult) -> str:
     """The verdict on growth after the first ten minutes."""
-    verdict = result.verdict()
+    verdict = judge(result.samples)
     if verdict is None:
         return (
             "too short for a verdict on growth: "

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import statistics
 from dataclasses import asdict, dataclass
-from typing import Callable, Sequence
+from typing import Iterator, Sequence
 
-from drone_mesh.bench.cases import Case
-from drone_mesh.bench.measurement import MEGABYTE, running_fleet
+from drone_mesh.bench.measurement import MEGABYTE
 from drone_mesh.bench.observation import StateSample
-from drone_mesh.bench.progress import ProgressLine
 from drone_mesh.bench.system import System
 
 SAMPLE_PERIOD_S = 60.0  # simulated
@@ -71,10 +69,6 @@ class SoakResult:
     spacing_m: float
     samples: list[Sample]
 
-    def verdict(self) -> Verdict | None:
-        """The verdict; None if the run is too short for one."""
-        return judge(self.samples)
-
 
 def judge(samples: Sequence[Sample]) -> Verdict | None:
     """The verdict on these samples; None if the run was too short.
@@ -102,57 +96,45 @@ def judge(samples: Sequence[Sample]) -> Verdict | None:
     )
 
 
-def soak(
-    case: Case,
-    hours: float,
-    launch_args: list[str],
-    port: int,
-    progress: ProgressLine,
-    on_sample: Callable[[Sample], None],
-) -> SoakResult:
-    """Run a fleet for `hours` of simulated time; `on_sample` gets each sample at once.
+def soak(system: System, hours: float) -> Iterator[Sample]:
+    """Sample a fleet for `hours` of simulated time.
 
-    Raises BenchmarkError if the fleet does not start, ends by itself or stops.
+    Raises BenchmarkError if the fleet ends by itself or stops.
     """
-    result = SoakResult(case.drones, case.spacing_m, [])
-    with running_fleet(case, launch_args, port, progress) as system:
-        watch = system.watch
-        assert watch.all_on is not None
-        next_s = watch.all_on.sim_s
-        end_s = next_s + hours * 3600.0
+    watch = system.watch
+    assert watch.all_on is not None
+    next_s = watch.all_on.sim_s
+    end_s = next_s + hours * 3600.0
 
-        def say() -> None:
-            now_s = watch.last.sim_s if watch.last else 0.0
-            progress.say(f"simulated {now_s:.0f} s of {end_s:.0f} s")
+    def words() -> str:
+        return f"simulated {watch.last.sim_s if watch.last else 0.0:.0f} s of {end_s:.0f} s"
 
-        while next_s <= end_s:
-            state = system.wait_until_s(next_s, SAMPLE_WITHIN_S, say, "a minute of simulated time")
-            sample = _take_sample(system, state)
-            result.samples.append(sample)
-            progress.clear()
-            on_sample(sample)
-            next_s += SAMPLE_PERIOD_S
-    return result
+    while next_s <= end_s:
+        state = system.wait_until_s(next_s, SAMPLE_WITHIN_S, words, "a minute of simulated time")
+        sample = _take_sample(system, state)
+        system.progress.clear()
+        yield sample
+        next_s += SAMPLE_PERIOD_S
 
 
 def _take_sample(system: System, sample: StateSample) -> Sample:
-    use = system.use()
+    processes = system.use().processes.values()
     return Sample(
         sim_s=sample.sim_s,
         wall_s=sample.wall_s - system.launched_s,
-        pss_mb=use.pss_bytes / MEGABYTE,
-        rss_mb=use.rss_bytes / MEGABYTE,
-        threads=use.threads,
-        open_files=use.open_files,
+        pss_mb=sum(process.pss_bytes for process in processes) / MEGABYTE,
+        rss_mb=sum(process.rss_bytes for process in processes) / MEGABYTE,
+        threads=sum(process.threads for process in processes),
+        open_files=sum(process.open_files for process in processes),
         routers_connected=sample.connected,
-        threads_of={process.name: process.threads for process in use.processes.values()},
-        open_files_of={process.name: process.open_files for process in use.processes.values()},
+        threads_of={process.name: process.threads for process in processes},
+        open_files_of={process.name: process.open_files for process in processes},
     )
 
 
 def as_json(result: SoakResult) -> dict[str, object]:
     """The samples and their verdict."""
-    verdict = result.verdict()
+    verdict = judge(result.samples)
     return {
         **asdict(result),
         "verdict": None if verdict is None else {**asdict(verdict), "steady": verdict.steady},

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Sequence
 
 from drone_mesh.communication.interfaces import NO_ROUTE
@@ -35,22 +36,19 @@ def animate_repair(states: Sequence[MeshStatus], record: RunRecord) -> str:
     frames = [*shown[::stride], shown[-1]]
     served = {sample.now_s: sample.served for sample in record.samples}
     scale = _Scale(frames)
-    seconds = FRAME_S * len(frames)
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {scale.height:.0f}" '
         'class="animation" role="img">',
         f'<rect width="{WIDTH}" height="{scale.height:.0f}" fill="#ffffff"/>',
     ]
-    parts += _links(frames, scale, seconds)
+    parts += _links(frames, scale)
     for index in range(len(frames[0].nodes)):
-        parts.append(
-            _drone([frame.nodes[index] for frame in frames], frames, served, scale, seconds)
-        )
+        parts.append(_drone([frame.nodes[index] for frame in frames], frames, served, scale))
     texts = [f"{state.stamp_s - record.fault_s:+.0f} s" for state in frames]
     for start, stop, text in _runs(texts):
         parts.append(
             f'<text x="{MARGIN}" y="18" font-size="13" font-family="sans-serif" fill="#333" '
-            f'visibility="hidden">{text}{_visible(start, stop, len(frames), seconds)}</text>'
+            f'visibility="hidden">{text}{_visible(start, stop, len(frames))}</text>'
         )
     parts.append("</svg>")
     return "\n".join(parts)
@@ -73,7 +71,7 @@ class _Scale:
         )
 
 
-def _links(frames: Sequence[MeshStatus], scale: _Scale, seconds: float) -> list[str]:
+def _links(frames: Sequence[MeshStatus], scale: _Scale) -> list[str]:
     """The routes in use; consecutive frames with the same routes share them."""
     pictures = []
     for frame in frames:
@@ -88,7 +86,7 @@ def _links(frames: Sequence[MeshStatus], scale: _Scale, seconds: float) -> list[
         pictures.append("".join(lines))
     return [
         f'<path d="{path}" stroke="#9bb0c9" stroke-width="1.4" fill="none" visibility="hidden">'
-        f"{_visible(start, stop, len(frames), seconds)}</path>"
+        f"{_visible(start, stop, len(frames))}</path>"
         for start, stop, path in _runs(pictures)
         if path
     ]
@@ -99,7 +97,6 @@ def _drone(
     frames: Sequence[MeshStatus],
     served: dict[float, frozenset[int]],
     scale: _Scale,
-    seconds: float,
 ) -> str:
     colours = []
     for node, frame in zip(states, frames):
@@ -114,10 +111,10 @@ def _drone(
     radius = 7 if states[0].role == Role.GATEWAY else 5
     inside = ""
     if len(set(colours)) > 1:
-        inside += _animate("fill", colours, seconds, "discrete")
+        inside += _animate("fill", colours, "discrete")
     if len(set(points)) > 1:
-        inside += _animate("cx", [f"{x:.1f}" for x, _ in points], seconds, "linear")
-        inside += _animate("cy", [f"{y:.1f}" for _, y in points], seconds, "linear")
+        inside += _animate("cx", [f"{x:.1f}" for x, _ in points], "linear")
+        inside += _animate("cy", [f"{y:.1f}" for _, y in points], "linear")
     title = f"<title>node {states[0].id}</title>"
     return (
         f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius}" fill="{colours[0]}" stroke="#fff" '
@@ -125,31 +122,31 @@ def _drone(
     )
 
 
-def _animate(attribute: str, values: Sequence[str], seconds: float, mode: str) -> str:
+def _animate(attribute: str, values: Sequence[str], mode: str) -> str:
+    """Gives an attribute one value per frame."""
     return (
-        f'<animate attributeName="{attribute}" values="{";".join(values)}" dur="{seconds:g}s" '
-        f'calcMode="{mode}" repeatCount="indefinite"/>'
+        f'<animate attributeName="{attribute}" values="{";".join(values)}" '
+        f'dur="{FRAME_S * len(values):g}s" calcMode="{mode}" repeatCount="indefinite"/>'
     )
 
 
-def _visible(start: int, stop: int, frames: int, seconds: float) -> str:
+def _visible(start: int, stop: int, frames: int) -> str:
     """Makes an element visible in the frames start..stop-1."""
-    values = ["visible" if start <= frame < stop else "hidden" for frame in range(frames)]
-    changes = [0, *(i for i in range(1, frames) if values[i] != values[i - 1])]
+    changes = sorted({0, start, stop} - {frames})
     times = ";".join(f"{change / frames:.4f}" for change in changes)
-    words = ";".join(values[change] for change in changes)
+    words = ";".join("visible" if start <= change < stop else "hidden" for change in changes)
     return (
         f'<animate attributeName="visibility" values="{words}" keyTimes="{times}" '
-        f'dur="{seconds:g}s" calcMode="discrete" repeatCount="indefinite"/>'
+        f'dur="{FRAME_S * frames:g}s" calcMode="discrete" repeatCount="indefinite"/>'
     )
 
 
 def _runs(items: Sequence[str]) -> list[tuple[int, int, str]]:
     """Runs of equal items: first index, index after the last, item."""
-    found: list[tuple[int, int, str]] = []
-    for index, item in enumerate(items):
-        if found and found[-1][2] == item:
-            found[-1] = (found[-1][0], index + 1, item)
-        else:
-            found.append((index, index + 1, item))
+    found = []
+    start = 0
+    for item, same in itertools.groupby(items):
+        stop = start + len(list(same))
+        found.append((start, stop, item))
+        start = stop
     return found

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import shlex
-import sys
+import statistics
 from pathlib import Path
-from typing import Sequence, TextIO
+from typing import Sequence
 
 from drone_mesh.lab.engine import run_all
 from drone_mesh.lab.experiment import LoadedExperiment
@@ -33,7 +33,6 @@ class Campaign:
         cluster: str | None,
         shard: tuple[int, int] | None = None,
         retry_failed: bool = False,
-        stream: TextIO = sys.stderr,
     ) -> None:
         """Execute missing runs; add seeds if the experiment requests it.
 
@@ -47,7 +46,7 @@ class Campaign:
             name = cluster or ("in this process" if workers == 0 else f"{workers} local")
             store.describe(describe_session(self._command, self.loaded, name))
             while True:
-                self._run_plan(plan, store, workers, cluster, shard, stream)
+                self._run_plan(plan, store, workers, cluster, shard)
                 more = self._more_seeds(plan, store)
                 if more is None:
                     break
@@ -64,26 +63,21 @@ class Campaign:
         workers: int,
         cluster: str | None,
         shard: tuple[int, int] | None,
-        stream: TextIO,
     ) -> None:
-        missing = [
-            planned
+        missing: dict[str, PlannedRun] = {
+            planned.spec.run: planned
             for place, planned in enumerate(plan)
             if planned.spec.run not in store.done and planned.spec.run not in store.failed
             if shard is None or place % shard[1] == shard[0]
-        ]
+        }
         if not missing:
             return
-        planned_of: dict[str, PlannedRun] = {planned.spec.run: planned for planned in missing}
-        progress = Progress(len(planned_of), stream)
-        outcomes = run_all(
-            (planned.spec for planned in planned_of.values()),
-            min(workers, len(planned_of)),
-            cluster,
-        )
+        progress = Progress(len(missing))
+        specs = (planned.spec for planned in missing.values())
+        outcomes = run_all(specs, min(workers, len(missing)), cluster)
         try:
             for outcome in outcomes:
-                planned = planned_of[outcome.spec.run]
+                planned = missing[outcome.spec.run]
                 label = plan.cells[planned.cell].label
                 store.add(outcome, label, self.show_command(outcome.spec.run))
                 progress.count(bool(outcome.failure))
@@ -120,10 +114,8 @@ def _is_narrow(
     """Whether the normal 95 % interval of the mean is narrow enough."""
     if len(values) < 2:
         return False
-    mean = sum(values) / len(values)
-    variance = sum((value - mean) ** 2 for value in values) / (len(values) - 1)
-    half = 1.96 * math.sqrt(variance / len(values))
+    half = 1.96 * statistics.stdev(values) / math.sqrt(len(values))
     if half_width is not None:
         return half <= half_width
     assert relative_half_width is not None
-    return half <= relative_half_width * abs(mean)
+    return half <= relative_half_width * abs(statistics.mean(values))

@@ -18,7 +18,7 @@ from drone_mesh.lab.merge import merge
 from drone_mesh.lab.plan import Plan
 from drone_mesh.lab.progress import as_duration
 from drone_mesh.lab.proofs.command import add_proofs
-from drone_mesh.lab.status import describe_folder
+from drone_mesh.lab.store import describe_folder
 from drone_mesh.lab.template import write_template
 from drone_mesh.stopping import ends_as
 from drone_mesh.web.listening import MAX_PORT
@@ -262,7 +262,7 @@ def _tables(options: argparse.Namespace) -> int:
 
 
 def _plot(options: argparse.Namespace) -> int:
-    from drone_mesh.lab.plot import draw_alone
+    from drone_mesh.lab.report import draw_alone
     from drone_mesh.lab.results import load_results
 
     results = load_results(options.results).only(options.cells, options.metric)

@@ -11,13 +11,13 @@ import logging
 import shutil
 import signal
 import statistics
-import threading
 from collections import deque
 from typing import TYPE_CHECKING, Iterable, Iterator
 
 from drone_mesh.errors import MeshError
 from drone_mesh.lab.plan import RunSpec
 from drone_mesh.lab.worker import Outcome, execute, execute_batch
+from drone_mesh.stopping import ignored
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -65,7 +65,8 @@ def _client(workers: int, cluster: str | None) -> Iterator[Client]:
     with contextlib.ExitStack() as stack:
         try:
             if cluster is None:
-                with _children_ignore_ctrl_c():
+                # A terminal sends Ctrl-C to the workers too. Only this process handles it.
+                with ignored(signal.SIGINT):
                     local = LocalCluster(
                         n_workers=workers,
                         threads_per_worker=1,
@@ -83,19 +84,6 @@ def _client(workers: int, cluster: str | None) -> Iterator[Client]:
         except (OSError, ValueError, RuntimeError) as error:
             raise EngineError(f"no dask scheduler at {cluster or 'localhost'}: {error}") from error
         yield client
-
-
-@contextlib.contextmanager
-def _children_ignore_ctrl_c() -> Iterator[None]:
-    """A terminal sends Ctrl-C to the workers too. Only this process handles it, and ends them."""
-    if threading.current_thread() is not threading.main_thread():
-        yield  # no Ctrl-C arrives here
-        return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 def _slurm(workers: int) -> contextlib.AbstractContextManager[object]:
@@ -164,4 +152,4 @@ def _run_on(client: Client, waiting: deque[RunSpec]) -> Iterator[Outcome]:
 
 def _died(spec: RunSpec, message: str) -> Outcome:
     words = f"killed its worker {DEATHS_ALLOWED + 1} times"
-    return Outcome(spec, 0.0, "", {}, "", (), "worker died", words, message)
+    return Outcome(spec, 0.0, "", failure="worker died", message=words, traceback=message)

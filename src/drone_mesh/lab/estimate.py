@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import statistics
 import time
-from typing import Callable, NamedTuple, Sequence
+from typing import NamedTuple, Sequence
 
 from drone_mesh.errors import MeshError
 from drone_mesh.lab.plan import Plan, RunSpec
@@ -19,12 +19,9 @@ LEAST_SHARE = 0.25  # least simulated share of a run in a trial: the start is no
 START_S = 2.5  # time in which local workers start and load the code
 TASK_S = 0.004  # additional time per run: scheduling, storing
 
-Clock = Callable[[], float]
-"""Processor time of this process, in seconds; other processes do not count."""
-
 
 class Trial(NamedTuple):
-    """The cost of one run, in seconds of processor time."""
+    """The cost of one run, in seconds of this process's processor time."""
 
     run_s: float
     outside_s: float | None  # of these, outside the simulation; None: cut off, or without packets
@@ -43,7 +40,7 @@ class EstimateError(MeshError):
     """A run of this experiment fails."""
 
 
-def estimate(plan: Plan, workers: int, clock: Clock = time.process_time) -> Estimate:
+def estimate(plan: Plan, workers: int) -> Estimate:
     """Try every cell once, or every n-th of many; repeat them while there is time.
 
     A trial of a long run is cut off and extrapolated, so that each cell has one. Raises
@@ -58,14 +55,14 @@ def estimate(plan: Plan, workers: int, clock: Clock = time.process_time) -> Esti
     stride = -(-len(by_cell) // MOST_CELLS)
     cells = [by_cell[cell] for cell in list(by_cell)[::stride]]
     most_s = BUDGET_S / len(cells)
-    _trial(cells[0][0], most_s, clock)  # loads the modules of a first run
+    _trial(cells[0][0], most_s)  # loads the modules of a first run
     trials: list[list[Trial]] = [[] for _ in cells]
-    started_s = clock()
+    started_s = time.process_time()
     for repetition in range(most_trials):
         for specs, found in zip(cells, trials):
-            if repetition and clock() - started_s > BUDGET_S:
+            if repetition and time.process_time() - started_s > BUDGET_S:
                 break
-            found.append(_trial(specs[repetition], most_s, clock))
+            found.append(_trial(specs[repetition], most_s))
     run_s = statistics.mean(statistics.mean(t.run_s for t in found) for found in trials)
     outside = [t.outside_s for found in trials for t in found if t.outside_s is not None]
     wall_s = len(plan) * (run_s + TASK_S) / max(1, workers) + (START_S if workers else 0.0)
@@ -74,33 +71,34 @@ def estimate(plan: Plan, workers: int, clock: Clock = time.process_time) -> Esti
     )
 
 
-def _trial(spec: RunSpec, most_s: float, clock: Clock) -> Trial:
-    started_s = clock()
+def _trial(spec: RunSpec, most_s: float) -> Trial:
+    started_s = time.process_time()
     if scenario_of(spec.scenario).model == "ideal":
         outcome = execute(spec)
         if outcome.failure:
             raise EstimateError(f"a trial run failed: {outcome.message}")
-        return Trial(clock() - started_s, None)
+        return Trial(time.process_time() - started_s, None)
     try:
         with quiet_nodes():
-            return _try_packets(spec, most_s, clock)
+            return _try_packets(spec, most_s)
     except Exception as error:  # a user's technique may raise anything
         message = " ".join(str(error).split())
         raise EstimateError(f"a trial run failed: {type(error).__name__}: {message}") from error
 
 
-def _try_packets(spec: RunSpec, most_s: float, clock: Clock) -> Trial:
-    started_s = clock()
-    simulation = simulation_of(spec, clock)
+def _try_packets(spec: RunSpec, most_s: float) -> Trial:
+    started_s = time.process_time()
+    simulation = simulation_of(spec)
     duration_s = simulation.scenario.duration_s
-    samples = [(0.0, clock() - started_s)]  # simulated seconds, processor time until then
+    # Simulated seconds, and the processor time until then.
+    samples = [(0.0, time.process_time() - started_s)]
     for now_s in simulation.samples():
-        samples.append((now_s, clock() - started_s))
+        samples.append((now_s, time.process_time() - started_s))
         if samples[-1][1] > most_s and LEAST_SHARE * duration_s <= now_s < duration_s:
             return Trial(_extrapolated(samples, duration_s), None)
     measured(simulation.record(), spec.own_metrics)
     simulation.event_hash()
-    run_s = clock() - started_s
+    run_s = time.process_time() - started_s
     return Trial(run_s, run_s - simulation.simulating_s)
 
 

@@ -17,7 +17,6 @@ from drone_mesh.lab import extensions, movement, places
 from drone_mesh.lab.dotted_path import NoSuchPlace, put
 from drone_mesh.lab.experiment_source import Source, nearest_name
 from drone_mesh.lab.expression import ExpressionError, Where
-from drone_mesh.lab.faults import Fault
 from drone_mesh.lab.parts import Part
 from drone_mesh.lab.scenario import Scenario
 from drone_mesh.yaml_file import KeyPath, read_mapping
@@ -109,7 +108,7 @@ def load_experiment(
         raise source.error((), "expected 'key: value' lines")
     for override in overrides:
         _override(content, override, source)
-    extensions.add_search_folder(source.folder)
+    extensions.add_search_path(str(source.folder.resolve()))
     try:
         experiment = Experiment.model_validate(content)
     except ValidationError as error:
@@ -178,20 +177,16 @@ def _cells(experiment: Experiment, source: Source) -> Iterator[Cell]:
                 raise source.error(("zip", number, axis), f"{axis} is swept twice")
             named[axis] = ("zip", number, axis)
         axes.append([dict(zip(group, row)) for row in zip(*group.values())])
-    where = _where(experiment, list(named), source)
+    where = None
+    if experiment.where is not None:
+        try:
+            where = Where(experiment.where, list(named))
+        except ExpressionError as error:
+            raise source.error(("where",), f"where: {error}") from None
     for combination in itertools.product(*axes):
         point = {axis: value for part in combination for axis, value in part.items()}
         if where is None or where.holds(point):
             yield Cell(point, _scenario(experiment, point, named, source))
-
-
-def _where(experiment: Experiment, axes: Sequence[str], source: Source) -> Optional[Where]:
-    if experiment.where is None:
-        return None
-    try:
-        return Where(experiment.where, axes)
-    except ExpressionError as error:
-        raise source.error(("where",), f"where: {error}") from None
 
 
 def _scenario(
@@ -242,23 +237,18 @@ def _check_ids(scenario: Scenario, source: Source) -> None:
     if scenario.layout.kind in ("casus", "file"):
         return
     for index, fault in enumerate(scenario.faults):
-        for node in _ids_of(fault):
+        one = getattr(fault.what, "id", None)
+        for node in (
+            *(getattr(fault.what, "ids", None) or ()),
+            *(getattr(fault.what, "between", None) or ()),
+            *(() if one is None else (one,)),
+        ):
             if node >= scenario.layout.drones:
                 raise source.error(
                     ("base", "faults", index, fault.action),
                     f"faults.{index}.{fault.action}: no drone {node}; the layout has "
                     f"0..{scenario.layout.drones - 1}",
                 )
-
-
-def _ids_of(fault: Fault) -> List[int]:
-    what = fault.what
-    one = getattr(what, "id", None)
-    return [
-        *(getattr(what, "ids", None) or ()),
-        *(getattr(what, "between", None) or ()),
-        *(() if one is None else (one,)),
-    ]
 
 
 def _check_metrics(experiment: Experiment, source: Source) -> None:

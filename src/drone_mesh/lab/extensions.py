@@ -7,7 +7,6 @@ import difflib
 import importlib
 import inspect
 import sys
-from pathlib import Path
 from typing import Callable, Iterator, cast
 
 from drone_mesh.errors import ConfigurationError
@@ -18,13 +17,8 @@ from drone_mesh.lab.record import RunRecord
 OwnMetric = Callable[[RunRecord], float]
 
 
-def add_search_folder(folder: Path) -> None:
-    """Let `module:Name` find modules beside the experiment file."""
-    add_search_path(str(folder.resolve()))
-
-
 def add_search_path(folder: str) -> None:
-    """The same for an absolute path; nothing changes if the folder is already included."""
+    """Let `module:Name` find modules in this folder, an absolute path."""
     if folder not in sys.path:
         sys.path.insert(0, folder)
 

@@ -1,15 +1,40 @@
 """The faults of a run as an experiment file describes them: what happens, and when."""
 
 # Pydantic reads these annotations when the module is loaded, and Python 3.8 has no list[int].
-from typing import Any, ClassVar, List, Optional, Tuple
+import difflib
+import re
+from typing import Any, ClassVar, List, NamedTuple, Optional, Tuple
 
 from pydantic import Field, field_validator, model_validator
 from typing_extensions import Annotated, Literal
 
 from drone_mesh.communication.data.packets import MAX_MESSAGE_BYTES
 from drone_mesh.drone.fleet import MAX_DRONES
-from drone_mesh.lab.conditions import parse_condition
 from drone_mesh.lab.parts import Above0, AtLeast0, NodeId, Part, Point, Share
+
+EVENTS = ("all connected", "the first flight", "the first landing", "the first loss", "healed")
+
+_PATTERN = re.compile(
+    r"\s*(?:when\s+|(?P<delay>\d+(?:\.\d+)?)\s*s\s+after\s+)?(?P<event>[a-z ]+?)\s*", re.IGNORECASE
+)
+
+
+class StartCondition(NamedTuple):
+    """A delay after the first occurrence of an event."""
+
+    event: str  # one of EVENTS
+    delay_s: float
+
+
+def parse_condition(text: str) -> StartCondition:
+    """Raises ValueError, with what is allowed, for an invalid condition."""
+    match = _PATTERN.fullmatch(text)
+    event = " ".join(match.group("event").lower().split()) if match else ""
+    if match is None or event not in EVENTS:
+        close = difflib.get_close_matches(event, EVENTS, n=1)
+        hint = f"did you mean {close[0]!r}?" if close else f"events: {', '.join(EVENTS)}"
+        raise ValueError(f"expected 'when EVENT' or 'N s after EVENT'; {hint}")
+    return StartCondition(event, float(match.group("delay") or 0.0))
 
 
 class Pick(Part):

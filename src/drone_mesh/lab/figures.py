@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import io
 import math
+import re
 from typing import Any, Literal, Mapping, NamedTuple, Sequence
 
 from matplotlib.axes import Axes
@@ -33,22 +33,32 @@ class Drawing(NamedTuple):
     caption: str
     figure: Figure
 
-    def to_svg(self) -> str:
-        """SVG text without a date, so that the same rows produce the same report."""
-        text = io.StringIO()
-        self.figure.savefig(text, format="svg", metadata={"Date": None})
-        return text.getvalue().partition("<svg")[1] + text.getvalue().partition("<svg")[2]
+
+def panels(count: int, row_in: float) -> tuple[Figure, list[Axes]]:
+    """A figure with so many panels, in rows of this height."""
+    columns = min(PANELS_PER_ROW, count)
+    rows = math.ceil(count / columns)
+    figure = Figure(figsize=(WIDTH_IN, row_in * rows + 0.5), layout="constrained")
+    grid = figure.subplots(rows, columns, squeeze=False).ravel()
+    for unused in grid[count:]:
+        unused.set_visible(False)
+    return figure, list(grid[:count])
+
+
+def add_legend(figure: Figure, panel: Axes, title: str | None) -> None:
+    """One legend above all panels, with what this one shows."""
+    handles, labels = panel.get_legend_handles_labels()
+    figure.legend(
+        handles, labels, loc="outside upper center", ncols=min(6, len(labels)), frameon=False,
+        title=title, fontsize=8, title_fontsize=8,
+    )  # fmt: skip
 
 
 def axis_drawings(results: Results) -> list[Drawing]:
     """One figure per axis, with a panel for each metric."""
-    drawings = []
+    axes = results.loaded.axes
     series = series_axis(results)
-    for axis in results.loaded.axes:
-        if axis == series and len(results.loaded.axes) > 1:
-            continue
-        drawings.append(axis_drawing(results, axis, series if axis != series else None))
-    return drawings
+    return [axis_drawing(results, axis) for axis in axes if axis != series or len(axes) == 1]
 
 
 def series_axis(results: Results) -> str | None:
@@ -60,33 +70,29 @@ def series_axis(results: Results) -> str | None:
     return axes[-1] if len(axes) > 1 else None
 
 
-def axis_drawing(results: Results, axis: str, series: str | None) -> Drawing:
-    metrics = results.metrics
-    columns = min(PANELS_PER_ROW, len(metrics))
-    rows = math.ceil(len(metrics) / columns)
-    figure = Figure(figsize=(WIDTH_IN, 2.5 * rows + 0.5), layout="constrained")
-    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+def axis_drawing(results: Results, axis: str) -> Drawing:
+    series = series_axis(results)
+    if series == axis:
+        series = None
+    figure, shown = panels(len(results.metrics), 2.5)
     others = [name for name in results.loaded.axes if name not in (axis, series)]
-    fixed = _most_common(results, [name for name in others if not _follows(results, name, axis)])
-    for panel, metric in zip(panels, metrics):
+    last = results.loaded.cells[-1].values  # for the axes that a figure cannot show
+    fixed = {name: last[name] for name in others if not _follows(results, name, axis)}
+    for panel, metric in zip(shown, results.metrics):
         _draw_metric(panel, results, metric, axis, series, fixed)
-    for panel in panels[len(metrics) :]:
-        panel.set_visible(False)
-    handles, labels = panels[0].get_legend_handles_labels()
     if series is not None:
-        figure.legend(
-            handles, labels, loc="outside upper center", ncols=min(6, len(labels)), frameon=False,
-            title=results.axis_names[series], fontsize=8, title_fontsize=8,
-        )  # fmt: skip
+        add_legend(figure, shown[0], results.axis_names[series])
     caption = "Bands: 95 % intervals (BCa bootstrap of the mean; Wilson for shares)."
     if fixed:
         held = ", ".join(
             f"{results.axis_names[name]} = {as_text(value)}" for name, value in fixed.items()
         )
         caption += f" Drawn for {held}; the tables have all cells."
-    if any(map(is_censored, metrics)):
+    if any(map(is_censored, results.metrics)):
         caption += " Times to heal include only runs that healed; compare the share healed as well."
-    return Drawing(f"axis_{_file_name(axis)}", f"Over {results.axis_names[axis]}", caption, figure)
+    return Drawing(
+        re.sub(r"\W", "_", f"axis_{axis}"), f"Over {results.axis_names[axis]}", caption, figure
+    )
 
 
 def _draw_metric(
@@ -137,10 +143,10 @@ def _draw_points(
     is_numeric: bool,
     lines: int,
 ) -> None:
-    if not points:
-        axes.plot([], [], color=COLOURS[order % len(COLOURS)], label=label)
-        return
     colour = COLOURS[order % len(COLOURS)]
+    if not points:
+        axes.plot([], [], color=colour, label=label)
+        return
     marker = MARKERS[order % len(MARKERS)]
     xs = [x for x, _ in points]
     means = [interval.value for _, interval in points]
@@ -160,11 +166,6 @@ def _draw_points(
         xs, means, yerr=[below, above], color=colour, marker=marker, ms=5, lw=1.4, ls="",
         capsize=3, label=label,
     )  # fmt: skip
-
-
-def _most_common(results: Results, axes: Sequence[str]) -> dict[str, Any]:
-    """A value for each axis that a figure cannot show: the last of its list."""
-    return {axis: results.loaded.cells[-1].values[axis] for axis in axes}
 
 
 def _follows(results: Results, name: str, axis: str) -> bool:
@@ -191,10 +192,6 @@ def metric_title(metric: str) -> str:
 def short(text: str) -> str:
     text = text.rpartition(":")[2]
     return text if len(text) <= 22 else f"{text[:20]}..."
-
-
-def _file_name(axis: str) -> str:
-    return "".join(letter if letter.isalnum() else "_" for letter in axis)
 
 
 def line_style(order: int) -> str:

@@ -42,7 +42,6 @@ class Flights:
         self.legs: list[Leg] = []
         self._network = network
         self._current: dict[int, Leg] = {}
-        self._flown_m: dict[int, float] = {}  # on completed legs
         self._may_fly_m: dict[int, float] = {}
         self._on_empty: Callable[[int], None] = lambda node: None
         for node_id, node in network.nodes.items():
@@ -54,26 +53,24 @@ class Flights:
         nodes = self._network.nodes
         return [node for node in self._current if nodes[node].drone.path is not None]
 
-    def flown_m(self, node: int) -> float:
-        """Metres over ground until now."""
-        leg = self._current.get(node)
-        now = 0.0 if leg is None else leg.metres_until(self._network.clock.now_s)
-        return self._flown_m.get(node, 0.0) + now
+    def _flown_m(self, node: int, but: Leg | None = None) -> float:
+        """Metres over ground until now, on all legs but this one."""
+        now_s = self._network.clock.now_s
+        legs = [leg for leg in self.legs if leg.node == node and leg is not but]
+        return sum(leg.metres_until(now_s) for leg in legs)
 
     def limit(self, nodes: list[int], metres: float, on_empty: Callable[[int], None]) -> None:
         """From now on these drones can fly this far; then call `on_empty(node)`."""
         self._on_empty = on_empty
         for node in nodes:
-            self._may_fly_m[node] = self.flown_m(node) + metres
+            self._may_fly_m[node] = self._flown_m(node) + metres
             if node in self._current:
                 self._plan_end_of_battery(self._current[node])
 
     def _fly(self, node: int, before: FlightPath | None, path: FlightPath) -> None:
         last = self._current.get(node)
-        if last is not None:
-            if before is not None:
-                last.replaced_s = path.start_s
-            self._flown_m[node] = self._flown_m.get(node, 0.0) + last.metres_until(path.start_s)
+        if last is not None and before is not None:
+            last.replaced_s = path.start_s
         is_false = before is None and self._decided_by_itself(node) and self._has_path(node)
         leg = Leg(node, path, before is None, is_false)
         self._current[node] = leg
@@ -83,7 +80,7 @@ class Flights:
     def _plan_end_of_battery(self, leg: Leg) -> None:
         if leg.node not in self._may_fly_m:
             return
-        left_m = self._may_fly_m[leg.node] - self._flown_m.get(leg.node, 0.0)
+        left_m = self._may_fly_m[leg.node] - self._flown_m(leg.node, but=leg)
         way_m = leg.path.ground_m
         if left_m < way_m:
             clock = self._network.clock

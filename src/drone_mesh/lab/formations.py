@@ -26,9 +26,8 @@ class Formations:
     def __init__(self, network: Network, order: Order) -> None:
         self.given_s: float | None = None  # when the last layout was ordered; None: none was
         self.planned_s = 0.0  # that it takes, by its preview
-        self.reached_s: float | None = (
-            None  # since when all that can be reached are at their places
-        )
+        # Since when all that can be reached are at their places.
+        self.reached_s: float | None = None
         self.missing: list[int] = []  # those that are not, and can be reached
         self._network, self._order = network, order
         self._layouts = Layouts.shipped()

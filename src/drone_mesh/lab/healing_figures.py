@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import math
-
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
 from drone_mesh.lab.experiment import Cell, as_text
 from drone_mesh.lab.figures import (
     COLOURS,
-    PANELS_PER_ROW,
     WIDTH_IN,
     Drawing,
+    add_legend,
     distinct,
     line_style,
+    panels,
     series_axis,
     short,
     style,
@@ -91,9 +90,7 @@ def survival_drawing(results: Results) -> Drawing | None:
             curves.setdefault(key, []).append((label, curve, end_s))
     if not curves:
         return None
-    panels = math.ceil(len(curves) / PANELS_PER_ROW)
-    figure = Figure(figsize=(WIDTH_IN, 2.4 * panels + 0.5), layout="constrained")
-    grid = figure.subplots(panels, min(PANELS_PER_ROW, len(curves)), squeeze=False).ravel()
+    figure, grid = panels(len(curves), 2.4)
     for axes, (key, lines) in zip(grid, curves.items()):
         for order, (label, curve, end_s) in enumerate(lines):
             xs = [t for t, _ in curve] + [end_s]
@@ -106,12 +103,7 @@ def survival_drawing(results: Results) -> Drawing | None:
         axes.yaxis.set_major_formatter(PercentFormatter(1.0))
         axes.set_xlabel("s after the fault", fontsize=8)
         style(axes)
-    for axes in grid[len(curves) :]:
-        axes.set_visible(False)
-    handles, labels = grid[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=min(6, len(labels)),
-                  frameon=False, fontsize=8, title=results.axis_names.get(series or ""),
-                  title_fontsize=8)  # fmt: skip
+    add_legend(figure, grid[0], results.axis_names.get(series or ""))
     caption = (
         "Share of runs that have healed (Kaplan-Meier): a curve below 100 % has censored runs."
     )

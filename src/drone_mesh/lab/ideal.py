@@ -11,6 +11,7 @@ import math
 from typing import Callable, NamedTuple
 
 import numpy as np
+from scipy.sparse.csgraph import connected_components
 
 from drone_mesh.air.graph import Graph, within
 from drone_mesh.drone.location import Location
@@ -135,6 +136,16 @@ def _blocks(swarm: Swarm, direction: Callable[[np.ndarray], np.ndarray]) -> np.n
     return moves
 
 
+class Draw(NamedTuple):
+    """A run's survivors and victims. Nodes are the rows of `start`."""
+
+    scenario: Scenario
+    start: np.ndarray  # (n, 2), m, of all
+    alive: np.ndarray  # (m,), the survivors
+    victims: list[int]
+    home: int  # row of the first gateway left among the survivors
+
+
 class Flown(NamedTuple):
     """The flights of a repair. Arrays have one row per survivor."""
 
@@ -165,51 +176,41 @@ def run_ideal(scenario: Scenario, streams: Streams) -> tuple[dict[str, float], s
         victims = cut_vertices_of(graph, gateways, order, number)
     else:
         victims = rng.sample(fit, min(number, len(fit)))
-    alive = np.array(sorted(set(range(len(starts))) - set(victims)))
-    if not set(gateways) & set(alive.tolist()):
+    alive = sorted(set(range(len(starts))) - set(victims))
+    homes = [alive.index(gateway) for gateway in gateways if gateway in alive]
+    if not homes:
         raise ConfigurationError("model ideal: no gateway is left")
-    if scenario.repair in IDEAL_PLANS:
-        flown = _planned(scenario, places, alive, victims)
-    else:
-        flown = _stepped(scenario, places, alive, victims, gateways)
-    return _measured(scenario, places, alive, victims, gateways, flown)
+    draw = Draw(scenario, places, np.array(alive), victims, homes[0])
+    return _measured(draw, _planned(draw) if scenario.repair in IDEAL_PLANS else _stepped(draw))
 
 
-def _planned(scenario: Scenario, start: np.ndarray, alive: np.ndarray, victims: list[int]) -> Flown:
+def _planned(draw: Draw) -> Flown:
     """The flights of a rule that plans all of them at once."""
-    places = {int(node): Location.from_vector((*start[node], 0.0)) for node in alive}
+    scenario = draw.scenario
+    places = {int(node): Location.from_vector((*draw.start[node], 0.0)) for node in draw.alive}
     flown: dict[int, float] = {}
-    if victims:
-        hole = Location.from_vector((*start[victims[0]], 0.0))
+    if draw.victims:
+        hole = Location.from_vector((*draw.start[draw.victims[0]], 0.0))
         places, flown = IDEAL_PLANS[scenario.repair](places, hole, scenario.range_m)
-    end = np.array([places[int(node)].to_vector()[:2] for node in alive])
-    metres = np.array([flown.get(int(node), 0.0) for node in alive])
+    end = np.array([places[int(node)].to_vector()[:2] for node in draw.alive])
+    metres = np.array([flown.get(int(node), 0.0) for node in draw.alive])
     return Flown(end, metres, float(metres.max()) / scenario.speed_m_s, 0)
 
 
-def _stepped(
-    scenario: Scenario,
-    start: np.ndarray,
-    alive: np.ndarray,
-    victims: list[int],
-    gateways: list[int],
-) -> Flown:
+def _stepped(draw: Draw) -> Flown:
     """The flights of a rule that decides in each step."""
-    rule = IDEAL_RULES[scenario.repair]
-    range_m, dead = scenario.range_m, start[victims]
-    places = start[alive].copy()
-    home_row = _home_row(alive, gateways)
-    lost_near = _near_lost(places, dead, range_m)
+    scenario, start = draw.scenario, draw.start
+    range_m, step_m = scenario.range_m, scenario.speed_m_s * STEP_S
+    places = start[draw.alive].copy()
+    lost_near = _near_lost(places, start[draw.victims], range_m)
     before, flown = places.copy(), np.zeros(len(places))
     middle = (start.min(axis=0) + start.max(axis=0)) / 2
     near, parts = _parts(places, range_m)
     steps, most = 0, round(scenario.duration_s / STEP_S) - 1
     pairs: set[tuple[int, int]] = set()
     while parts.max() > 0 and steps < most:
-        swarm = Swarm(
-            places, before, parts, home_row, lost_near, near, middle, scenario.speed_m_s * STEP_S
-        )
-        moves = rule(swarm)
+        swarm = Swarm(places, before, parts, draw.home, lost_near, near, middle, step_m)
+        moves = IDEAL_RULES[scenario.repair](swarm)
         before, places = places, places + moves
         flown += np.linalg.norm(moves, axis=1)
         steps += 1
@@ -218,30 +219,19 @@ def _stepped(
     return Flown(places, flown, steps * STEP_S, len(pairs))
 
 
-def _home_row(alive: np.ndarray, gateways: list[int]) -> int:
-    return int(np.flatnonzero(alive == next(g for g in gateways if g in alive))[0])
-
-
-def _measured(
-    scenario: Scenario,
-    start: np.ndarray,
-    alive: np.ndarray,
-    victims: list[int],
-    gateways: list[int],
-    repair: Flown,
-) -> tuple[dict[str, float], str]:
-    places, flown, end_s, range_m = repair.places, repair.metres, repair.end_s, scenario.range_m
-    home_row = _home_row(alive, gateways)
-    _near, first_parts = _parts(start[alive], range_m)
+def _measured(draw: Draw, repair: Flown) -> tuple[dict[str, float], str]:
+    scenario, start, range_m = draw.scenario, draw.start, draw.scenario.range_m
+    places, flown, end_s = repair.places, repair.metres, repair.end_s
+    _near, first_parts = _parts(start[draw.alive], range_m)
     near, parts = _parts(places, range_m)
     healed = parts.max() == 0
-    shifts = np.linalg.norm(places - start[alive], axis=1)
+    shifts = np.linalg.norm(places - start[draw.alive], axis=1)
     values = dict.fromkeys(METRICS, math.nan)
     values.update(
         healed=float(healed),
         split=float(first_parts.max() > 0),
-        cut_off=float((first_parts != first_parts[home_row]).sum()),
-        victims=float(len(victims)),
+        cut_off=float((first_parts != first_parts[draw.home]).sum()),
+        victims=float(len(draw.victims)),
         t_total_s=end_s if healed else math.nan,
         t_capped_s=end_s,
         t_detect_s=0.0 if healed else math.nan,
@@ -249,7 +239,7 @@ def _measured(
         t_fly_s=end_s if healed else math.nan,
         t_reroute_s=0.0 if healed else math.nan,
         observed_s=(round(scenario.duration_s / STEP_S) - 1) * STEP_S,
-        connected_share=float((parts == parts[home_row]).mean()),
+        connected_share=float((parts == parts[draw.home]).mean()),
         distance_total_m=float(flown.sum()),
         distance_max_m=float(flown.max()),
         distance_mean_m=float(flown[flown > 0].mean()) if (flown > 0).any() else 0.0,
@@ -269,8 +259,6 @@ def _measured(
 
 def _parts(places: np.ndarray, range_m: float) -> tuple[np.ndarray, np.ndarray]:
     """(which drones are near each other, number of each one's connected part)."""
-    from scipy.sparse.csgraph import connected_components
-
     gaps = places[:, None] - places[None]
     near = (gaps * gaps).sum(axis=2) < (range_m + ROUNDING_M) ** 2
     np.fill_diagonal(near, False)

@@ -26,9 +26,13 @@ def cut_off(places: Places, range_m: float) -> AbstractSet[int]:
 
 
 def nearest(
-    places: Places, hole: Location, range_m: float, acting: AbstractSet[int]
+    places: Places, hole: Location, range_m: float, all_act: bool = False
 ) -> tuple[Places, Flown]:
-    """The nearest drone of `acting` moves into the hole; its own place is then the next hole."""
+    """The nearest drone, of those cut off or of all, moves into the hole.
+
+    Its own place is then the next hole.
+    """
+    acting = places.keys() if all_act else cut_off(places, range_m)
     now = dict(places)
     flown: Flown = {}
     while cut_off(now, range_m):
@@ -42,9 +46,13 @@ def nearest(
 
 
 def inward(
-    places: Places, hole: Location, range_m: float, acting: AbstractSet[int]
+    places: Places, hole: Location, range_m: float, all_act: bool = False
 ) -> tuple[Places, Flown]:
-    """The drones of `acting` beside the dead node move towards the hole; the others follow."""
+    """The drones beside the dead node, of those cut off or of all, move towards the hole.
+
+    The others follow.
+    """
+    acting = places.keys() if all_act else cut_off(places, range_m)
     now = dict(places)
     flown: Flown = {}
     first = [n for n in acting if hole.distance_m(places[n]) < range_m]
@@ -93,24 +101,12 @@ def _fly(node: int, goal: Location, now: Places, flown: Flown) -> None:
         now[node] = goal
 
 
-def _all_act(
-    rule: Callable[..., tuple[Places, Flown]], places: Places, hole: Location, range_m: float
-) -> tuple[Places, Flown]:
-    return rule(places, hole, range_m, places.keys())
-
-
-def _cut_off_act(
-    rule: Callable[..., tuple[Places, Flown]], places: Places, hole: Location, range_m: float
-) -> tuple[Places, Flown]:
-    return rule(places, hole, range_m, cut_off(places, range_m))
-
-
 IdealPlan = Callable[[Places, Location, float], "tuple[Places, Flown]"]
 """(places after, metres flown) for the places of the survivors, the dead node's and the range."""
 
 IDEAL_PLANS: Mapping[str, IdealPlan] = {
-    "nearest": functools.partial(_cut_off_act, nearest),
-    "inward": functools.partial(_cut_off_act, inward),
-    "nearest_of_all": functools.partial(_all_act, nearest),
-    "inward_of_all": functools.partial(_all_act, inward),
+    "nearest": nearest,
+    "inward": inward,
+    "nearest_of_all": functools.partial(nearest, all_act=True),
+    "inward_of_all": functools.partial(inward, all_act=True),
 }

@@ -13,6 +13,7 @@ from drone_mesh.drone.location import Location
 from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.radio import InProcessAir
 from drone_mesh.inprocess.shared_air import SharedAir
+from drone_mesh.lab.faults import Jam
 
 
 @dataclass
@@ -21,15 +22,6 @@ class Traffic:
 
     own: int = 0
     forwarded: int = 0
-
-
-@dataclass
-class Jamming:
-    """Noise in a circle."""
-
-    center: tuple[float, float]
-    radius_m: float
-    loss: float
 
 
 @dataclass
@@ -45,7 +37,7 @@ class Impairments:
     loss: float
     traffic: dict[int, Traffic] = field(default_factory=dict)  # by type
     lost: int = 0
-    jams: list[Jamming] = field(default_factory=list)
+    jams: list[Jam] = field(default_factory=list)
     sent_by: dict[int, int] = field(default_factory=dict)
     frames: dict[str, int] | None = None  # on the shared channel: "control" and "data"
     arrives: Callable[[Location, Location], float] | None = None  # share, by fading
@@ -108,7 +100,7 @@ class Impairments:
             rng = self._links[link] = self.stream(f"loss {sender} {to}")
         return rng.random() < loss
 
-    def _is_inside(self, jam: Jamming, node_id: int) -> bool:
+    def _is_inside(self, jam: Jam, node_id: int) -> bool:
         node = self.network.nodes.get(node_id)
         if node is None:
             return False

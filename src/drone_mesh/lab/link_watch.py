@@ -33,7 +33,6 @@ class LinkWatch:
     """Sums over the samples of a run, from `from_s` on."""
 
     from_s: float
-    seconds: float = 0.0  # of observation
     drone_s: float = 0.0  # live drones, gateways included, times seconds
     link_s: float = 0.0  # links times seconds
     appeared: int = 0
@@ -54,7 +53,6 @@ class LinkWatch:
         if self._links is not None:
             passed_s = sample.now_s - self._last_s
             reachable = sample.alive & graph.hops_from(gateways).keys()
-            self.seconds += passed_s
             self.drone_s += len(graph.near) * passed_s
             self.link_s += len(links) * passed_s
             self.appeared += len(links - self._links)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Callable, Mapping, Sequence
+from typing import Mapping, Sequence
 
 from drone_mesh.inprocess import Network
+from drone_mesh.lab.formations import Order
 from drone_mesh.lab.places import StartPoint, side_of
 from drone_mesh.lab.scenario import Scenario
 from drone_mesh.lab.streams import Streams
@@ -14,9 +15,6 @@ from drone_mesh.mobility.trace_files import read_trace
 
 LEAST_BETWEEN_ORDERS_S = 5.0  # our choice: of one drone; a model may turn more often
 LOOK_S = 1.0  # period at which the goals of told drones are compared
-
-Order = Callable[[int, float, float, int], None]
-"""Orders a drone to x, y and a height."""
 
 
 def rows_of_file(path: Path) -> list[list[float]]:

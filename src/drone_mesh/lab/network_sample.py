@@ -32,18 +32,9 @@ def sample_of(network: Network) -> NetworkSample:
     """
     nodes = network.nodes
     leads = {n: node.antenna.powered for n, node in nodes.items() if node.is_gateway}
-    alive = []
-    connected = []
-    served = []
-    for node_id, node in nodes.items():
-        if node_id in leads and node.is_gateway:
-            continue
-        if node.antenna.powered:
-            alive.append(node_id)
-            if node.component.get_connected_to_gateway():
-                connected.append(node_id)
-                if _leads(network, node_id, leads):
-                    served.append(node_id)
+    alive = [n for n, node in nodes.items() if node.antenna.powered and not node.is_gateway]
+    connected = [n for n in alive if nodes[n].component.get_connected_to_gateway()]
+    served = [n for n in connected if _leads(network, n, leads)]
     return NetworkSample(
         network.clock.now_s, frozenset(alive), frozenset(connected), frozenset(served)
     )

@@ -56,12 +56,10 @@ def draw_places(
 
 
 def rows_of_file(path: Path) -> list[list[float]]:
-    """The positions in a file as numbers: id, x, y, 1 for a gateway. Raises ConfigurationError."""
-    return [[float(p.node_id), p.x, p.y, float(p.gateway)] for p in read_start_points(path)]
+    """The drones of a CSV file with the header id,x,y,role by id: id, x, y, 1 for a gateway.
 
-
-def read_start_points(path: Path) -> list[StartPoint]:
-    """A CSV file with the header id,x,y,role; role is gateway or router."""
+    A role is gateway or router. Raises ConfigurationError.
+    """
     try:
         with path.open(encoding="utf-8", newline="") as file:
             rows = list(csv.reader(file))
@@ -69,7 +67,7 @@ def read_start_points(path: Path) -> list[StartPoint]:
         raise ConfigurationError(f"layout file {path}: {error}") from error
     if not rows or [name.strip() for name in rows[0]] != PLACES_HEADER:
         raise ConfigurationError(f"layout file {path}, line 1: expected {','.join(PLACES_HEADER)}")
-    places: dict[int, StartPoint] = {}
+    places: dict[int, list[float]] = {}
     for number, row in enumerate(rows[1:], start=2):
         if not row:
             continue
@@ -82,8 +80,8 @@ def read_start_points(path: Path) -> list[StartPoint]:
             raise ConfigurationError(f"{where}: id {node_id} is out of range or a duplicate")
         if role not in ("gateway", "router") or not (math.isfinite(x) and math.isfinite(y)):
             raise ConfigurationError(f"{where}: expected finite x, y and role gateway or router")
-        places[node_id] = StartPoint(node_id, x, y, role == "gateway")
-    if not any(place.gateway for place in places.values()):
+        places[node_id] = [float(node_id), x, y, float(role == "gateway")]
+    if not any(is_gateway for *_, is_gateway in places.values()):
         raise ConfigurationError(f"layout file {path}: no gateway")
     return [places[node_id] for node_id in sorted(places)]
 

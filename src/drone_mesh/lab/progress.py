@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import sys
 import time
-from typing import TextIO
 
 TERMINAL_PERIOD_S = 0.5
 LOG_PERIOD_S = 15.0
 
 
 class Progress:
-    """Prints the progress of a batch: runs done, rate, time left. A context manager."""
+    """Prints the progress of a batch: runs done, rate, time left."""
 
-    def __init__(self, missing: int, stream: TextIO = sys.stderr) -> None:
+    def __init__(self, missing: int) -> None:
         self.done = self.failed = 0
         self._missing = missing
-        self._stream = stream
-        self._on_terminal = stream.isatty()
+        self._stream = sys.stderr
+        self._on_terminal = self._stream.isatty()
         self._started_s = self._shown_s = time.monotonic()
 
     def count(self, failed: bool) -> None:

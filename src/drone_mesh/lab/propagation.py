@@ -66,7 +66,7 @@ def put_obstacles(
     range_m = scenario.range_m
     if scenario.radio.kind != "disc":
         if part.boxes:  # its fading is the network's
-            cast(_Air, network.air).space.obstacles = obstacles.loss_db
+            cast(ChannelAir, network.air).space.obstacles = obstacles.loss_db
     elif part.boxes:
         impairments.disc.sees = lambda a, b: (
             obstacles.margin_db(a.to_vector(), b.to_vector(), range_m) > 0
@@ -86,7 +86,7 @@ def put_obstacles(
 
 def put_noise(network: Network, jam: Jam, range_m: float, rng: random.Random) -> Callable[[], None]:
     """Start a transmitter of noise on a shared channel; returns what stops it."""
-    air = cast(_Air, network.air)
+    air = cast(ChannelAir, network.air)
     mhz = 2400 + air.settings.channel
     links, (x, y) = air.space.links, jam.center
     at_edge_dbm = links.received_dbm(range_m, float(air.settings.power.value), mhz)
@@ -96,11 +96,13 @@ def put_noise(network: Network, jam: Jam, range_m: float, rng: random.Random) ->
     return lambda: noise.stop(round(network.now_s() * NS_PER_S))
 
 
-class _Air(Protocol):
+class ChannelAir(Protocol):
     """The air of radios that share a channel."""
 
     space: Space
     settings: RadioSettings
+    airtime_s: float  # of all frames
+    collisions: int  # receptions that another frame destroyed
 
 
 class Planner:
@@ -109,7 +111,6 @@ class Planner:
     def __init__(self, obstacles: Obstacles) -> None:
         self.obstacles = obstacles
         self.refused: list[int] = []  # node ids
-        self.on_refusal: Callable[[int], None] = lambda node: None
 
     def plan(
         self, node: int, start: Vector, goal: Vector, start_s: float, speed_m_s: float
@@ -118,5 +119,4 @@ class Planner:
         path = self.obstacles.plan_flight(start, goal, start_s, speed_m_s)
         if path is None:
             self.refused.append(node)
-            self.on_refusal(node)
         return path

@@ -84,7 +84,7 @@ class RunRecord:
     left_behind: Mapping[int, str]  # live routers that are not connected at the end -> why
     able: frozenset[int]  # drones that can fly and know roughly where a gateway is, at the end
     endless_packets: int  # dropped at the limit of hops
-    links: LinkWatch | None  # of a run with motion, churn or probes
+    links: LinkWatch  # empty in a run without motion, churn and probes
     probes: Sequence[ProbeFate]
     frames: Mapping[str, int] | None  # shared channel: "control" and "data"
     formations: Formations  # what became of layouts

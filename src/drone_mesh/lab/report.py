@@ -1,4 +1,4 @@
-"""The report of an experiment: one self-contained HTML file, and files for a paper."""
+"""The report of an experiment: one self-contained HTML file, and figures and tables for a paper."""
 
 from __future__ import annotations
 
@@ -7,15 +7,21 @@ from typing import Sequence
 
 import jinja2
 
-from drone_mesh.errors import MeshError
+from drone_mesh.errors import ConfigurationError, MeshError
 from drone_mesh.lab.animation import animate_repair
-from drone_mesh.lab.figures import Drawing, axis_drawings
-from drone_mesh.lab.healing_figures import phases_drawing, survival_drawing
+from drone_mesh.lab.figures import Drawing, axis_drawing, axis_drawings
+from drone_mesh.lab.healing_figures import (
+    HEALED,
+    PHASES_OF_REPAIR,
+    phases_drawing,
+    survival_drawing,
+)
 from drone_mesh.lab.metrics import METRICS
 from drone_mesh.lab.results import Results, load_results, number
 from drone_mesh.lab.show import replay
 from drone_mesh.lab.store import EXPERIMENT
 from drone_mesh.lab.tables import Table, all_tables
+from drone_mesh.report.drawing import in_style, svg_element, svg_of_its_own
 
 _TEMPLATE = Path(__file__).resolve().parent / "report.html"
 PNG_DPI = 200
@@ -59,7 +65,7 @@ def _render(results: Results, tables: Sequence[Table], drawings: Sequence[Drawin
         failures=results.failures,
         draws=experiment.draws,
         tables={table.name: table for table in tables},
-        drawings=[(drawing, drawing.to_svg()) for drawing in drawings],
+        drawings=[(drawing, svg_element(drawing.figure)) for drawing in drawings],
         animation=animation,
         animated_run=run,
         folder=results.folder,
@@ -108,3 +114,25 @@ def _export(
                 path.write_text(text, encoding="utf-8")
                 written.append(path)
     return written
+
+
+def draw_alone(results: Results, name: str, out: Path) -> None:
+    """Write one figure as SVG, light and dark: an axis, HEALED or PHASES_OF_REPAIR.
+
+    Raises ConfigurationError if there is no such figure, or the file cannot be written.
+    """
+    with in_style():
+        if name in results.loaded.axes:
+            drawing = axis_drawing(results, name)
+        elif name in (HEALED, PHASES_OF_REPAIR):
+            found = survival_drawing(results) if name == HEALED else phases_drawing(results)
+            if found is None:
+                raise ConfigurationError(f"{results.folder}: no run has a fault to heal")
+            drawing = found
+        else:
+            names = ", ".join([*results.loaded.axes, HEALED, PHASES_OF_REPAIR])
+            raise ConfigurationError(f"{results.folder}: no figure {name}; there are {names}")
+        try:
+            out.write_text(svg_of_its_own(drawing.figure), encoding="utf-8")
+        except OSError as error:
+            raise ConfigurationError(f"cannot write {out}: {error.strerror}") from error

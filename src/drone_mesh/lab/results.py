@@ -7,7 +7,7 @@ from typing import Mapping, NamedTuple, Sequence
 
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.lab import extensions
-from drone_mesh.lab.experiment import Cell, LoadedExperiment, as_text, load_experiment
+from drone_mesh.lab.experiment import LoadedExperiment, as_text, load_experiment
 from drone_mesh.lab.metrics import METRICS
 from drone_mesh.lab.plan import Plan, PlannedRun
 from drone_mesh.lab.store import (
@@ -47,8 +47,7 @@ class Results(NamedTuple):
 
         Raises ConfigurationError if none matches.
         """
-        wanted = self._wanted(text)
-        fit = [i for i, cell in enumerate(self.loaded.cells) if _fits(cell, wanted)]
+        fit = self._matching(text)
         if not fit:
             raise ConfigurationError(f"{self.folder}: no cell matches {text}")
         experiment = self.loaded.experiment
@@ -60,7 +59,8 @@ class Results(NamedTuple):
             by_cell={place: self.drawn(index) for place, index in enumerate(fit)},
         )
 
-    def _wanted(self, text: str) -> dict[str, str]:
+    def _matching(self, text: str) -> list[int]:
+        """The cells that match axis=value[,axis=value...]."""
         wanted: dict[str, str] = {}
         for part in filter(None, text.split(",")):
             axis, equals, value = part.partition("=")
@@ -68,20 +68,36 @@ class Results(NamedTuple):
                 axes = ", ".join(self.loaded.axes) or "no axes"
                 raise ConfigurationError(f"cell {text}: expected axis=value with one of {axes}")
             wanted[axis] = value
-        return wanted
+        return [
+            index
+            for index, cell in enumerate(self.loaded.cells)
+            if all(as_text(cell.values[axis]) == value for axis, value in wanted.items())
+        ]
 
     def of_cell(self, cell: int) -> dict[int, Row]:
-        """The rows of one cell that count in the report, by repetition."""
-        return {r: row for r, row in self.drawn(cell).items() if self.counts(row)}
+        """The rows of one cell that count in the report, by repetition.
+
+        `draws:` may exclude split runs, or all others.
+        """
+        draws = self.loaded.experiment.draws
+        return {
+            repetition: row
+            for repetition, row in self.drawn(cell).items()
+            if draws == "all" or (row.get("split") == "1") == (draws == "split")
+        }
 
     def drawn(self, cell: int) -> dict[int, Row]:
         """All rows of one cell, by repetition."""
         return self.by_cell.get(cell, {})
 
-    def counts(self, row: Row) -> bool:
-        """Whether the report counts this run: `draws:` may exclude split runs, or all others."""
-        draws = self.loaded.experiment.draws
-        return draws == "all" or (row.get("split") == "1") == (draws == "split")
+    def paired(self, a: int, b: int, metric: str) -> tuple[list[float], list[float]]:
+        """A metric in two cells, for the seeds for which both have a value, in the same order."""
+        in_a, in_b = self.of_cell(a), self.of_cell(b)
+        pairs = (
+            (number(in_a[r], metric), number(in_b[r], metric)) for r in sorted(in_a.keys() & in_b)
+        )
+        whole = [(x, y) for x, y in pairs if x is not None and y is not None]
+        return [x for x, _ in whole], [y for _, y in whole]
 
     @property
     def axis_names(self) -> dict[str, str]:
@@ -93,8 +109,7 @@ class Results(NamedTuple):
 
     def find_cell(self, text: str) -> int:
         """The one cell that matches axis=value[,axis=value...]. Raises ConfigurationError."""
-        wanted = self._wanted(text)
-        fit = [i for i, cell in enumerate(self.loaded.cells) if _fits(cell, wanted)]
+        fit = self._matching(text)
         if len(fit) != 1:
             labels = [self.loaded.cells[i].label for i in fit or range(len(self.loaded.cells))]
             shown = "; ".join(labels[:CELLS_SHOWN]) + ("; ..." if labels[CELLS_SHOWN:] else "")
@@ -120,7 +135,6 @@ def load_results(folder: Path) -> Results:
     if not sessions or not (folder / EXPERIMENT).exists():
         raise StoreError(f"{folder}: not a results folder of lab run")
     last = sessions[-1]
-    extensions.add_search_path(str(last["folder"]))
     loaded = load_experiment(folder / EXPERIMENT, list(last["overrides"]), Path(last["folder"]))
     rows = {row["run"]: row for row in read_rows(folder / RUNS)}
     seeds = _seeds(loaded, rows)
@@ -147,10 +161,6 @@ def is_share(column: str) -> bool:
 def _last_words(axis: str) -> str:
     words = axis.split(".")
     return ".".join(words[-2:] if words[0] == "faults" else words[-1:])
-
-
-def _fits(cell: Cell, wanted: Mapping[str, str]) -> bool:
-    return all(as_text(cell.values[axis]) == value for axis, value in wanted.items())
 
 
 def _seeds(loaded: LoadedExperiment, rows: Mapping[str, Row]) -> int:

@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 from drone_mesh.communication.repair.options import LostPlace, RepairOptions
-from drone_mesh.communication.seals.keys import MeshKey
+from drone_mesh.communication.seals.keys import Keys, MeshKey
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.positions import PositionErrors
 from drone_mesh.lab.places import StartPoint, draw_places
 from drone_mesh.lab.propagation import obstacles_of
-from drone_mesh.lab.scenario import Positions, Scenario
+from drone_mesh.lab.scenario import Scenario
 from drone_mesh.lab.streams import Streams
 from drone_mesh.nrf24.emulator.links import IdealDisc, LinkModel, LogDistance, ScriptedLoss
 from drone_mesh.nrf24.settings import DEFAULT_RATE, data_rate
@@ -20,12 +20,25 @@ _KEY = MeshKey(b"the key of a lab")
 
 
 def network_of(scenario: Scenario, streams: Streams, places: list[StartPoint]) -> Network:
+    gateways = {place.node_id for place in places if place.gateway}
+
+    def key_of(node: int) -> Keys:
+        return _KEY if node in gateways else _KEY.for_node(node)
+
     network = Network(
         seed=streams.number("mesh"),
         timing=MeshTiming(**scenario.timing.model_dump()),
         routing=scenario.routing,
         max_distance_m=scenario.range_m,
-        **_options(scenario, streams, places),
+        repair=scenario.repair,
+        repair_options=RepairOptions(
+            clearance_m=scenario.repair_options.clearance_m,
+            range_m=scenario.range_m,
+            lost_place=LostPlace(scenario.repair_options.lost_place),
+        ),
+        key=key_of if scenario.key else None,
+        positions=PositionErrors(**scenario.positions.model_dump()),
+        **_radio(scenario, streams),
     )
     grounded = streams.of("grounded")
     for place in places:
@@ -43,30 +56,19 @@ def places_of(scenario: Scenario, streams: Streams) -> list[StartPoint]:
     return draw_places(scenario.layout, scenario.range_m, streams.of("layout"), obstacles)
 
 
-def _options(scenario: Scenario, streams: Streams, places: list[StartPoint]) -> dict[str, Any]:
-    """The arguments that differ from the network's defaults."""
-    options: dict[str, Any] = {
-        "repair": scenario.repair,
-        "repair_options": RepairOptions(
-            clearance_m=scenario.repair_options.clearance_m,
-            range_m=scenario.range_m,
-            lost_place=LostPlace(scenario.repair_options.lost_place),
-        ),
+def _radio(scenario: Scenario, streams: Streams) -> dict[str, Any]:
+    """The arguments of the network about its medium."""
+    radio, part = scenario.radio, scenario.obstacles
+    if radio.kind == "disc":
+        return {"delay_s": radio.delay_s, "jitter_s": radio.jitter_s}
+    rate = radio.rate or DEFAULT_RATE
+    return {
+        "radio": radio.kind,
+        "rate": rate,
+        "links": _links(scenario, rate, streams),
+        "fading": part.fading,
+        "rician_k_db": part.rician_k_db,
     }
-    if scenario.key:
-        gateways = {place.node_id for place in places if place.gateway}
-        options["key"] = lambda node: _KEY if node in gateways else _KEY.for_node(node)
-    if scenario.positions != Positions():
-        options["positions"] = PositionErrors(**scenario.positions.model_dump())
-    if scenario.radio.kind == "disc":
-        options["delay_s"] = scenario.radio.delay_s
-        options["jitter_s"] = scenario.radio.jitter_s
-    else:
-        rate = scenario.radio.rate or DEFAULT_RATE
-        options.update(radio=scenario.radio.kind, rate=rate, links=_links(scenario, rate, streams))
-        part = scenario.obstacles
-        options.update(fading=part.fading, rician_k_db=part.rician_k_db)
-    return options
 
 
 def _links(scenario: Scenario, rate: str, streams: Streams) -> LinkModel:

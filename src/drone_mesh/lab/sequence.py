@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 import random
-import time
-from typing import Callable, Iterator, Mapping
+from typing import Iterator
 
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.repair.options import DEFAULT_REPAIR
@@ -14,7 +13,7 @@ from drone_mesh.inprocess.radio import InProcessAir
 from drone_mesh.lab.network_sample import physical_graph
 from drone_mesh.lab.record import RunRecord
 from drone_mesh.lab.scenario import Layout, Radio, Scenario, Sequence
-from drone_mesh.lab.simulation import Simulation, Stopwatch
+from drone_mesh.lab.simulation import Simulation
 from drone_mesh.lab.streams import Streams
 
 GATEWAY = 0
@@ -40,12 +39,10 @@ def run_sequence(
 class SequenceRun(Simulation):
     """The run of a sequence, on the disc. The same seed and scenario give the same run."""
 
-    def __init__(
-        self, scenario: Scenario, streams: Streams, stopwatch: Stopwatch = time.process_time
-    ) -> None:
+    def __init__(self, scenario: Scenario, streams: Streams) -> None:
         """Raises ConfigurationError for a layout that cannot be drawn."""
         self._rng = streams.of("sequence")
-        super().__init__(_drawn(scenario, self._rng), streams, stopwatch)
+        super().__init__(_drawn(scenario, self._rng), streams)
 
     def samples(self) -> Times:
         """The whole sequence; yields the time (s) of each sample once it is taken."""
@@ -55,7 +52,7 @@ class SequenceRun(Simulation):
             yield from self._passing(1.0)
         for name in rng.choices(self.scenario.sequence.incidents, k=rng.randint(1, 3)):
             self.timeline.note(name, [])
-            yield from INCIDENTS[name](self)
+            yield from getattr(self, f"_{name}")()
             yield from self._passing(rng.uniform(5.0, 150.0))
         network.power(GATEWAY, True)
         yield from self._until_rest()
@@ -173,11 +170,6 @@ class SequenceRun(Simulation):
                     self._kill([event.node])
                     return
             seen = len(network.events)
-
-
-INCIDENTS: Mapping[str, Callable[[SequenceRun], Times]] = {
-    name: getattr(SequenceRun, f"_{name}") for name in Sequence.INCIDENTS
-}
 
 
 def _drawn(scenario: Scenario, rng: random.Random) -> Scenario:

@@ -58,11 +58,6 @@ def explain_hash(results: Results, shown: Replay) -> str:
     return f"a different run: event hash {shown.event_hash}, the row has {row['event_hash']}; {why}"
 
 
-def _differs(results: Results, shown: Replay) -> bool:
-    row = results.rows.get(shown.planned.spec.run)
-    return row is not None and row["event_hash"] != shown.event_hash
-
-
 def show_run(options: argparse.Namespace) -> int:
     """`lab show`: 0, or 1 if it was not the same run; with --rviz the exit code of lab_run."""
     if options.rviz:
@@ -82,7 +77,8 @@ def show_run(options: argparse.Namespace) -> int:
         _print_story(shown)
     if not options.console:
         print(verdict)
-    return 1 if _differs(results, shown) else 0
+    row = results.rows.get(shown.planned.spec.run)
+    return 0 if row is None or row["event_hash"] == shown.event_hash else 1
 
 
 def _show_in_rviz(options: argparse.Namespace) -> NoReturn:

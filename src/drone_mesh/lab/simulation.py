@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import math
 import time
@@ -27,8 +28,8 @@ from drone_mesh.lab.network_sample import (
     sample_of,
 )
 from drone_mesh.lab.probes import ProbeSender
-from drone_mesh.lab.propagation import obstacles_of, put_obstacles
-from drone_mesh.lab.record import AirFigures, RunRecord, ServiceGap, Topology
+from drone_mesh.lab.propagation import ChannelAir, obstacles_of, put_obstacles
+from drone_mesh.lab.record import AirFigures, Place, RunRecord, ServiceGap, Topology
 from drone_mesh.lab.scenario import Scenario
 from drone_mesh.lab.scenario_network import network_of, places_of
 from drone_mesh.lab.streams import Streams
@@ -42,35 +43,30 @@ FLIGHT_SAMPLE_S = 0.25  # period of distance checks while a drone flies: 0.5 m a
 ABLE_WITHIN_M = 1.0  # a place believed to be so near to the range leads to the gateway
 
 OnStatus = Callable[[MeshStatus], None]
-Stopwatch = Callable[[], float]
-"""Processor time of this process, in seconds."""
 
 
 class Simulation:
     """A run of a mesh with packets. Create it, call `run()` once, and read its record."""
 
-    def __init__(
-        self, scenario: Scenario, streams: Streams, stopwatch: Stopwatch = time.process_time
-    ) -> None:
+    def __init__(self, scenario: Scenario, streams: Streams) -> None:
         """Raises ConfigurationError for a layout that cannot be drawn."""
         self.scenario = scenario
         places = places_of(scenario, streams)
         self.network = network_of(scenario, streams, places)
         self.simulating_s = 0.0  # processor time in the network, without the lab's own
-        self._stopwatch = stopwatch
         self.impairments = Impairments(self.network, streams.of, scenario.radio.loss)
         self._planner = put_obstacles(self.network, self.impairments, scenario)
         self.flights = Flights(self.network)
         self.timeline = Timeline(
-            scenario, self.network, self.impairments, self.flights, streams, self
+            scenario, self.network, self.impairments, self.flights, streams, self._observing
         )
         self._move(tracks(scenario, places, streams))
         self._probes = ProbeSender(
             self.network, scenario.probes, scenario.duration_s, streams.of("probes")
         )
         churns = any(fault.churn is not None for fault in scenario.faults)
-        is_watched = churns or scenario.probes.per_s or scenario.mobility.kind != "none"
-        self._links = LinkWatch(scenario.probes.from_s) if is_watched else None
+        self._is_watched = bool(churns or scenario.probes.per_s or scenario.mobility.kind != "none")
+        self._links = LinkWatch(scenario.probes.from_s)
         self._samples: list[NetworkSample] = []
         self._start_places = self._places()
         self._start: Topology | None = None
@@ -179,9 +175,9 @@ class Simulation:
                 self._run_until(until_s)
 
     def _run_until(self, until_s: float) -> None:
-        before_s = self._stopwatch()
+        before_s = time.process_time()
         self.network.clock.run_until(until_s)
-        self.simulating_s += self._stopwatch() - before_s
+        self.simulating_s += time.process_time() - before_s
 
     def is_able(self, node: int) -> bool:
         """Whether a drone can fly and the gateway would be in range of its believed place."""
@@ -195,19 +191,18 @@ class Simulation:
     def _take_sample(self) -> NetworkSample:
         sample = sample_of(self.network)
         self._samples.append(sample)
-        if self._links is not None:
+        if self._is_watched:
             self._links.look(sample, physical_graph(self.network), gateways_of(self.network))
         for node in self._cut_off.keys() & sample.served:
             self._cut_offs.append(ServiceGap(node, self._cut_off.pop(node), sample.now_s))
         return sample
 
-    def before_disruption(self) -> None:
-        """A fault that must be healed is about to happen."""
+    @contextlib.contextmanager
+    def _observing(self) -> Iterator[None]:
+        """Observe the network before and after what happens inside."""
         if self._before is None:
             self._before = self._scene(sample_of(self.network))
-
-    def after_disruption(self) -> None:
-        """The fault has happened."""
+        yield
         graph = physical_graph(self.network)
         if self._after_fault is None:
             self._after_fault = graph
@@ -217,14 +212,13 @@ class Simulation:
                 self._cut_off.setdefault(node, self.network.clock.now_s)
         self._take_sample()
 
-    def _places(self) -> dict[int, tuple[float, float, float]]:
+    def _places(self) -> dict[int, Place]:
         return {
-            node_id: (place.longitude, place.latitude, place.height)
-            for node_id, place in ((n, self.network.location(n)) for n in self.network.nodes)
+            node_id: self.network.location(node_id).to_vector() for node_id in self.network.nodes
         }
 
-    def _scene(self, sample: NetworkSample | None) -> Topology:
-        hops = {} if sample is None else route_hops(self.network, sample.served)
+    def _scene(self, sample: NetworkSample) -> Topology:
+        hops = route_hops(self.network, sample.served)
         return Topology(physical_graph(self.network), hops, self._places())
 
     def _watch_distances(self) -> None:
@@ -244,15 +238,8 @@ class Simulation:
                 self._pairs.add((min(node, other), max(node, other)))
 
 
-class _Channel(Protocol):
-    """The air of radios that share a channel."""
-
-    airtime_s: float
-    collisions: int
-
-
 class _Radio(Protocol):
-    """The antenna of one of them."""
+    """The antenna of one of the radios that share a channel."""
 
     def statistics(self) -> RadioStatistics: ...
 
@@ -260,7 +247,7 @@ class _Radio(Protocol):
 def _air_figures(network: Network) -> AirFigures | None:
     if isinstance(network.air, InProcessAir):
         return None
-    air = cast(_Channel, network.air)
+    air = cast(ChannelAir, network.air)
     radios = [cast(_Radio, node.antenna).statistics() for node in network.nodes.values()]
     return AirFigures(
         air.airtime_s,

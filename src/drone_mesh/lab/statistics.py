@@ -119,7 +119,9 @@ def survival(times: Sequence[float], seen: Sequence[bool]) -> Survival:
     until = min(censored_at) if censored_at else max(times)
     # No run is censored before `until`, so up to there the mean of the truncated times is exact.
     area = mean_interval([min(t, until) for t in times])
-    return Survival(events, len(times) - events, _km_median(times, seen), area, until)
+    curve = kaplan_meier(times, seen)
+    median = next((time for time, share in curve if share <= 0.5), math.nan)
+    return Survival(events, len(times) - events, median, area, until)
 
 
 def kaplan_meier(times: Sequence[float], seen: Sequence[bool]) -> list[tuple[float, float]]:
@@ -131,7 +133,3 @@ def kaplan_meier(times: Sequence[float], seen: Sequence[bool]) -> list[tuple[flo
         share *= 1.0 - sum(t == time and s for t, s in zip(times, seen)) / at_risk
         curve.append((time, share))
     return curve
-
-
-def _km_median(times: Sequence[float], seen: Sequence[bool]) -> float:
-    return next((t for t, share in kaplan_meier(times, seen) if share <= 0.5), math.nan)

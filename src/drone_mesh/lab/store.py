@@ -119,7 +119,6 @@ class Store:
         kept = [row for row in self.outages.rows if row["run"] in self.done]
         if len(kept) != len(self.outages.rows):
             self.outages.rewrite(kept)
-            self.outages.rows = kept
 
     def use(self, plan: Plan) -> None:
         """Continue with another plan of the same experiment, with more seeds."""
@@ -218,17 +217,14 @@ class Store:
     def forget_failures(self) -> None:
         """Remove failed runs, so that they count as missing."""
         self.failures.rewrite([])
-        self.failures.rows = []
         self.failed = set()
 
     def put_in_order(self) -> None:
         """Sort all tables in the order of the plan: the same runs produce the same bytes."""
         order = {planned.spec.run: place for place, planned in enumerate(self._plan)}
-        last = len(order)
         for table in (self.runs, self.outages, self.failures):
             rows = read_rows(table.path)
-            rows.sort(key=lambda row: (order.get(row["run"], last), row["run"] not in order))
-            table.rewrite(rows)
+            table.rewrite(sorted(rows, key=lambda row: order.get(row["run"], len(order))))
 
     def close(self) -> None:
         """Release the folder for other writers."""
@@ -263,6 +259,33 @@ def read_provenance(folder: Path) -> list[dict[str, Any]]:
     except (OSError, ValueError):
         return []
     return sessions if isinstance(sessions, list) else []
+
+
+def describe_folder(folder: Path) -> str:
+    """A few lines of text. Raises StoreError if the folder has no results."""
+    if not (folder / PLAN).exists():
+        raise StoreError(f"{folder}: no {PLAN} there, so it is not a results folder of lab run")
+    with (folder / PLAN).open(encoding="utf-8", newline="") as file:
+        planned = [row["run"] for row in csv.DictReader(file)]
+    rows = read_rows(folder / RUNS)
+    done = {row["run"] for row in rows}
+    failed = {row["run"] for row in read_rows(folder / FAILURES)} - done
+    in_plan = sum(run in done for run in planned)
+    lines = [f"{folder}: {in_plan} of {len(planned)} runs done"]
+    if failed:
+        lines[0] += f", {len(failed)} failed"
+    if len(done) > in_plan:
+        lines.append(f"{len(done) - in_plan} more runs are of an earlier plan and are kept")
+    codes = sorted({row["code"] for row in rows})
+    if len(codes) > 1:
+        lines.append(f"warning: rows of {len(codes)} versions of the code: {', '.join(codes)}")
+    elif codes and codes[0].endswith("+dirty"):
+        lines.append(f"warning: run with uncommitted changes ({codes[0]})")
+    sessions = read_provenance(folder)
+    if sessions:
+        last = sessions[-1]
+        lines.append(f"last session: {last['started']}, {' '.join(last['command'])}")
+    return "\n".join(lines)
 
 
 def _cannot(do: str, path: Path, error: OSError) -> StoreError:

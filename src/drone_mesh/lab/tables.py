@@ -6,7 +6,7 @@ import csv
 import io
 import math
 from dataclasses import dataclass
-from typing import Any, Mapping, Sequence
+from typing import Mapping, Sequence
 
 from drone_mesh.lab.experiment import as_text
 from drone_mesh.lab.metrics.registry import METRICS, is_censored, unit_of
@@ -123,24 +123,26 @@ def cells_table(results: Results) -> Table:
 
 def healing_table(results: Results) -> Table | None:
     """Share healed by certain times, and the censored time to heal; None without faults."""
-    rows = []
+    cells = []
     for index, cell in enumerate(results.loaded.cells):
-        counted = results.of_cell(index)
-        if not any(number(row, "observed_s") is not None for row in counted.values()):
-            continue
-        found = survival_of(counted)
+        counted = results.of_cell(index).values()
+        times = [(number(row, "t_total_s"), number(row, "observed_s")) for row in counted]
+        if any(observed_s is not None for _, observed_s in times):
+            healed = [math.inf if total_s is None else total_s for total_s, _ in times]
+            end_s = min(observed_s or 0.0 for _, observed_s in times)
+            cells.append((cell, healed, end_s, survival_of(results.of_cell(index))))
+    if not cells:
+        return None
+    columns = [by_s for by_s in HEALED_BY_S if any(by_s <= end_s for _, _, end_s, _ in cells)]
+    rows = []
+    for cell, healed, end_s, found in cells:
         n = found.events + found.censored
-        watched = [number(row, "observed_s") or 0.0 for row in counted.values()]
-        shares = []
-        for by_s in HEALED_BY_S:
-            if by_s > min(watched):
-                shares.append("-")  # the runs end earlier
-                continue
-            healed = sum(
-                (t := number(row, "t_total_s")) is not None and t <= by_s
-                for row in counted.values()
-            )
-            shares.append(_percent(share_interval(healed, n)))
+        shares = [
+            "-"  # the runs end earlier
+            if by_s > end_s
+            else _percent(share_interval(sum(total_s <= by_s for total_s in healed), n))
+            for by_s in columns
+        ]
         rows.append(
             [
                 *map(as_text, cell.values.values()),
@@ -151,19 +153,10 @@ def healing_table(results: Results) -> Table | None:
                 f"{found.restricted_mean} to {found.until:.3g}",
             ]
         )
-    if not rows:
-        return None
     header = [
-        *results.axis_names.values(), "n", *(f"healed in {by_s:g} s" for by_s in HEALED_BY_S),
+        *results.axis_names.values(), "n", *(f"healed in {by_s:g} s" for by_s in columns),
         "healed at all", "median, s", "restricted mean, s",
     ]  # fmt: skip
-    unwatched = [
-        place
-        for place, word in enumerate(header)
-        if word.startswith("healed in") and all(row[place] == "-" for row in rows)
-    ]
-    header = [word for place, word in enumerate(header) if place not in unwatched]
-    rows = [[word for place, word in enumerate(row) if place not in unwatched] for row in rows]
     caption = (
         "Shares with Wilson intervals. Runs that did not heal are censored at their end and never "
         "averaged in: median of Kaplan-Meier (- if less than half healed), and the mean time up "
@@ -178,16 +171,17 @@ def paired_table(results: Results) -> Table | None:
     if compare is None:
         return None
     found = []
-    for index, cell in enumerate(results.loaded.cells):
+    cells = results.loaded.cells
+    for index, cell in enumerate(cells):
         if cell.values[compare.over] == compare.baseline:
             continue
-        base = _baseline_of(results, cell.values, compare.over, compare.baseline)
+        wanted = {**cell.values, compare.over: compare.baseline}
+        base = next((i for i, other in enumerate(cells) if other.values == wanted), None)
         if base is None:
             continue
         for metric in results.metrics:
-            pairs = _pairs(results.of_cell(base), results.of_cell(index), metric)
-            paired = paired_difference([a for a, _ in pairs], [b for _, b in pairs])
-            found.append((cell.values, metric, len(pairs), paired))
+            xs, ys = results.paired(base, index, metric)
+            found.append((cell.values, metric, len(xs), paired_difference(xs, ys)))
     adjusted = holm([paired.p for *_, paired in found])
     rows = [
         [
@@ -235,19 +229,6 @@ def worst_table(results: Results) -> Table | None:
         f"show {results.folder} RUN, with --page FILE for a page about it."
     )
     return Table("worst", "Worst seeds", caption, header, rows)
-
-
-def _baseline_of(
-    results: Results, values: Mapping[str, Any], over: str, baseline: Any
-) -> int | None:
-    wanted = {**values, over: baseline}
-    cells = results.loaded.cells
-    return next((i for i, cell in enumerate(cells) if dict(cell.values) == wanted), None)
-
-
-def _pairs(a: Mapping[int, Row], b: Mapping[int, Row], metric: str) -> list[tuple[float, float]]:
-    pairs = ((number(a[r], metric), number(b[r], metric)) for r in sorted(a.keys() & b.keys()))
-    return [(x, y) for x, y in pairs if x is not None and y is not None]
 
 
 def _verdict(difference: Interval, p: float, metric: str) -> str:

@@ -6,16 +6,15 @@ import contextlib
 import math
 import random
 from dataclasses import dataclass
-from typing import Callable, Iterable, Iterator, NamedTuple, Protocol, Sequence
+from typing import Callable, ContextManager, Iterable, Iterator, NamedTuple, Sequence
 
 from drone_mesh.communication.data.ticket import Ticket
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.inprocess import Network
-from drone_mesh.lab.conditions import StartCondition, parse_condition
-from drone_mesh.lab.faults import Fault
+from drone_mesh.lab.faults import Fault, StartCondition, parse_condition
 from drone_mesh.lab.flights import Flights
 from drone_mesh.lab.formations import Formations
-from drone_mesh.lab.impairments import Impairments, Jamming
+from drone_mesh.lab.impairments import Impairments
 from drone_mesh.lab.network_sample import NetworkSample, gateways_of
 from drone_mesh.lab.picking import pick_drones
 from drone_mesh.lab.propagation import put_noise
@@ -43,14 +42,8 @@ class OrderAttempt:
     taken: bool
 
 
-class Witness(Protocol):
-    """Observes the network around each fault that must be healed."""
-
-    def before_disruption(self) -> None:
-        """A fault is about to happen."""
-
-    def after_disruption(self) -> None:
-        """The fault has happened."""
+Observing = Callable[[], ContextManager[None]]
+"""Observes the network before and after each fault that must be healed."""
 
 
 class Timeline:
@@ -63,7 +56,7 @@ class Timeline:
         impairments: Impairments,
         flights: Flights,
         streams: Streams,
-        witness: Witness,
+        observing: Observing,
     ) -> None:
         """Schedule the faults on the network's clock."""
         self.happened: list[Happened] = []
@@ -73,7 +66,7 @@ class Timeline:
         self.first_disruption_s: float | None = None
         self._network, self._impairments, self._flights = network, impairments, flights
         self._scenario, self._streams = scenario, streams
-        self._witness = witness
+        self._observing = observing
         self.formations = Formations(network, self.send_order)
         self._waiting: list[tuple[StartCondition, int]] = []
         self._seen: dict[str, float] = {}  # when a condition's event was first true
@@ -129,10 +122,9 @@ class Timeline:
         """What happens inside must be healed; it befalls these nodes."""
         if self.first_disruption_s is None:
             self.first_disruption_s = self._network.clock.now_s
-        self._witness.before_disruption()
-        yield
-        self.note(action, nodes)
-        self._witness.after_disruption()
+        with self._observing():
+            yield
+            self.note(action, nodes)
 
     def note(self, action: str, nodes: Sequence[int]) -> None:
         """Record what happens now."""
@@ -189,9 +181,8 @@ class Timeline:
             stop = put_noise(self._network, what, self._scenario.range_m, rng)
             self._after(what.for_s, lambda _: stop())
             return []
-        jamming = Jamming((what.center[0], what.center[1]), what.radius_m, what.loss)
-        jams.append(jamming)
-        self._after(what.for_s, lambda _: jams.remove(jamming))
+        jams.append(what)
+        self._after(what.for_s, lambda _: jams.remove(what))
         return []
 
     def _gateway_off(self, fault: Fault, _rng: random.Random) -> list[int]:

@@ -9,26 +9,18 @@ import math
 import threading
 import time
 import traceback
-from typing import NamedTuple
+from typing import Mapping, NamedTuple, Sequence
 
 from drone_mesh.lab import extensions
 from drone_mesh.lab.metrics import METRICS, measure_all
 from drone_mesh.lab.plan import RunSpec
 from drone_mesh.lab.provenance import code_version
 from drone_mesh.lab.quiet import quiet_nodes
-from drone_mesh.lab.record import RunRecord
+from drone_mesh.lab.record import RunRecord, ServiceGap
 from drone_mesh.lab.scenario import Scenario
 from drone_mesh.lab.sequence import SequenceRun
-from drone_mesh.lab.simulation import Simulation, Stopwatch
+from drone_mesh.lab.simulation import Simulation
 from drone_mesh.lab.streams import Streams
-
-
-class OutageRow(NamedTuple):
-    """One row of outages.csv, without the run's id; seconds of simulated time."""
-
-    node: int
-    lost_s: float
-    restored_s: float | None
 
 
 class Outcome(NamedTuple):
@@ -37,12 +29,12 @@ class Outcome(NamedTuple):
     spec: RunSpec
     wall_s: float
     code: str  # version of the code that ran it
-    values: dict[str, float]  # metric -> value; empty after a failure
-    event_hash: str
-    outages: tuple[OutageRow, ...]
-    failure: str  # kind; empty: none
-    message: str
-    traceback: str
+    values: Mapping[str, float] = {}  # by metric; empty after a failure
+    event_hash: str = ""
+    outages: Sequence[ServiceGap] = ()
+    failure: str = ""  # kind; empty: none
+    message: str = ""
+    traceback: str = ""
 
 
 class RunTimeout(Exception):
@@ -69,32 +61,29 @@ def execute(spec: RunSpec) -> Outcome:
             message = f"{type(error).__name__}: {message}"
         else:
             message = f"still running after {spec.timeout_s:g} s of wall time"
-        return Outcome(
-            spec, time.perf_counter() - started, code_version(), {}, "", (), kind, message,
-            traceback.format_exc(),
-        )  # fmt: skip
+        wall_s, words = time.perf_counter() - started, traceback.format_exc()
+        return Outcome(spec, wall_s, code_version(), failure=kind, message=message, traceback=words)
     wall_s = time.perf_counter() - started
-    return Outcome(spec, wall_s, code_version(), values, event_hash, outages, "", "", "")
+    return Outcome(spec, wall_s, code_version(), values, event_hash, outages)
 
 
-def _measure(spec: RunSpec) -> tuple[dict[str, float], str, tuple[OutageRow, ...]]:
+def _measure(spec: RunSpec) -> tuple[dict[str, float], str, Sequence[ServiceGap]]:
     if scenario_of(spec.scenario).model == "ideal":
         from drone_mesh.lab.ideal import run_ideal  # needs scipy, which a mesh does not
 
         return (*run_ideal(scenario_of(spec.scenario), Streams(spec.seed, spec.repetition)), ())
     simulation = simulation_of(spec)
     record = simulation.run()
-    gaps = tuple(OutageRow(gap.node, gap.lost_s, gap.restored_s) for gap in record.gaps())
-    return measured(record, spec.own_metrics), simulation.event_hash(), gaps
+    return measured(record, spec.own_metrics), simulation.event_hash(), record.gaps()
 
 
-def simulation_of(spec: RunSpec, stopwatch: Stopwatch = time.process_time) -> Simulation:
+def simulation_of(spec: RunSpec) -> Simulation:
     """The run, before its start. Raises ConfigurationError for a layout that cannot be drawn."""
     if spec.search_path:
         extensions.add_search_path(spec.search_path)
     scenario = scenario_of(spec.scenario)
     kind = Simulation if scenario.sequence is None else SequenceRun
-    return kind(scenario, Streams(spec.seed, spec.repetition), stopwatch)
+    return kind(scenario, Streams(spec.seed, spec.repetition))
 
 
 def measured(record: RunRecord, own_metrics: tuple[str, ...]) -> dict[str, float]:

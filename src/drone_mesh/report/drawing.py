@@ -63,13 +63,18 @@ def figure_with_columns(height_in: float, columns: int) -> tuple[Figure, list[Ax
 
 def svg_of(figure: Figure) -> str:
     """The figure as an SVG element, with each colour of the palette as its CSS variable."""
-    text = io.StringIO()
     with in_style():
-        figure.savefig(text, format="svg", metadata={"Date": None})
-    _prologue, start, drawing = text.getvalue().partition("<svg")
-    return start + re.sub(
+        drawing = svg_element(figure)
+    return re.sub(
         r"#[0-9a-f]{6}\b", lambda found: _VARIABLES.get(str(found[0]), str(found[0])), drawing
     )
+
+
+def svg_element(figure: Figure) -> str:
+    """The figure as an SVG element in its own colours, without a date."""
+    text = io.StringIO()
+    figure.savefig(text, format="svg", metadata={"Date": None})
+    return "".join(text.getvalue().partition("<svg")[1:])
 
 
 def svg_of_its_own(figure: Figure) -> str:

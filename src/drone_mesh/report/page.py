@@ -6,9 +6,8 @@ from pathlib import Path
 
 import jinja2
 
-from drone_mesh.report.charts import messages_figure, timeline_figure
+from drone_mesh.report.charts import messages_figure, outages_figure, timeline_figure
 from drone_mesh.report.maps import maps_figure
-from drone_mesh.report.outage_bars import outages_figure
 from drone_mesh.report.story import RunStory
 from drone_mesh.report.tables import (
     EVENT_KINDS_LEFT_OUT,

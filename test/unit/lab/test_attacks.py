@@ -117,7 +117,6 @@ def test_an_unknown_attack_is_an_error_in_one_line(capsys):
 @pytest.mark.parametrize("key", [None, KEY], ids=["without key", "with key"])
 def test_no_mutated_packet_stops_a_node(key):
     result = fuzz(10_000, seed=1, key=key)
-    assert result.packets == 10_000
     if key is not None:
         assert (result.moved, result.connected) == (0, 5)
 

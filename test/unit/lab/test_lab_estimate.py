@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import statistics
+import time
 from pathlib import Path
 
 import pytest
@@ -42,9 +43,7 @@ class PacketClock:
             return send(air, payload)
 
         monkeypatch.setattr(InProcessAir, "send", counted)
-
-    def __call__(self) -> float:
-        return self.now_s
+        monkeypatch.setattr(time, "process_time", lambda: self.now_s)
 
 
 def plan_of(folder: Path, text: str) -> Plan:
@@ -69,7 +68,7 @@ def test_the_estimate_is_within_30_percent_also_of_cells_that_differ(
     plan = plan_of(tmp_path, SEVERAL_CELLS)
     clock = PacketClock(monkeypatch)
     monkeypatch.setattr(estimating, "BUDGET_S", budget_s)
-    guess = estimate(plan, 1, clock)
+    guess = estimate(plan, 1)
     assert guess.run_s * len(plan) == pytest.approx(cost_s(plan, clock), rel=0.3)
     assert guess.wall_s > guess.run_s * len(plan)
 
@@ -90,7 +89,7 @@ def test_every_cell_has_a_trial_even_without_any_time_for_it(
     plan = plan_of(tmp_path, SEVERAL_CELLS)
     clock = PacketClock(monkeypatch)
     monkeypatch.setattr(estimating, "BUDGET_S", 0.0)
-    guess = estimate(plan, 1, clock)
+    guess = estimate(plan, 1)
     assert guess.trials == len(plan.cells)
     assert guess.outside_s is None  # all were cut off
     assert clock.now_s < (len(plan.cells) + 1) * guess.run_s / 2
@@ -99,8 +98,8 @@ def test_every_cell_has_a_trial_even_without_any_time_for_it(
 def test_nothing_of_a_run_that_costs_only_packets_is_outside_the_simulation(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    clock = PacketClock(monkeypatch)
-    assert estimate(plan_of(tmp_path, SEVERAL_CELLS), 1, clock).outside_s == pytest.approx(0.0)
+    PacketClock(monkeypatch)
+    assert estimate(plan_of(tmp_path, SEVERAL_CELLS), 1).outside_s == pytest.approx(0.0)
 
 
 def test_a_long_run_is_extrapolated_by_its_second_half() -> None:
@@ -114,14 +113,15 @@ def test_a_cell_with_few_trials_weighs_as_much_as_the_others(
 ) -> None:
     costs = iter([9.0, 1.0, 1.0, 3.0, 3.0, 5.0])  # the first loads the code, and does not count
 
-    def trial(_spec: object, _most_s: float, clock: object) -> Trial:
+    def trial(_spec: object, _most_s: float) -> Trial:
         spent_s.append(next(costs))
         return Trial(spent_s[-1], None)
 
     spent_s: list[float] = []
     monkeypatch.setattr(estimating, "_trial", trial)
     monkeypatch.setattr(estimating, "BUDGET_S", 12.0)
-    guess = estimate(plan_of(tmp_path, SEVERAL_CELLS), 1, lambda: sum(spent_s))
+    monkeypatch.setattr(time, "process_time", lambda: sum(spent_s))
+    guess = estimate(plan_of(tmp_path, SEVERAL_CELLS), 1)
     assert guess.trials == 5
     assert guess.run_s == statistics.mean([statistics.mean([1.0, 5.0]), 1.0, 3.0, 3.0])
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 
 from drone_mesh.drone.roles import Role
-from drone_mesh.report.outage_bars import outages_figure, phases_of
+from drone_mesh.report.charts import outages_figure, phases_of
 from drone_mesh.report.page import ROWS_SHOWN, render_page
 from drone_mesh.report.story import NothingRecorded, RunStory, tell_story
 from drone_mesh.report.tables import key_numbers, outages_in_words, repair_rows, write_csv

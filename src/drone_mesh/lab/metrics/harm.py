@@ -21,7 +21,7 @@ PROMPT_S = 120.0  # our choice: a node that is cut off should be connected again
 )  # fmt: skip
 def harm(run: RunRecord) -> float:
     kinds = (resting_close, flew_connected, flew_grounded, left_able, endless_packets)
-    return float(any(count(run) for count in kinds))
+    return any(count(run) for count in kinds)
 
 
 @metric(
@@ -29,11 +29,9 @@ def harm(run: RunRecord) -> float:
 )
 def resting_close(run: RunRecord) -> float:
     at_rest = sorted(run.end.graph.near.keys() - run.in_the_air)
-    return float(
-        sum(
-            math.dist(run.end.places[one], run.end.places[other]) < CLEARANCE_M - ROUNDING_M
-            for one, other in itertools.combinations(at_rest, 2)
-        )
+    return sum(
+        math.dist(run.end.places[one], run.end.places[other]) < CLEARANCE_M - ROUNDING_M
+        for one, other in itertools.combinations(at_rest, 2)
     )
 
 
@@ -48,58 +46,55 @@ def flew_connected(run: RunRecord) -> float:
             connected.discard(event.node)
         elif event.kind == MeshEventKind.FLIGHT_DECIDED.value:
             flights += event.node in connected
-    return float(flights)
+    return flights
 
 
 @metric("", "repair flights of drones that cannot fly", better="less")
 def flew_grounded(run: RunRecord) -> float:
-    return float(sum(node in run.grounded for node in _repair_flights(run)))
+    return sum(node in run.grounded for node in _nodes_with(run, MeshEventKind.FLIGHT_DECIDED))
 
 
 @metric("", "flights that repairs decided on", better="less")
 def repair_flights(run: RunRecord) -> float:
-    return float(len(_repair_flights(run)))
+    return len(_nodes_with(run, MeshEventKind.FLIGHT_DECIDED))
 
 
-def _repair_flights(run: RunRecord) -> list[int]:
-    kind = MeshEventKind.FLIGHT_DECIDED.value
-    return [event.node for event in run.events if event.kind == kind]
+def _nodes_with(run: RunRecord, kind: MeshEventKind) -> list[int]:
+    """The node of each event of this kind."""
+    return [event.node for event in run.events if event.kind == kind.value]
 
 
 @metric("drones", "live routers that are not connected at the end", better="less")
 def left_behind(run: RunRecord) -> float:
-    return float(len(run.left_behind))
+    return len(run.left_behind)
 
 
 @metric("drones", "the ones that can fly, have a link left and know a gateway", better="less")
 def left_able(run: RunRecord) -> float:
-    return float(len(run.left_behind.keys() & run.able))
+    return len(run.left_behind.keys() & run.able)
 
 
 @metric("drones", "of left_behind: those that were connected, and know no place", better="less")
 def left_placeless(run: RunRecord) -> float:
-    kind = MeshEventKind.CONNECTED.value
-    connected = {event.node for event in run.events if event.kind == kind}
-    return float(
-        sum(node in connected and "knows no place" in why for node, why in run.left_behind.items())
+    connected = set(_nodes_with(run, MeshEventKind.CONNECTED))
+    return sum(
+        node in connected and "knows no place" in why for node, why in run.left_behind.items()
     )
 
 
 @metric("", "packets that were dropped at the limit of hops", better="less")
 def endless_packets(run: RunRecord) -> float:
-    return float(run.endless_packets)
+    return run.endless_packets
 
 
 @metric("", "times that a fault left a live router without any path to a gateway, while one was on")
 def times_cut_off(run: RunRecord) -> float:
-    return float(len(run.cut_offs))
+    return len(run.cut_offs)
 
 
 @metric("", "of times_cut_off: served again within 120 s", better="more")
 def times_back(run: RunRecord) -> float:
-    return float(
-        sum(
-            gap.restored_s is not None and gap.restored_s - gap.lost_s <= PROMPT_S
-            for gap in run.cut_offs
-        )
+    return sum(
+        gap.restored_s is not None and gap.restored_s - gap.lost_s <= PROMPT_S
+        for gap in run.cut_offs
     )

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 import statistics
-from typing import Sequence
+from typing import Iterable
 
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.lab.metrics.registry import NAN, metric
 from drone_mesh.lab.record import RunRecord
+from drone_mesh.state.model import EventRecord
 
 
 @metric("0/1", "all live routers are served again before the end", better="more", is_share=True)
 def healed(run: RunRecord) -> float:
-    return float(run.healed_at_s is not None)
+    return run.healed_at_s is not None
 
 
 @metric("0/1", "the fault left a live router without any path to a gateway", is_share=True)
@@ -25,13 +26,13 @@ def split(run: RunRecord) -> float:
 def cut_off(run: RunRecord) -> float:
     if run.after_fault is None:
         return NAN
-    return float(len(run.after_fault.near) - len(run.after_fault.hops_from(sorted(run.gateways))))
+    return len(run.after_fault.near) - len(run.after_fault.hops_from(sorted(run.gateways)))
 
 
 @metric("drones", "drones that faults switched off during the run")
 def victims(run: RunRecord) -> float:
     deadly = ("kill", "gateway_off", "battery empty", "death")
-    return float(len({n for item in run.happened if item.action in deadly for n in item.nodes}))
+    return len({n for item in run.happened if item.action in deadly for n in item.nodes})
 
 
 @metric(
@@ -120,8 +121,9 @@ def _phases(run: RunRecord) -> tuple[float, float, float, float]:
     if start_s == end_s:
         return (0.0, 0.0, 0.0, 0.0)
     died = {(item.at_s, node) for item in run.happened for node in item.nodes}
-    noticed = _first(  # a drone that is switched off loses its own connection at that moment
-        [event for event in between if (event.stamp_s, event.node) not in died],
+    # A drone that is switched off loses its own connection at that moment.
+    noticed = _first(
+        (event for event in between if (event.stamp_s, event.node) not in died),
         MeshEventKind.DISCONNECTED,
     )
     decided = _first(between, MeshEventKind.FLIGHT_DECIDED)
@@ -134,11 +136,8 @@ def _phases(run: RunRecord) -> tuple[float, float, float, float]:
     return (noticed_s - start_s, decided_s - noticed_s, landed_s - decided_s, end_s - landed_s)
 
 
-def _first(events: Sequence[object], kind: MeshEventKind) -> float | None:
-    return next(
-        (event.stamp_s for event in events if event.kind == kind.value),  # type: ignore[attr-defined]
-        None,
-    )
+def _first(events: Iterable[EventRecord], kind: MeshEventKind) -> float | None:
+    return next((event.stamp_s for event in events if event.kind == kind.value), None)
 
 
 # Outages of single routers ---------------------------------------------------------------------
@@ -146,7 +145,7 @@ def _first(events: Sequence[object], kind: MeshEventKind) -> float | None:
 
 @metric("", "times that a live router was without service since the fault", better="less")
 def outages(run: RunRecord) -> float:
-    return float(len(run.gaps()))
+    return len(run.gaps())
 
 
 @metric("s", "median length of these outages; one without end counts up to the end", better="less")

@@ -6,74 +6,68 @@ import math
 import statistics
 from typing import Sequence
 
-from drone_mesh.lab.metrics.registry import NAN, metric
+from drone_mesh.lab.metrics.registry import NAN, mean, metric, per_drone_and_s, ratio
 from drone_mesh.lab.record import RunRecord
 
 
 @metric("1/min", "links that appear or disappear, per drone and minute")
 def link_changes(run: RunRecord) -> float:
-    watch = run.links
-    if watch is None or not watch.drone_s:
-        return NAN
-    return 2 * (watch.appeared + watch.disappeared) / (watch.drone_s / 60.0)
+    return ratio(2 * (run.links.appeared + run.links.disappeared), run.links.drone_s / 60.0)
 
 
 @metric("s", "mean life of a link: time of all links per link that ended; empty: none ended")
 def link_life_s(run: RunRecord) -> float:
-    watch = run.links
-    return NAN if watch is None or not watch.disappeared else watch.link_s / watch.disappeared
+    return ratio(run.links.link_s, run.links.disappeared)
 
 
 @metric("share", "time of live routers with any path to a gateway over existing links")
 def reachable(run: RunRecord) -> float:
-    watch = run.links
-    return NAN if watch is None or not watch.router_s else watch.reachable_s / watch.router_s
+    return ratio(run.links.reachable_s, run.links.router_s)
 
 
 @metric("share", "time of these routers in which they are served", better="more")
 def served(run: RunRecord) -> float:
-    watch = run.links
-    return NAN if watch is None or not watch.reachable_s else watch.served_s / watch.reachable_s
+    return ratio(run.links.served_s, run.links.reachable_s)
 
 
 @metric("share", "the same share at the worst of 20 moments (5th percentile)", better="more")
 def served_p5(run: RunRecord) -> float:
-    return _percentile([] if run.links is None else run.links.service.shares, 0.05)
+    return _percentile(run.links.service.shares, 0.05)
 
 
 @metric("share", "the same share, median over time", better="more")
 def served_p50(run: RunRecord) -> float:
-    return _percentile([] if run.links is None else run.links.service.shares, 0.5)
+    return _percentile(run.links.service.shares, 0.5)
 
 
 @metric("s", "median time that a router has a path and is not served", better="less")
 def lapse_p50_s(run: RunRecord) -> float:
-    return _percentile([] if run.links is None else run.links.service.lapses_s, 0.5)
+    return _percentile(run.links.service.lapses_s, 0.5)
 
 
 @metric("s", "99th percentile of these times", better="less")
 def lapse_p99_s(run: RunRecord) -> float:
-    return _percentile([] if run.links is None else run.links.service.lapses_s, 0.99)
+    return _percentile(run.links.service.lapses_s, 0.99)
 
 
 @metric("share", "connected routers of those with a path at the worst of 20 moments", better="more")
 def connected_p5(run: RunRecord) -> float:
-    return _percentile([] if run.links is None else run.links.connection.shares, 0.05)
+    return _percentile(run.links.connection.shares, 0.05)
 
 
 @metric("share", "the same share, median over time", better="more")
 def connected_p50(run: RunRecord) -> float:
-    return _percentile([] if run.links is None else run.links.connection.shares, 0.5)
+    return _percentile(run.links.connection.shares, 0.5)
 
 
 @metric("s", "median time that a router has a path and is not connected", better="less")
 def unconnected_p50_s(run: RunRecord) -> float:
-    return _percentile([] if run.links is None else run.links.connection.lapses_s, 0.5)
+    return _percentile(run.links.connection.lapses_s, 0.5)
 
 
 @metric("s", "99th percentile of these times", better="less")
 def unconnected_p99_s(run: RunRecord) -> float:
-    return _percentile([] if run.links is None else run.links.connection.lapses_s, 0.99)
+    return _percentile(run.links.connection.lapses_s, 0.99)
 
 
 @metric(
@@ -108,22 +102,17 @@ def delay_p95_ms(run: RunRecord) -> float:
 
 @metric("hops", "mean hops of an echo beyond the shortest path at its time", better="less")
 def detours(run: RunRecord) -> float:
-    more = [probe.hops - probe.shortest for probe in run.probes if probe.hops is not None]
-    return statistics.fmean(more) if more else NAN
+    return mean(probe.hops - probe.shortest for probe in run.probes if probe.hops is not None)
 
 
 @metric("1/s", "frames per drone and second, acknowledgements included; shared radio only")
 def frame_rate(run: RunRecord) -> float:
-    if run.frames is None:
-        return NAN
-    return sum(run.frames.values()) / run.end_s / len(run.start.places)
+    return NAN if run.frames is None else per_drone_and_s(run, sum(run.frames.values()))
 
 
 @metric("1/s", "of these, frames that carry no data of users", better="less")
 def control_frame_rate(run: RunRecord) -> float:
-    if run.frames is None:
-        return NAN
-    return run.frames["control"] / run.end_s / len(run.start.places)
+    return NAN if run.frames is None else per_drone_and_s(run, run.frames["control"])
 
 
 def _percentile(values: Sequence[float], share: float) -> float:
@@ -137,7 +126,4 @@ def _delays_ms(run: RunRecord) -> list[float]:
 
 
 def _arrived(run: RunRecord, kind: str) -> float:
-    probes = [probe for probe in run.probes if probe.kind == kind]
-    if not probes:
-        return NAN
-    return sum(probe.delay_s is not None for probe in probes) / len(probes)
+    return mean(probe.delay_s is not None for probe in run.probes if probe.kind == kind)

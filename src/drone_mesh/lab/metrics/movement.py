@@ -39,17 +39,17 @@ def distance_mean_m(run: RunRecord) -> float:
 
 @metric("drones", "drones that flew", better="less")
 def moved(run: RunRecord) -> float:
-    return float(len(_flown(run)))
+    return len(_flown(run))
 
 
 @metric("", "take-offs", better="less")
 def flights(run: RunRecord) -> float:
-    return float(sum(leg.is_start for leg in run.legs))
+    return sum(leg.is_start for leg in run.legs)
 
 
 @metric("", "flights that a router decided on although it had a path to a gateway", better="less")
 def false_flights(run: RunRecord) -> float:
-    return float(sum(leg.had_path for leg in run.legs))
+    return sum(leg.had_path for leg in run.legs)
 
 
 @metric("s", "time in flight of all drones", better="less")
@@ -70,7 +70,7 @@ def displacement_max_m(run: RunRecord) -> float:
 
 @metric("drones", "live drones more than 1 m from where they started", better="less")
 def displaced(run: RunRecord) -> float:
-    return float(sum(metres > DISPLACED_M for metres in _displacements(run)))
+    return sum(metres > DISPLACED_M for metres in _displacements(run))
 
 
 def _displacements(run: RunRecord) -> list[float]:
@@ -84,7 +84,7 @@ def _displacements(run: RunRecord) -> list[float]:
     "", "pairs of live drones nearer than 0.3 m at some time, one of them in flight", better="less"
 )
 def collisions(run: RunRecord) -> float:
-    return float(run.collisions)
+    return run.collisions
 
 
 @metric("m", "smallest distance of a drone in flight to another; empty: no flight", better="more")
@@ -96,7 +96,7 @@ def min_distance_m(run: RunRecord) -> float:
     "drones", "live drones within 0.3 m of another at the end, and not at the start", better="less"
 )
 def stacked(run: RunRecord) -> float:
-    return float(len(_stacked(run.end, run.end.graph) - _stacked(run.start, run.end.graph)))
+    return len(_stacked(run.end, run.end.graph) - _stacked(run.start, run.end.graph))
 
 
 def _stacked(scene: Topology, alive: Graph) -> set[int]:
@@ -133,4 +133,4 @@ def astray(run: RunRecord) -> float:
 
 @metric("", "flights that an obstacle did not allow", better="less")
 def flights_blocked(run: RunRecord) -> float:
-    return float(run.refused_flights)
+    return run.refused_flights

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Callable, NamedTuple
+from typing import Callable, Iterable, NamedTuple
 
 from drone_mesh.lab.record import RunRecord
 
@@ -44,7 +44,23 @@ def unit_of(column: str) -> str:
 
 def measure_all(record: RunRecord) -> dict[str, float]:
     """Every metric of a run, by name."""
-    return {name: metric.measure(record) for name, metric in METRICS.items()}
+    return {name: float(metric.measure(record)) for name, metric in METRICS.items()}
+
+
+def ratio(part: float, whole: float) -> float:
+    """NaN if there is no whole."""
+    return part / whole if whole else NAN
+
+
+def mean(values: Iterable[float]) -> float:
+    """NaN if there are no values."""
+    found = list(values)
+    return ratio(sum(found), len(found))
+
+
+def per_drone_and_s(record: RunRecord, count: float) -> float:
+    """This count of a whole run, per drone and second."""
+    return count / record.end_s / len(record.start.places)
 
 
 def metric(unit: str, definition: str, **about: object) -> Callable[[Measure], Measure]:

@@ -6,38 +6,38 @@ from typing import Sequence
 
 import numpy as np
 
-from drone_mesh.lab.metrics.registry import NAN, metric
+from drone_mesh.lab.metrics.registry import mean, metric
 from drone_mesh.lab.record import RunRecord, Topology
 
 
 @metric("parts", "connected parts right before the fault (or at the start)")
 def parts_before(run: RunRecord) -> float:
-    return float(len(_before(run).graph.parts()))
+    return len(_before(run).graph.parts())
 
 
 @metric("parts", "connected parts at the end", better="less")
 def parts_after(run: RunRecord) -> float:
-    return float(len(run.end.graph.parts()))
+    return len(run.end.graph.parts())
 
 
 @metric("hops", "mean length of the routes in use right before the fault")
 def hops_mean_before(run: RunRecord) -> float:
-    return _mean(_before(run).route_hops.values())
+    return mean(_before(run).route_hops.values())
 
 
 @metric("hops", "mean length of the routes in use at the end", better="less")
 def hops_mean_after(run: RunRecord) -> float:
-    return _mean(run.end.route_hops.values())
+    return mean(run.end.route_hops.values())
 
 
 @metric("hops", "longest route in use right before the fault")
 def hops_max_before(run: RunRecord) -> float:
-    return float(max(_before(run).route_hops.values(), default=0))
+    return max(_before(run).route_hops.values(), default=0)
 
 
 @metric("hops", "longest route in use at the end", better="less")
 def hops_max_after(run: RunRecord) -> float:
-    return float(max(run.end.route_hops.values(), default=0))
+    return max(run.end.route_hops.values(), default=0)
 
 
 @metric(
@@ -48,7 +48,7 @@ def hops_max_after(run: RunRecord) -> float:
 )
 def stretch(run: RunRecord) -> float:
     shortest = run.end.graph.hops_from(sorted(run.gateways))
-    return _mean(
+    return mean(
         hops / shortest[node] for node, hops in run.end.route_hops.items() if shortest.get(node)
     )
 
@@ -86,8 +86,3 @@ def covered(points: Sequence[Sequence[float]], range_m: float) -> int:
 
 def _before(run: RunRecord) -> Topology:
     return run.start if run.before is None else run.before
-
-
-def _mean(values: object) -> float:
-    found = list(values)  # type: ignore[call-overload]
-    return sum(found) / len(found) if found else NAN

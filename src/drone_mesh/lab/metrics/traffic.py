@@ -7,9 +7,19 @@ import statistics
 from drone_mesh.communication.data.ticket import TicketState
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.packet_types import MessageType
-from drone_mesh.lab.metrics.registry import METRICS, NAN, Metric, metric
+from drone_mesh.lab.impairments import Traffic
+from drone_mesh.lab.metrics.registry import (
+    METRICS,
+    NAN,
+    Metric,
+    mean,
+    metric,
+    per_drone_and_s,
+    ratio,
+)
 from drone_mesh.lab.record import RunRecord
 
+NO_TRAFFIC = Traffic()
 DELIVERED_WITHIN_S = 10.0  # an order that arrives later counts as lost
 
 
@@ -19,12 +29,12 @@ DELIVERED_WITHIN_S = 10.0  # an order that arrives later counts as lost
     better="less",
 )
 def packets(run: RunRecord) -> float:
-    return float(sum(one.own + one.forwarded for one in run.traffic.values()))
+    return sum(one.own + one.forwarded for one in run.traffic.values())
 
 
 @metric("1/s", "packets per drone and second", better="less")
 def packet_rate(run: RunRecord) -> float:
-    return packets(run) / run.end_s / len(run.start.places)
+    return per_drone_and_s(run, packets(run))
 
 
 @metric("bytes", "32 bytes for each of these packets", better="less")
@@ -41,33 +51,32 @@ def air_load(run: RunRecord) -> float:
 
 @metric("frames", "receptions that another frame destroyed; shared radio only", better="less")
 def frames_destroyed(run: RunRecord) -> float:
-    return NAN if run.air is None else float(run.air.destroyed)
+    return NAN if run.air is None else run.air.destroyed
 
 
 @metric("", "tries of the driver per packet with a receiver; shared radio only", better="less")
 def tries_per_packet(run: RunRecord) -> float:
-    return NAN if run.air is None or not run.air.sent else run.air.tries / run.air.sent
+    return NAN if run.air is None else ratio(run.air.tries, run.air.sent)
 
 
 @metric("packets", "packets that the driver gave up; shared radio only", better="less")
 def given_up(run: RunRecord) -> float:
-    return NAN if run.air is None else float(run.air.given_up)
+    return NAN if run.air is None else run.air.given_up
 
 
 @metric("", "flight orders that were given")
 def orders(run: RunRecord) -> float:
-    return float(len(run.orders))
+    return len(run.orders)
 
 
 @metric("share", "orders whose drone set out within 10 s; empty: no orders", better="more")
 def order_delivery(run: RunRecord) -> float:
-    return sum(d is not None for d in _order_delays(run)) / len(run.orders) if run.orders else NAN
+    return mean(d is not None for d in _order_delays(run))
 
 
 @metric("share", "orders whose drone set out within 2 s; empty: no orders", better="more")
 def order_prompt(run: RunRecord) -> float:
-    delays = _order_delays(run)
-    return sum(d is not None and d <= 2.0 for d in delays) / len(delays) if delays else NAN
+    return mean(d is not None and d <= 2.0 for d in _order_delays(run))
 
 
 @metric("", "orders that neither arrived nor were reported as lost by the gateway", better="less")
@@ -77,15 +86,13 @@ def orders_unreported(run: RunRecord) -> float:
         for event in run.events
         if event.kind == MeshEventKind.NO_ROUTE.value and event.node in run.gateways
     ]
-    return float(
-        sum(
-            delay is None
-            and not any(
-                order.node in peers and 0.0 <= stamp_s - order.at_s <= DELIVERED_WITHIN_S
-                for stamp_s, peers in reported
-            )
-            for order, delay in zip(run.orders, _order_delays(run))
+    return sum(
+        delay is None
+        and not any(
+            order.node in peers and 0.0 <= stamp_s - order.at_s <= DELIVERED_WITHIN_S
+            for stamp_s, peers in reported
         )
+        for order, delay in zip(run.orders, _order_delays(run))
     )
 
 
@@ -109,12 +116,9 @@ def data_rate(run: RunRecord) -> float:
     "share", "users' messages that arrived; reliable ones: as their sender knows", better="more"
 )
 def data_delivered(run: RunRecord) -> float:
-    if not run.tickets:
-        return NAN
-    if run.tickets[0].reliable:
-        known = sum(ticket.state is TicketState.DELIVERED for ticket in run.tickets)
-        return known / len(run.tickets)
-    return len(run.received) / len(run.tickets)
+    if run.tickets and run.tickets[0].reliable:
+        return mean(ticket.state is TicketState.DELIVERED for ticket in run.tickets)
+    return ratio(len(run.received), len(run.tickets))
 
 
 def _order_delays(run: RunRecord) -> list[float | None]:
@@ -145,8 +149,7 @@ def _note_traffic() -> None:
         ):
 
             def count(run: RunRecord, kind: int = int(kind), attribute: str = attribute) -> float:
-                traffic = run.traffic.get(kind)
-                return 0.0 if traffic is None else float(getattr(traffic, attribute))
+                return float(getattr(run.traffic.get(kind, NO_TRAFFIC), attribute))
 
             METRICS[f"{name}_{word}"] = Metric(
                 "packets", f"packets of this type {words}, tries included", count, "less",

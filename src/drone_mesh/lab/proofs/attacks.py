@@ -1,13 +1,13 @@
 """Attacks on a mesh that an outsider with one radio can make (docs/security.md, "Attacks").
 
 Each function here is one attack. It is called once the mesh is connected, takes as much simulated
-time as it needs, and returns where the owner has ordered drones meanwhile.
+time as it needs, and notes in `stranger.ordered` where the owner sends drones meanwhile.
 """
 
 from __future__ import annotations
 
 import random
-from typing import Callable, Dict, Mapping
+from typing import Callable, Mapping
 
 from drone_mesh.communication.interfaces import BROADCAST
 from drone_mesh.communication.messages import (
@@ -35,27 +35,25 @@ FAR = Location(4900.0, 4900.0, 0.0)  # 6.9 km away, within the bounds for goals
 HERE, THERE = Location(-5.0, 2.0, 0.0), Location(-2.0, -4.0, 0.0)  # of two orders of the owner
 LARGEST_BID, PLAUSIBLE_BID = 1e9, 100.0
 
-Attack = Callable[[Stranger], Dict[int, Location]]
+Attack = Callable[[Stranger], None]
 
 
-def order_gateway_away(stranger: Stranger) -> dict[int, Location]:
+def order_gateway_away(stranger: Stranger) -> None:
     """Send one order to fly to the gateway's own drone."""
     _order(stranger, 0, 0)
     stranger.network.run_for(ATTACK_S)
-    return {}
 
 
-def order_all_away(stranger: Stranger) -> dict[int, Location]:
+def order_all_away(stranger: Stranger) -> None:
     """Send an order to fly to each drone, far ones first."""
     near = stranger.in_range()
     for node in sorted(stranger.network.nodes, reverse=True):
         _order(stranger, node if node in near else near[-1], node)
         stranger.network.run_for(0.1)
     stranger.network.run_for(ATTACK_S)
-    return {}
 
 
-def false_gateway(stranger: Stranger) -> dict[int, Location]:
+def false_gateway(stranger: Stranger) -> None:
     """Claim to be a gateway and answer each heartbeat."""
     me = stranger.node_id
 
@@ -65,22 +63,18 @@ def false_gateway(stranger: Stranger) -> dict[int, Location]:
             stranger.say(MessageType.HEARTBEAT, me, from_, creator, bytes((1, me, 0)))
 
     stranger.on_packet = answer
-    for _ in stranger.every(1.0, ATTACK_S):
-        for node in stranger.in_range():
-            stranger.say(MessageType.HEARTBEAT, me, node, node, bytes((1, me, 0)))
-    return {}
+    for node in stranger.targets(1.0, ATTACK_S):
+        stranger.say(MessageType.HEARTBEAT, me, node, node, bytes((1, me, 0)))
 
 
-def black_hole(stranger: Stranger) -> dict[int, Location]:
+def black_hole(stranger: Stranger) -> None:
     """Introduce the radio as the best route to the gateway, and forward nothing."""
     me = stranger.node_id
-    for _ in stranger.every(1.0, ATTACK_S):
-        for node in stranger.in_range():
-            stranger.say(MessageType.PRESENT, me, node, BROADCAST, bytes((0, 1)))
-    return {}
+    for node in stranger.targets(1.0, ATTACK_S):
+        stranger.say(MessageType.PRESENT, me, node, BROADCAST, bytes((0, 1)))
 
 
-def swallowing_relay(stranger: Stranger) -> dict[int, Location]:
+def swallowing_relay(stranger: Stranger) -> None:
     """Act as a relay that answers and forwards heartbeats, and drops all other packets of others.
 
     In a mesh without a key, and among captured nodes, it is the router on most routes; otherwise it
@@ -88,30 +82,26 @@ def swallowing_relay(stranger: Stranger) -> dict[int, Location]:
     """
     stranger.swallow_as_relay()
     stranger.network.run_for(SWALLOWING_S)
-    return {}
 
 
-def missing_storm(stranger: Stranger) -> dict[int, Location]:
+def missing_storm(stranger: Stranger) -> None:
     """Report once a second, with each id as sender, that the gateway is missing."""
-    for _ in stranger.every(1.0, ATTACK_S):
-        for node in stranger.in_range():
-            for creator in stranger.network.nodes:
-                if creator != node:
-                    stranger.say(MessageType.MISSING, creator, node, node, bytes((0,)))
-    return {}
+    for node in stranger.targets(1.0, ATTACK_S):
+        for creator in stranger.network.nodes:
+            if creator != node:
+                stranger.say(MessageType.MISSING, creator, node, node, bytes((0,)))
 
 
-def invented_ids(stranger: Stranger) -> dict[int, Location]:
+def invented_ids(stranger: Stranger) -> None:
     """Send ten heartbeats a second, each from another invented node."""
     chance = random.Random(stranger.node_id)
     for _ in stranger.every(0.1, ATTACK_S):
         creator = chance.randrange(100, 250)
         for node in stranger.in_range():
             stranger.say(MessageType.HEARTBEAT, creator, node, node, bytes((0, 255, 0)))
-    return {}
 
 
-def borrowed_names(stranger: Stranger) -> dict[int, Location]:
+def borrowed_names(stranger: Stranger) -> None:
     """Send 20 frames a second that open for nobody, in the names of its living neighbours."""
     chance = random.Random(stranger.node_id)
     for _ in stranger.every(0.05, ATTACK_S):
@@ -119,10 +109,9 @@ def borrowed_names(stranger: Stranger) -> dict[int, Location]:
         victim, name = chance.sample(near, 2)
         frame = packet(MessageType.HEARTBEAT, name, name, victim, victim, bytes((0, 255, 0)))
         stranger.play(victim, frame[:-1] + b"\1")
-    return {}
 
 
-def far_place(stranger: Stranger) -> dict[int, Location]:
+def far_place(stranger: Stranger) -> None:
     """Claim that the gateway is far away, in its name and as hearsay; then it is off."""
     own_word = LocationMessage.BODY.pack(FAR.latitude, FAR.longitude, 0, 0)
     hearsay = body(GatewayPlace(0, FAR, 0.0).to_payload(0, 0, 0, 0))
@@ -136,10 +125,9 @@ def far_place(stranger: Stranger) -> dict[int, Location]:
     stranger.network.run_for(OUTAGE_S)
     stranger.network.power(0, True)
     stranger.network.run_for(ATTACK_S)
-    return {}
 
 
-def jammed_requests(stranger: Stranger) -> dict[int, Location]:
+def jammed_requests(stranger: Stranger) -> None:
     """Destroy all requests for places, and nothing else."""
     air = stranger.network.air
     assert isinstance(air, InProcessAir)
@@ -147,48 +135,44 @@ def jammed_requests(stranger: Stranger) -> dict[int, Location]:
         air.carries = lambda payload: payload[TYPE_AT] != MessageType.REQUESTLOCATION
     stranger.network.run_for(SWALLOWING_S)
     air.carries = None
-    return {}
 
 
-def highest_bid(stranger: Stranger) -> dict[int, Location]:
+def highest_bid(stranger: Stranger) -> None:
     """Cut off the drones behind node 1, and send a higher bid than theirs every 3 s."""
-    return _bid(stranger, LARGEST_BID)
+    _bid(stranger, LARGEST_BID)
 
 
-def plausible_bid(stranger: Stranger) -> dict[int, Location]:
+def plausible_bid(stranger: Stranger) -> None:
     """The same, with bids that a real drone could make."""
-    return _bid(stranger, PLAUSIBLE_BID)
+    _bid(stranger, PLAUSIBLE_BID)
 
 
-def _bid(stranger: Stranger, score: float) -> dict[int, Location]:
+def _bid(stranger: Stranger, score: float) -> None:
     stranger.network.power(1, False)
     body = MovementNegotiationMessage.BODY.pack(score)
     for bid, _ in enumerate(stranger.every(3.0, BIDDING_S)):
         for node in stranger.in_range():
             absent = 100 + bid % 100
             stranger.say(MessageType.MOVEMENT_NEGOTIATION, absent, node, node, body)
-    return {}
 
 
-def replayed_order(stranger: Stranger) -> dict[int, Location]:
+def replayed_order(stranger: Stranger) -> None:
     """The owner sends drone 1 away and back; a second later its first order is replayed."""
-    return _replay(stranger, lambda: None)
+    _replay(stranger, 1, _recorded_order(stranger))
 
 
-def replay_after_restart(stranger: Stranger) -> dict[int, Location]:
+def replay_after_restart(stranger: Stranger) -> None:
     """The same, but drone and gateway restart before the order is replayed."""
-
-    def restart() -> None:
-        for node in (1, 0):
-            stranger.network.restart(node)
-        stranger.network.run_for(15.0)
-
-    return _replay(stranger, restart)
+    order = _recorded_order(stranger)
+    for node in (1, 0):
+        stranger.network.restart(node)
+    stranger.network.run_for(15.0)
+    _replay(stranger, 1, order)
 
 
-def replay_on_another_path(stranger: Stranger) -> dict[int, Location]:
+def replay_on_another_path(stranger: Stranger) -> None:
     """The same, but the order is replayed through another neighbour of the drone."""
-    return _replay(stranger, lambda: None, through=6)
+    _replay(stranger, 6, readdressed(_recorded_order(stranger), 6))
 
 
 ATTACKS: Mapping[str, Attack] = {
@@ -222,9 +206,8 @@ def _order(stranger: Stranger, to: int, forward: int) -> None:
     stranger.say(MessageType.MOVE_TO_LOCATION, stranger.node_id, to, forward, body)
 
 
-def _replay(
-    stranger: Stranger, meanwhile: Callable[[], None], through: int | None = None
-) -> dict[int, Location]:
+def _recorded_order(stranger: Stranger) -> bytes:
+    """The owner sends drone 1 away and back; returns the first packet of its first order."""
     network = stranger.network
     stranger.listen()
     for place in (HERE, THERE):
@@ -232,13 +215,12 @@ def _replay(
             network.order(1, place.longitude, place.latitude, allow_shared_place=True)
             network.run_until(lambda at=place: network.location(1) == at, within_s=30.0)  # type: ignore[misc]
     network.run_for(15.0)
-    meanwhile()
-    orders = [r for r in stranger.record if r.payload[2] == MessageType.MOVE_TO_LOCATION]
-    first = orders[0].payload
-    network.run_for(1.0)
-    if through is None:
-        stranger.play(1, first)
-    else:
-        stranger.play(through, readdressed(first, through))
-    network.run_for(ATTACK_S)
-    return {1: THERE}
+    stranger.ordered[1] = THERE
+    heard = (recorded.payload for recorded in stranger.record)
+    return next(payload for payload in heard if payload[TYPE_AT] == MessageType.MOVE_TO_LOCATION)
+
+
+def _replay(stranger: Stranger, receiver: int, order: bytes) -> None:
+    stranger.network.run_for(1.0)
+    stranger.play(receiver, order)
+    stranger.network.run_for(ATTACK_S)

@@ -5,6 +5,7 @@ Like those in `attacks`.
 
 from __future__ import annotations
 
+import itertools
 import random
 from typing import Callable
 
@@ -12,7 +13,6 @@ from drone_mesh.communication import messages
 from drone_mesh.communication.beacon.packets import NO_ANCESTORS, Beacon
 from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE
 from drone_mesh.communication.packet_types import MessageType
-from drone_mesh.drone.location import Location
 from drone_mesh.lab.proofs.stranger import Stranger
 
 CLAIMING_S = 60.0
@@ -25,7 +25,7 @@ AHEAD = 10  # numbers of beacons
 BEACON_ROOM = 20  # bytes, also with a seal
 
 
-def far_counter(stranger: Stranger) -> dict[int, Location]:
+def far_counter(stranger: Stranger) -> None:
     """Claim, in a broadcast of each neighbour, a counter that is far ahead of its own.
 
     Epochs travel in the clear, when nodes answer challenges. An outsider has no network key.
@@ -43,83 +43,69 @@ def far_counter(stranger: Stranger) -> dict[int, Location]:
                 if node == name != receiver:
                     claim = messages.readdressed(present, receiver)
                     stranger.play(receiver, stranger.sealed_to_all(claim, epoch, count + FAR_AHEAD))
-    return {}
 
 
-def own_names(stranger: Stranger) -> dict[int, Location]:
+def own_names(stranger: Stranger) -> None:
     """Hand each neighbour packets that it seems to have created itself, as if they came back."""
     for _ in stranger.every(1.0 / CLAIMS_PER_S, CLAIMING_S):
         near = stranger.in_range()
         for place, node in enumerate(near):
-            stranger.pass_on(MessageType.HEARTBEAT, node, near[place - 1], node, 0, b"\1\0\2")
-    return {}
+            stranger.say(MessageType.HEARTBEAT, node, node, 0, b"\1\0\2", relay=near[place - 1])
 
 
-def claimed_nonces(stranger: Stranger) -> dict[int, Location]:
+def claimed_nonces(stranger: Stranger) -> None:
     """Claim nonces at the gateway in the names of drones, while the owner sends eight away."""
-    network, ordered = stranger.network, {}
+    network = stranger.network
     names = [node for node in network.nodes if node]
-    claims = 0
+    kinds = (MessageType.PRESENT, MessageType.HEARTBEAT)
+    claims = itertools.cycle(itertools.product(kinds, names))
     for drone in ORDERED:
         here = network.location(drone)
-        ordered[drone] = goal = here._replace(longitude=here.longitude - ORDERED_M)
+        goal = stranger.ordered[drone] = here._replace(longitude=here.longitude - ORDERED_M)
         network.order(drone, goal.longitude, goal.latitude, allow_shared_place=True)
-        for _ in stranger.every(1.0 / CLAIMS_PER_S, ORDER_PERIOD_S):
-            name = names[claims % len(names)]
-            kind = (MessageType.PRESENT, MessageType.HEARTBEAT)[claims // len(names) % 2]
-            stranger.pass_on(kind, name, name, 0, 0, b"\1\0\1")
-            claims += 1
-    return ordered
+        periods = stranger.every(1.0 / CLAIMS_PER_S, ORDER_PERIOD_S)
+        for _, (kind, name) in zip(periods, claims):
+            stranger.say(kind, name, 0, 0, b"\1\0\1")
 
 
-def beacon_black_hole(stranger: Stranger) -> dict[int, Location]:
+def beacon_black_hole(stranger: Stranger) -> None:
     """Claim in beacons to be beside the gateway, with its next numbers, and forward nothing."""
-    return _beacons(stranger, hops=1, ahead=1)
+    _beacons(stranger, ahead=1)
 
 
-def beacons_ahead(stranger: Stranger) -> dict[int, Location]:
+def beacons_ahead(stranger: Stranger) -> None:
     """Claim numbers that the gateway has not reached yet, so that its own seem old."""
-    return _beacons(stranger, hops=1, ahead=AHEAD)
+    _beacons(stranger, AHEAD)
 
 
-def beacons_in_names(stranger: Stranger) -> dict[int, Location]:
+def beacons_in_names(stranger: Stranger) -> None:
     """Say in beacons of each neighbour that it has no gateway and will be silent for long."""
     lost = Beacon(NO_ROUTE, 0, NO_ROUTE, NO_ROUTE, NO_ANCESTORS, 12.0).to_body(BEACON_ROOM)
     for _ in stranger.every(0.5, CLAIMING_S):
-        near = stranger.in_range()
-        for node in near:
-            for name in near:
-                if name != node:
-                    stranger.pass_on(MessageType.BEACON, name, name, node, BROADCAST, lost)
-    return {}
+        for node, name in itertools.permutations(stranger.in_range(), 2):
+            stranger.say(MessageType.BEACON, name, node, BROADCAST, lost)
 
 
-def _beacons(stranger: Stranger, hops: int, ahead: int) -> dict[int, Location]:
-    stranger.on_packet = newest = _Newest()
-    me = stranger.node_id
-    for _ in stranger.every(0.5, CLAIMING_S):
-        number = (newest.number + ahead) % 256
-        body = Beacon(0, number, hops, 0, NO_ANCESTORS, 0.5).to_body(BEACON_ROOM)
-        for node in stranger.in_range():
-            if node:
-                stranger.say(MessageType.BEACON, me, node, BROADCAST, body)
-    return {}
+def _beacons(stranger: Stranger, ahead: int) -> None:
+    """Send beacons of a node beside the gateway, so many numbers ahead of its newest one."""
+    newest = 0
 
-
-class _Newest:
-    """The newest number in a beacon of the gateway."""
-
-    def __init__(self) -> None:
-        self.number = 0
-
-    def __call__(self, payload: bytes) -> None:
+    def note(payload: bytes) -> None:
+        nonlocal newest
         creator, _from, kind, _to, _forward = messages.header(payload)
         if kind == MessageType.BEACON and creator == 0:
             beacon = Beacon.from_body(messages.body(payload), None)
-            self.number = self.number if beacon is None else beacon.number
+            newest = newest if beacon is None else beacon.number
+
+    stranger.on_packet = note
+    for _ in stranger.every(0.5, CLAIMING_S):
+        body = Beacon(0, (newest + ahead) % 256, 1, 0, NO_ANCESTORS, 0.5).to_body(BEACON_ROOM)
+        for node in stranger.in_range():
+            if node:
+                stranger.say(MessageType.BEACON, stranger.node_id, node, BROADCAST, body)
 
 
-BY_BEACONS: tuple[Callable[[Stranger], dict[int, Location]], ...] = (
+BY_BEACONS: tuple[Callable[[Stranger], None], ...] = (
     beacon_black_hole,
     beacons_ahead,
     beacons_in_names,

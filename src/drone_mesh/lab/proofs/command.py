@@ -76,7 +76,7 @@ def _fuzz(options: argparse.Namespace) -> int:
     for case, key in (("without a key", None), ("with a key", KEY)):
         result = fuzz(options.packets, options.seed, key, progress)
         print(
-            f"{case}: {result.packets} packets, no exception; {result.moved} drones moved, "
+            f"{case}: {options.packets} packets, no exception; {result.moved} drones moved, "
             f"{result.connected} of {NODES - 1} routers connected a minute later",
             flush=True,
         )

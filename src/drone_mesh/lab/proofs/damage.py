@@ -29,6 +29,8 @@ SPACING_M = 6.0
 STRANGER = 200
 LURED_M = 50.0  # farther than any repair flies here
 OFF_ORDER_M = 3.0  # tolerance for a drone that its owner ordered to a place
+SAMPLE_PERIOD_S = 1.0
+RECOVERY_S = 60.0
 _SECRET = b"the key of a lab"
 KEY = MeshKey(_SECRET)
 
@@ -40,9 +42,6 @@ class Threat(enum.Enum):
     WITHOUT_KEY = "without key"
     WITH_KEY = "with key"
     CAPTURED = "captured node"  # with its own keys, in a mesh with a key
-
-
-RECOVERY_S = 60.0
 
 
 class Damage(NamedTuple):
@@ -85,10 +84,16 @@ def trial(name: str, threat: Threat, seed: int) -> Damage:
     stranger.switch_on()
     if threat is Threat.CAPTURED:
         _join_neighbours(stranger)
-    shares = _Sampler(network, stranger.swallows)
-    ordered = attack(stranger)
-    cut_off = shares.mean()
-    lured = _away(network, places, ordered)
+    shares: list[float] = []
+
+    def sample(_: object) -> None:
+        shares.append(share_cut_off(network, stranger.swallows))
+        network.clock.call_at(network.now_s() + SAMPLE_PERIOD_S, sample, None)
+
+    sample(None)
+    attack(stranger)
+    cut_off = statistics.fmean(shares)
+    lured = _away(network, places, stranger.ordered)
     stranger.antenna.stop_antenna()
     network.run_for(RECOVERY_S)
     return Damage(
@@ -96,7 +101,7 @@ def trial(name: str, threat: Threat, seed: int) -> Damage:
     )
 
 
-def share_cut_off(network: Network, swallow: AbstractSet[int] = frozenset()) -> float:
+def share_cut_off(network: Network, swallow: AbstractSet[int]) -> float:
     """The share of powered routers whose packets would not arrive at a gateway.
 
     `swallow`: nodes that drop packets for other nodes; they do not count.
@@ -189,23 +194,3 @@ def _away(
         if goal.distance_m(place) > allowed_m:
             distances.append(goal.distance_m(place))
     return distances
-
-
-class _Sampler:
-    """Samples the mesh once a second."""
-
-    def __init__(self, network: Network, swallow: AbstractSet[int]) -> None:
-        self._network = network
-        self._swallow = swallow
-        self._shares: list[float] | None = []
-        self._sample()
-
-    def mean(self) -> float:
-        """The mean so far; ends the sampling."""
-        shares, self._shares = self._shares, None
-        return statistics.fmean(shares or [0.0])
-
-    def _sample(self, _: object = None) -> None:
-        if self._shares is not None:
-            self._shares.append(share_cut_off(self._network, self._swallow))
-            self._network.clock.call_at(self._network.now_s() + 1.0, self._sample, None)

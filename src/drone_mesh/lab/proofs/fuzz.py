@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import random
 from collections import deque
-from typing import Callable, Iterable, NamedTuple
+from typing import Callable, Iterable, Iterator, NamedTuple
 
 from drone_mesh.communication.interfaces import BROADCAST, PAYLOAD_BYTES
 from drone_mesh.communication.seals.keys import Keys
-from drone_mesh.drone.location import Location
 from drone_mesh.inprocess.network import Network
 from drone_mesh.lab.proofs.stranger import RecordedPacket, Tap
 
@@ -23,7 +22,6 @@ _ROUND = 50  # packets after which simulated time advances
 class FuzzResult(NamedTuple):
     """The state of a mesh after mutated packets."""
 
-    packets: int
     moved: int  # drones that have moved
     connected: int  # routers, a minute after the last packet
 
@@ -46,9 +44,7 @@ def fuzz(
     Raises AssertionError, which quotes the packet, if a node raises an exception.
     """
     rng = random.Random(seed)
-    network = Network(seed, key=key)
-    network.add_fleet(1, NODES - 1, 3, SPACING_M)
-    network.run_until(network.all_connected, within_s=60.0)
+    network = _connected_mesh(seed, key)
     record: list[RecordedPacket] = []
     taps = {node: Tap(network, node, record) for node in network.nodes}
     for node, tap in taps.items():
@@ -60,18 +56,15 @@ def fuzz(
     for node, tap in taps.items():
         network.nodes[node].receiver = tap.tapped
     places = {node: network.location(node) for node in network.nodes}
-    for done in range(packets):
+    for _ in _flood(network, packets, progress):
         receiver, payload = rng.randrange(NODES), mutated(rng.choice(models), rng)
         try:
             network.inject(receiver, payload)
         except Exception as error:
             raise AssertionError(f"packet {payload.hex()} for node {receiver}") from error
-        if done % _ROUND == 0:
-            network.run_for(_ROUND / PACKETS_PER_S)
-        if done % REPORT_EVERY == 0:
-            progress(done)
     network.run_for(60.0)
-    return FuzzResult(packets, _moved(network, places), sum(map(network.connected, places)) - 1)
+    moved = sum(network.location(node) != place for node, place in places.items())
+    return FuzzResult(moved, sum(map(network.connected, places)) - 1)
 
 
 def crowd(
@@ -85,25 +78,34 @@ def crowd(
     Returns what the tables of all nodes held after each half.
     """
     rng = random.Random(seed)
-    network = Network(seed, key=key)
-    network.add_fleet(1, NODES - 1, 3, SPACING_M)
-    network.run_until(network.all_connected, within_s=60.0)
+    network = _connected_mesh(seed, key)
     held = []
-    for done in range(packets):
+    for done in _flood(network, packets, progress):
+        if done == packets // 2:
+            held.append(tables(node.receiver for node in network.nodes.values()))
         receiver = rng.randrange(NODES)
         head = [rng.randrange(254), rng.randrange(254), rng.randrange(256), receiver]
         head.append(rng.choice((receiver, BROADCAST, rng.randrange(254))))
-        network.inject(
-            receiver,
-            bytes(head) + bytes(rng.getrandbits(8) for _ in range(PAYLOAD_BYTES - len(head))),
-        )
+        body = bytes(rng.getrandbits(8) for _ in range(PAYLOAD_BYTES - len(head)))
+        network.inject(receiver, bytes(head) + body)
+    return [*held, tables(node.receiver for node in network.nodes.values())]
+
+
+def _connected_mesh(seed: int, key: Keys | Callable[[int], Keys | None] | None) -> Network:
+    network = Network(seed, key=key)
+    network.add_fleet(1, NODES - 1, 3, SPACING_M)
+    network.run_until(network.all_connected, within_s=60.0)
+    return network
+
+
+def _flood(network: Network, packets: int, progress: Callable[[int], None]) -> Iterator[int]:
+    """Yield the number of each packet; simulated time passes after every _ROUND of them."""
+    for done in range(packets):
+        yield done
         if done % _ROUND == 0:
             network.run_for(_ROUND / PACKETS_PER_S)
         if done % REPORT_EVERY == 0:
             progress(done)
-        if done + 1 in (packets // 2, packets):
-            held.append(tables(node.receiver for node in network.nodes.values()))
-    return held
 
 
 def tables(roots: Iterable[object]) -> Tables:
@@ -134,7 +136,3 @@ def mutated(payload: bytes, rng: random.Random) -> bytes:
     if rng.random() < 0.02:
         return bytes(changed[: rng.randrange(PAYLOAD_BYTES)])
     return bytes(changed) + bytes(rng.random() < 0.01)
-
-
-def _moved(network: Network, places: dict[int, Location]) -> int:
-    return sum(network.location(node) != place for node, place in places.items())

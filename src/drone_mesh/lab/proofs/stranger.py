@@ -75,13 +75,12 @@ class Stranger(IMeshNetwork):
     def __init__(self, network: Network, node_id: int, x: float, y: float) -> None:
         """At (x, y) metres on the ground, with a radio like those of the network."""
         self.node_id = node_id
-        self._x, self._y = x, y
         self.network = network
         self.mute = False  # True: it does nothing
         self.record: list[RecordedPacket] = []
-        self.heard: list[bytes] = []  # packets to its own address
         self.swallows: set[int] = set()  # nodes that drop packets for other nodes
-        self.on_packet: Callable[[bytes], None] = self.heard.append
+        self.ordered: dict[int, Location] = {}  # where the owner sent drones during the attack
+        self.on_packet: Callable[[bytes], object] = len  # called with packets to its own address
         self.drone = InProcessDrone(
             network.clock, Location.from_vector((x, y, 0.0)), lambda _started: None, ""
         )
@@ -124,7 +123,8 @@ class Stranger(IMeshNetwork):
             relay = max(sorted(relays), key=relays.__getitem__)
         else:
             relay = BESIDE
-            network.add_router(relay, self._x, self._y, network.now_s())
+            x, y, _ = self.drone.get_location().to_vector()
+            network.add_router(relay, x, y, network.now_s())
             network.run_for(0.0)
         node = network.nodes[relay]
         node.receiver = Hole(network, relay, [])
@@ -134,30 +134,19 @@ class Stranger(IMeshNetwork):
         """The nodes that can hear it."""
         return sorted(self._air.in_range(self.node_id))
 
-    def say(self, kind: int, creator: int, to: int, forward: int, body: bytes = b"") -> None:
-        """Send a packet of `creator` to the neighbour `to`.
+    def say(
+        self, kind: int, creator: int, to: int, forward: int, body: bytes, relay: int | None = None
+    ) -> None:
+        """Hand the neighbour `to` a packet of `creator` that `relay` (default: it) seems to send.
 
-        A radio without keys impersonates `creator`; a captured node pretends to be its relay.
+        A captured node cannot pose as another sender: it has no key for that, and is the relay.
         """
         if self._is_inside and not self.mute:
             packet = messages.packet(kind, creator, self.node_id, to, forward, body)
             self.antenna.send_message_to(packet)
         else:
-            self.play(to, messages.packet(kind, creator, creator, to, forward, body))
-
-    def pass_on(
-        self, kind: int, creator: int, from_: int, to: int, forward: int, body: bytes
-    ) -> None:
-        """Hand `to` a packet of `creator` that `from_` seems to pass on; a captured node does it.
-
-        A captured node cannot pose as another sender: what it has no key for, it sends itself.
-        """
-        if self._is_inside and not self.mute:
-            self.antenna.send_message_to(
-                messages.packet(kind, creator, self.node_id, to, forward, body)
-            )
-        else:
-            self.play(to, messages.packet(kind, creator, from_, to, forward, body))
+            sender = creator if relay is None else relay
+            self.play(to, messages.packet(kind, creator, sender, to, forward, body))
 
     def epochs(self) -> dict[int, tuple[int, int]]:
         """Epoch and counter of the nodes whose answers to challenges it has recorded."""
@@ -187,6 +176,11 @@ class Stranger(IMeshNetwork):
         while self.network.now_s() < end_s:
             yield
             self.network.run_for(period_s)
+
+    def targets(self, period_s: float, seconds: float) -> Iterator[int]:
+        """Yield each node in range once per period, while simulated time passes."""
+        for _ in self.every(period_s, seconds):
+            yield from self.in_range()
 
     # IMeshNetwork ----------------------------------------------------------------------------
 
