@@ -17,12 +17,12 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Callable, Iterator, Mapping
 
+from arducopter import SAFE, ArduCopter
 from copter_rig import ORIGIN, WORKER
+from pilot_side import PilotSide
 
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.location import Location
-from drone_mesh.raspberry.arducopter import SAFE, ArduCopter
-from drone_mesh.raspberry.pilot_side import PilotSide
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
