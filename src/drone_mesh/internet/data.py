@@ -111,9 +111,9 @@ async def _over(sending: Sending, wait_s: float) -> None:
     """Wait until the node has accepted the message, then for its final state."""
     until_s = time.monotonic() + wait_s
     give_up_s = time.monotonic() + HANDOVER_S  # then `ticket` raises
-    while not sending.is_over:
+    while not sending.over.done():
         now_s = time.monotonic()
-        if now_s >= (until_s if sending.is_taken else give_up_s):
+        if now_s >= (until_s if sending.taken.done() else give_up_s):
             return
         await asyncio.sleep(_POLL_S)
 
