@@ -17,14 +17,18 @@ from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError, MeshError
 from drone_mesh.nrf24.emulator.pcapng import LINKTYPE_PAYLOADS, CapturedPacket, PcapngWriter
 from drone_mesh.nrf24.emulator.wall_clock import WallClock
-from drone_mesh.nrf24.gpio import CePin, GpiodCe, GpiodIrq, IrqPin
+from drone_mesh.nrf24.gpio import CePin, IrqPin
 from drone_mesh.nrf24.settings import DATA_RATES, RadioSettings
-from drone_mesh.nrf24.spi import SpiDevice, open_spi
+from drone_mesh.nrf24.spi import SpiDevice
 from drone_mesh.raspberry import radio_tests, range_test
 from drone_mesh.raspberry.emulated_partner import PARTNER_ID, EmulatedPartner
 from drone_mesh.raspberry.field_radio import FieldRadio
 from drone_mesh.raspberry.node_status import version
-from drone_mesh.raspberry.wiring_options import add_channel_options, add_wiring_options
+from drone_mesh.raspberry.wiring_options import (
+    add_channel_options,
+    add_wiring_options,
+    wired_hardware,
+)
 from drone_mesh.stopping import ends_as
 
 REPORT_ROUNDS = 20
@@ -149,24 +153,13 @@ def _opened(options: argparse.Namespace) -> Iterator[tuple[FieldRadio, IrqPin | 
             partner = EmulatedPartner(clock, settings, Location(0.0, options.emulated, 0.0))
             stack.callback(partner.close)
             chip = partner.other_chip()
-            spi, ce, runtime = chip.spi, chip.ce, clock.runtime
-            irq = chip.irq
+            spi, ce, irq, runtime = chip.spi, chip.ce, chip.irq, clock.runtime
         else:
-            spi, ce, runtime = _hardware(options)
-            irq = None if options.irq is None else GpiodIrq(options.irq)
+            spi, ce, irq = wired_hardware(options).open()
+            runtime = SystemRuntime()
         radio = FieldRadio(spi, ce, options.id, settings, runtime)
         stack.callback(radio.close)
         yield radio, irq
-
-
-def _hardware(options: argparse.Namespace) -> tuple[SpiDevice, CePin, Runtime]:
-    bus, device = options.spi
-    spi = open_spi(bus, device, options.spi_hz)
-    with contextlib.ExitStack() as opened:
-        opened.callback(spi.close)
-        ce = GpiodCe(options.ce)
-        opened.pop_all()
-    return spi, ce, SystemRuntime()
 
 
 def _parser() -> argparse.ArgumentParser:
