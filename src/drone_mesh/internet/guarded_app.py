@@ -7,11 +7,10 @@ Python 3.8.
 import functools
 import logging
 import time
-from typing import Any, Dict, List, Optional, Tuple, Union
+from typing import Any, Dict, Optional, Union
 
-from fastapi import Depends, FastAPI, Request
+from fastapi import APIRouter, Depends, FastAPI, Request
 from fastapi.exceptions import RequestValidationError
-from fastapi.params import Depends as Guard
 from fastapi.responses import JSONResponse
 from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
 from fastapi_offline import FastAPIOffline
@@ -47,14 +46,18 @@ REFUSALS: Responses = {
     414: {"model": Refusal, "description": "Address too long"},
     429: {"model": Refusal, "description": "Too many orders, or wrong tokens; wait 1 s"},
     431: {"model": Refusal, "description": "Headers too large"},
-    503: {"model": Refusal, "description": "Not done; nothing was sent"},
-    504: {"model": Refusal, "description": "Started, but not finished in time"},
 }
 """Possible refusals of any request."""
 
+UNDONE: Responses = {
+    503: {"model": Refusal, "description": "Not done; nothing was sent"},
+    504: {"model": Refusal, "description": "Started, but not finished in time"},
+}
+"""Possible refusals of any request to the gateway's own thread."""
 
-def guarded_app(title: str, description: str, access: Access) -> Tuple[FastAPI, List[Guard]]:
-    """The application, and the dependencies of each operation that needs the token.
+
+def guarded_app(title: str, description: str, access: Access, router: APIRouter) -> FastAPI:
+    """The application; each operation of the router needs the token.
 
     Its page /docs loads nothing from the internet.
     """
@@ -90,7 +93,8 @@ def guarded_app(title: str, description: str, access: Access) -> Tuple[FastAPI, 
             _log.warning("HTTP: refused %s: %s (refusal %d)", address, reason, number)
         raise HTTPException(status, reason, headers=headers)
 
-    return app, [Depends(check_token)]
+    app.include_router(router, dependencies=[Depends(check_token)], responses=REFUSALS)
+    return app
 
 
 def _answer_errors_with_a_reason(app: FastAPI) -> None:
