@@ -13,7 +13,7 @@ from typing import Mapping, Sequence
 from drone_mesh.arguments import whole
 from drone_mesh.console import DEFAULT_PORT
 from drone_mesh.console.frames import FrameStore
-from drone_mesh.console.gateway_client import GatewayClient, GatewayControls, GatewayGone
+from drone_mesh.console.gateway_client import GatewayClient, GatewayControls
 from drone_mesh.console.history import History
 from drone_mesh.console.page_token import PageToken
 from drone_mesh.console.real_mesh import events_of, origin_of, real_mesh
@@ -23,6 +23,7 @@ from drone_mesh.console.tiles import Tiles, open_tiles
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.stopping import StopRequest, ends_as
 from drone_mesh.web import LOOPBACK
+from drone_mesh.web.json_client import NoAnswer
 from drone_mesh.web.listening import MAX_PORT
 
 ASK_PERIOD_S = 1.0  # our choice
@@ -48,7 +49,7 @@ class GatewayFeed:
             origin = origin_of(answer)
             events = events_of(answer)
             last = max((int(event["number"]) for event in answer["events"]), default=self._seen)
-        except GatewayGone as error:
+        except NoAnswer as error:
             self._runner.in_loop(partial(self._store.set_link, str(error)))
             return
         except (ConfigurationError, KeyError, TypeError, ValueError) as error:
