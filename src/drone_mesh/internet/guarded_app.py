@@ -1,4 +1,4 @@
-"""The common base of all nodes' HTTP applications: guard, token, and errors with a reason.
+"""The common base of all nodes' HTTP servers: guard, token, and errors with a reason.
 
 No `from __future__ import annotations` here: FastAPI reads the annotations at run time, also on
 Python 3.8.
@@ -16,15 +16,19 @@ from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
 from fastapi_offline import FastAPIOffline
 from pydantic import BaseModel
 from starlette.exceptions import HTTPException
+from starlette.types import ASGIApp
 from typing_extensions import Annotated
 
 from drone_mesh.communication.throttle import Throttle
 from drone_mesh.errors import GoalRefused, PlaceTaken
 from drone_mesh.internet.asking import AnswerLate, NotCarriedOut
+from drone_mesh.internet.http_settings import HttpSettings
 from drone_mesh.internet.request_guard import RequestGuard
 from drone_mesh.web.access import Access, TooManyGuesses
+from drone_mesh.web.server_thread import ServerThread
 
 REFUSAL_LOG_PERIOD_S = 10.0  # our choice
+MOST_CONNECTIONS = 64  # our choice; further ones get 503
 
 _log = logging.getLogger(__name__)
 
@@ -54,6 +58,22 @@ UNDONE: Responses = {
     504: {"model": Refusal, "description": "Started, but not finished in time"},
 }
 """Possible refusals of any request to the gateway's own thread."""
+
+
+class HttpServer(ServerThread):
+    """Serves the application of one node, in its own thread."""
+
+    def __init__(self, app: ASGIApp, http: HttpSettings) -> None:
+        """Open the port. Raises ConfigurationError if it is not available."""
+        super().__init__(
+            app,
+            http.address,
+            http.port,
+            name="http",
+            certificate=http.certificate,
+            ws="none",
+            limit_concurrency=MOST_CONNECTIONS,
+        )
 
 
 def guarded_app(title: str, description: str, access: Access, router: APIRouter) -> FastAPI:

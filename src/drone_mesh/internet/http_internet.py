@@ -10,7 +10,7 @@ from drone_mesh.drone.geodesy import Origin
 from drone_mesh.internet.api import make_api
 from drone_mesh.internet.asked_watch import AskedWatch
 from drone_mesh.internet.asking import GatewayDesk, Submit
-from drone_mesh.internet.http_server import HttpServer
+from drone_mesh.internet.guarded_app import HttpServer
 from drone_mesh.internet.http_settings import HttpSettings
 from drone_mesh.internet.status import ReadStatus
 from drone_mesh.users.desk import UsersDesk

@@ -8,8 +8,7 @@ from typing import Any, Callable, Dict
 
 from fastapi import APIRouter
 
-from drone_mesh.internet.guarded_app import guarded_app
-from drone_mesh.internet.http_server import HttpServer
+from drone_mesh.internet.guarded_app import HttpServer, guarded_app
 from drone_mesh.internet.http_settings import HttpSettings
 
 ReadStatus = Callable[[], Dict[str, Any]]
