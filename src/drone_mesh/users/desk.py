@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import base64
-import queue
 import threading
+from collections import deque
 from concurrent import futures
 from typing import Callable
 
@@ -88,30 +88,24 @@ class Listener:
     def __init__(self, port: int | None) -> None:
         self._port = port
         self.close: Callable[[], None] = lambda: None  # no more messages
-        self._messages: queue.Queue[ReceivedMessage] = queue.Queue(MOST_UNREAD)
+        self._messages: deque[ReceivedMessage] = deque(maxlen=MOST_UNREAD)
+        self._arrived = threading.Condition()  # guards the messages
         self.dropped = 0  # messages dropped because they were not read in time
 
     def next(self, timeout_s: float) -> ReceivedMessage | None:
         """The next message; None if none arrived in time."""
-        try:
-            return self._messages.get(timeout=timeout_s)
-        except queue.Empty:
-            return None
+        with self._arrived:
+            has_one = self._arrived.wait_for(lambda: len(self._messages) > 0, timeout_s)
+            return self._messages.popleft() if has_one else None
 
     def put(self, message: ReceivedMessage) -> None:
         """Add a message; called on the node's thread."""
         if self._port not in (None, message.port):
             return
-        while True:
-            try:
-                self._messages.put_nowait(message)
-                return
-            except queue.Full:
-                self.dropped += 1
-                try:
-                    self._messages.get_nowait()
-                except queue.Empty:
-                    continue
+        with self._arrived:
+            self.dropped += len(self._messages) == MOST_UNREAD
+            self._messages.append(message)
+            self._arrived.notify()
 
 
 class UsersDesk:
