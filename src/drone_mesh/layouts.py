@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Dict, Mapping, NamedTuple
 
 from drone_mesh.communication.interfaces import MAX_NODE_ID
+from drone_mesh.drone.fleet import ids_in_words
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError, GoalRefused, MeshError
@@ -98,7 +99,7 @@ class Layouts:
         known ones.
         """
         if case not in self._cases:
-            raise UnknownCase(f"unknown case {case}: use one of {_ranges(self.cases)}")
+            raise UnknownCase(f"unknown case {case}: use one of {ids_in_words(self.cases, 3)}")
         return [Order(*item) for item in sorted(self._cases[case].items(), reverse=True)]
 
 
@@ -172,16 +173,3 @@ def _grid_layout() -> Layout:
         )
         for n in range(1, _GRID_DRONES + 1)
     }
-
-
-def _ranges(numbers: list[int]) -> str:
-    """Ascending numbers as ranges: 0..17, 100, 101."""
-    runs: list[list[int]] = []
-    for number in numbers:
-        if runs and number == runs[-1][-1] + 1:
-            runs[-1].append(number)
-        else:
-            runs.append([number])
-    return ", ".join(
-        f"{run[0]}..{run[-1]}" if len(run) > 2 else ", ".join(map(str, run)) for run in runs
-    )
