@@ -19,7 +19,7 @@ from drone_mesh.console.page_token import PageToken
 from drone_mesh.console.real_mesh import events_of, origin_of, real_mesh
 from drone_mesh.console.runner import ConsoleRunner
 from drone_mesh.console.server import ConsoleServer
-from drone_mesh.console.tiles import Tiles, open_tiles
+from drone_mesh.console.tiles import open_tiles
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.stopping import StopRequest, ends_as
 from drone_mesh.web import LOOPBACK
@@ -74,6 +74,31 @@ def main(
     arguments: Sequence[str] | None = None, environment: Mapping[str, str] = os.environ
 ) -> int:
     """Run until Ctrl-C or SIGTERM; the exit status."""
+    options = _parsed(arguments)
+    logging.basicConfig(format="%(levelname)s %(message)s", level="INFO")
+    token = PageToken.needed(options.bind, environment.get(PAGE_TOKEN, ""), f"${PAGE_TOKEN}")
+    with StopRequest() as stop:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, lambda *_: stop.make())
+        client = GatewayClient(options.gateway, environment.get(GATEWAY_TOKEN, ""))
+        tiles = open_tiles(options.tiles) if options.tiles else None
+        store, controls = FrameStore(History()), GatewayControls(client)
+        access = token.access(options.bind)
+        server = ConsoleServer(store, controls, access, actions=controls.ACTIONS, tiles=tiles)
+        runner = ConsoleRunner(server, options.bind, options.port)
+        runner.start()
+        print(token.greeting(options.bind, runner.port), flush=True)
+        feed = GatewayFeed(client, store, runner)
+        try:
+            feed.ask()
+            while not stop.wait(ASK_PERIOD_S):
+                feed.ask()
+        finally:
+            runner.stop()
+    return 0
+
+
+def _parsed(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         "drone_mesh_console",
         description="Serves the web console of a real mesh: it shows the state that the gateway "
@@ -110,37 +135,4 @@ def main(
     options = parser.parse_args(arguments)
     if not options.gateway.startswith(("http://", "https://")):
         parser.error(f"--gateway {options.gateway}: must begin with http:// or https://")
-    logging.basicConfig(format="%(levelname)s %(message)s", level="INFO")
-    token = PageToken.needed(options.bind, environment.get(PAGE_TOKEN, ""), f"${PAGE_TOKEN}")
-    with StopRequest() as stop:
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, lambda *_: stop.make())
-        client = GatewayClient(options.gateway, environment.get(GATEWAY_TOKEN, ""))
-        tiles = open_tiles(options.tiles) if options.tiles else None
-        _serve(client, options.bind, options.port, token, stop, tiles)
-    return 0
-
-
-def _serve(
-    client: GatewayClient,
-    address: str,
-    port: int,
-    token: PageToken,
-    stop: StopRequest,
-    tiles: Tiles | None,
-) -> None:
-    store = FrameStore(History())
-    controls = GatewayControls(client)
-    server = ConsoleServer(
-        store, controls, token.access(address), actions=GatewayControls.ACTIONS, tiles=tiles
-    )
-    runner = ConsoleRunner(server, address, port)
-    runner.start()
-    print(token.greeting(address, runner.port), flush=True)
-    feed = GatewayFeed(client, store, runner)
-    try:
-        feed.ask()
-        while not stop.wait(ASK_PERIOD_S):
-            feed.ask()
-    finally:
-        runner.stop()
+    return options
