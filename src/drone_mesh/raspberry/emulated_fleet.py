@@ -61,7 +61,7 @@ class EmulatedFleet:
 
     def __init__(self, fleet: FleetOptions, flight: FlightOptions, air: EmulatedAir) -> None:
         """Start the simulated vehicles, if there are any; `close` ends them."""
-        self.air = air
+        self._air = air
         self._flight = flight
         self._server = None
         if fleet.drones == GROUND:
@@ -88,7 +88,7 @@ class EmulatedFleet:
         if self._server is not None:
             address = self._server.addresses[node_id]
             flight = dataclasses.replace(flight, drone=f"{MAVLINK}{address}")
-        return create_engine(node_id, self.air.place(node_id), flight)
+        return create_engine(node_id, self._air.place(node_id), flight)
 
     @property
     def origin(self) -> Origin | None:

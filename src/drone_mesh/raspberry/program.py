@@ -97,7 +97,7 @@ class _DebugSwitch:
 def _run(options: Options, request: StopRequest) -> None:
     with contextlib.ExitStack() as stack:
         if options.emulated:
-            nodes = _emulated_nodes(options, _emulated_fleet(options, stack))
+            nodes = _emulated_nodes(options, stack)
         elif options.air.join is not None:
             nodes = [joining_node(options, options.air.join, _orders(options))]
         elif options.air.serve is not None:
@@ -171,15 +171,11 @@ def _real_node(options: Options) -> RadioNode:
     return node
 
 
-def _emulated_fleet(options: Options, stack: contextlib.ExitStack) -> EmulatedFleet:
+def _emulated_nodes(options: Options, stack: contextlib.ExitStack) -> list[RadioNode]:
     air = EmulatedAir(options.radio, options.emulated, options.trace)
     stack.callback(air.close)
     fleet = EmulatedFleet(options.fleet, options.flight, air)
     stack.callback(fleet.close)
-    return fleet
-
-
-def _emulated_nodes(options: Options, fleet: EmulatedFleet) -> list[RadioNode]:
     _log.info("%d nodes on emulated radios; node 0 is the gateway", options.emulated)
     options = dataclasses.replace(
         options, flight=dataclasses.replace(options.flight, origin=fleet.origin)
@@ -188,12 +184,12 @@ def _emulated_nodes(options: Options, fleet: EmulatedFleet) -> list[RadioNode]:
     make_internet = _orders(options) or without_internet
     return [
         RadioNode(
-            fleet.air.radio(node_id, options.radio),
+            air.radio(node_id, options.radio),
             fleet.engine(node_id),
             options,
             None if node_id else make_internet,
             events,
-            partial(fleet.air.move, node_id),
+            partial(air.move, node_id),
         )
         for node_id in range(options.emulated)
     ]
