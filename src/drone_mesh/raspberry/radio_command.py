@@ -154,7 +154,7 @@ def _opened(options: argparse.Namespace) -> Iterator[tuple[FieldRadio, IrqPin | 
         if options.emulated:
             clock = WallClock()
             stack.callback(clock.close)
-            partner = _Partner(clock, settings, Location(0.0, options.emulated, 0.0))
+            partner = EmulatedPartner(clock, settings, Location(0.0, options.emulated, 0.0))
             stack.callback(partner.close)
             chip = partner.other_chip()
             spi, ce, irq, runtime = chip.spi, chip.ce, chip.irq, clock.runtime
@@ -166,7 +166,7 @@ def _opened(options: argparse.Namespace) -> Iterator[tuple[FieldRadio, IrqPin | 
         yield radio, irq
 
 
-class _Partner:
+class EmulatedPartner:
     """Node 1 at this place; it acknowledges what it receives, and follows a range measurement."""
 
     def __init__(self, clock: WallClock, settings: RadioSettings, place: Location) -> None:
