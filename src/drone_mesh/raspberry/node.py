@@ -147,13 +147,7 @@ class RadioNode:
         """The result of `node_status`; any thread may call it."""
         now_s = time.monotonic()
         return node_status(
-            self.component,
-            self.engine,
-            self._antenna.statistics(),
-            self._antenna.link_quality(),
-            self._antenna.on(),
-            now_s - self._started_s,
-            now_s,
+            self.component, self.engine, self._antenna, now_s - self._started_s, now_s
         )
 
     def is_alive(self) -> bool:
