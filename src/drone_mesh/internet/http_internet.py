@@ -10,8 +10,9 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from drone_mesh.communication.interfaces import IGatewayCommands, IInternetConnection
 from drone_mesh.drone.geodesy import Origin
+from drone_mesh.execution import Submit
 from drone_mesh.internet.api import make_api
-from drone_mesh.internet.asking import GatewayDesk, Submit
+from drone_mesh.internet.asking import GatewayDesk
 from drone_mesh.internet.guarded_app import HttpServer
 from drone_mesh.internet.http_settings import HttpSettings
 from drone_mesh.internet.status import ReadStatus

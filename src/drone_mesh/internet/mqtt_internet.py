@@ -33,7 +33,7 @@ from drone_mesh.communication.interfaces import (
 )
 from drone_mesh.communication.observer import MeshEvent
 from drone_mesh.errors import ConfigurationError, MessageRefused, QueueFull
-from drone_mesh.internet.asking import Submit
+from drone_mesh.execution import Submit
 from drone_mesh.internet.mqtt_topics import Broker, Topics
 from drone_mesh.users.desk import UsersDesk
 

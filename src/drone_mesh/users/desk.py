@@ -12,13 +12,11 @@ from drone_mesh.communication.data.echo import EchoAnswer
 from drone_mesh.communication.data.ticket import Ticket, TicketState
 from drone_mesh.communication.data.transport import ReceivedMessage, Receiver, Transport
 from drone_mesh.errors import MessageRefused
+from drone_mesh.execution import Submit
 
 HANDOVER_S = 5.0  # our choice: a node accepts a message within this time
 LONGEST_WAIT_S = 300.0  # our choice: a reliable message is given up before
 MOST_UNREAD = 256  # messages that may wait for a slow listener; the oldest is dropped
-
-Submit = Callable[[Callable[[float], None]], None]
-"""Runs a function, with the time, on the thread that owns the node. Any thread may call it."""
 
 
 def in_json(message: ReceivedMessage) -> dict[str, object]:
