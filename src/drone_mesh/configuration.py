@@ -9,9 +9,10 @@ import reprlib
 from pathlib import Path
 from typing import Any, Literal, Mapping, get_args
 
-from pydantic import ConfigDict, Field, ValidationError, field_validator
+from pydantic import AfterValidator, ConfigDict, Field, ValidationError, field_validator
 from pydantic.dataclasses import dataclass
 from pydantic.fields import FieldInfo
+from typing_extensions import Annotated
 
 from drone_mesh.air.reach import MAX_DISTANCE_M
 from drone_mesh.communication.named_techniques import DEFAULT_ROUTING
@@ -33,6 +34,15 @@ MAX_SEED = 2**32 - 1
 RANDOM_SEED = "random"  # requests a new seed although the file has a fixed one
 
 _log = logging.getLogger(__name__)
+
+
+def _zero_or(lowest: float, highest: float) -> AfterValidator:
+    def check(value: float) -> float:
+        if value != 0 and not lowest <= value <= highest:
+            raise ValueError("out of bounds")
+        return value
+
+    return AfterValidator(check)
 
 
 @dataclass(frozen=True, config=ConfigDict(extra="forbid", str_strip_whitespace=True))
@@ -69,12 +79,14 @@ class FactoryConfiguration:
     ] = Field("none")  # how pilots fly the routers
     speed: float = Field(0.3, gt=0, le=20, description="metres per second")  # of mobility
     shape: Literal["quadrocopter", "box"] = Field("quadrocopter")  # how drones are drawn
-    real_time_factor: float = Field(
-        1.0,
-        description=(
-            f"a factor, {MIN_REAL_TIME_FACTOR:g}..{MAX_REAL_TIME_FACTOR:g}, "
-            "or 0 for as fast as possible"
-        ),
+    real_time_factor: Annotated[float, _zero_or(MIN_REAL_TIME_FACTOR, MAX_REAL_TIME_FACTOR)] = (
+        Field(
+            1.0,
+            description=(
+                f"a factor, {MIN_REAL_TIME_FACTOR:g}..{MAX_REAL_TIME_FACTOR:g}, "
+                "or 0 for as fast as possible"
+            ),
+        )
     )
     max_distance: float = Field(MAX_DISTANCE_M, gt=0, le=10_000, description="metres")
     obstacles: str = Field("", description="the absolute path of a file of boxes, or empty")
@@ -94,11 +106,11 @@ class FactoryConfiguration:
     # where a repair ends if a silent drone may still be at the place; see LostPlace
     lost_place: Literal["beside", "above", "below", "exact"] = Field("beside")
     check_period: float = Field(MeshTiming.check_period_s, ge=0.1, le=3600, description="seconds")
-    connection_lost_after: float = Field(
+    connection_lost_after: Annotated[float, _zero_or(0.1, 3600)] = Field(
         MeshTiming.connection_lost_after_s,
         description="seconds, 0.1..3600, or 0 for those of the routing technique",
     )
-    report_period: float = Field(
+    report_period: Annotated[float, _zero_or(MIN_REPORT_PERIOD_S, 3600)] = Field(
         MeshTiming.report_period_s,
         description=f"seconds, {MIN_REPORT_PERIOD_S:g}..3600, or 0 for no reports",
     )
@@ -109,27 +121,6 @@ class FactoryConfiguration:
     def _not_a_switch_for_a_number(cls, value: object, info: Any) -> object:
         if isinstance(value, bool) and info.field_name not in _SWITCHES:
             raise ValueError("true and false are not numbers")
-        return value
-
-    @field_validator("real_time_factor")
-    @classmethod
-    def _zero_or_in_bounds(cls, value: float) -> float:
-        if value != 0 and not MIN_REAL_TIME_FACTOR <= value <= MAX_REAL_TIME_FACTOR:
-            raise ValueError("out of bounds")
-        return value
-
-    @field_validator("connection_lost_after")
-    @classmethod
-    def _zero_or_a_time(cls, value: float) -> float:
-        if value != 0 and not 0.1 <= value <= 3600:
-            raise ValueError("out of bounds")
-        return value
-
-    @field_validator("report_period")
-    @classmethod
-    def _zero_or_not_too_often(cls, value: float) -> float:
-        if value != 0 and not MIN_REPORT_PERIOD_S <= value <= 3600:
-            raise ValueError("out of bounds")
         return value
 
 

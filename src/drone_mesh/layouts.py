@@ -5,16 +5,20 @@ from __future__ import annotations
 import reprlib
 import sys
 from pathlib import Path
-from typing import Any, Dict, List, Mapping, NamedTuple, Sequence
-
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
-from typing_extensions import Annotated
+from typing import Any, Dict, Mapping, NamedTuple
 
 from drone_mesh.communication.interfaces import MAX_NODE_ID
+from drone_mesh.drone.fleet import ids_in_words
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError, GoalRefused, MeshError
-from drone_mesh.yaml_file import YamlFile, read_mapping, read_mapping_text
+from drone_mesh.yaml_file import (
+    YamlFile,
+    is_number,
+    is_whole_up_to,
+    read_mapping,
+    read_mapping_text,
+)
 
 FIELD_CASE = 0
 GRID_CASE = 100
@@ -95,7 +99,7 @@ class Layouts:
         known ones.
         """
         if case not in self._cases:
-            raise UnknownCase(f"unknown case {case}: use one of {_ranges(self.cases)}")
+            raise UnknownCase(f"unknown case {case}: use one of {ids_in_words(self.cases, 3)}")
         return [Order(*item) for item in sorted(self._cases[case].items(), reverse=True)]
 
 
@@ -112,11 +116,48 @@ def read_layout(text: str, name: str = "the file") -> list[Order]:
 
 
 def _cases(file: YamlFile) -> dict[int, Layout]:
-    try:
-        cases = _LayoutFile.model_validate(file.content).cases
-    except ValidationError as error:
-        raise _refusal(file, error.errors()) from None
+    for key in file.content:
+        if key != "cases":
+            raise ConfigurationError(f"{file.where(key)}: unknown key {key}: expected only 'cases'")
+    cases = file.content.get("cases")
+    if not isinstance(cases, dict):
+        raise ConfigurationError(
+            f"{file.where('cases')}: expected 'cases:' with one layout per case number"
+        )
+    for case in cases:
+        if not is_whole_up_to(case, MAX_CASE):
+            raise ConfigurationError(
+                f"{file.where('cases', case)}: invalid case {case!r}: "
+                f"must be a whole number 0..{MAX_CASE}"
+            )
     return {case: _layout(file, case, places) for case, places in cases.items()}
+
+
+def _layout(file: YamlFile, case: int, places: Any) -> Layout:
+    if not isinstance(places, dict) or not places:
+        raise ConfigurationError(
+            f"{file.where('cases', case)}: case {case}: "
+            "expected 'node id: [longitude, latitude, height]' lines"
+        )
+    layout: Layout = {}
+    for node_id, place in places.items():
+        where = file.where("cases", case, node_id)
+        if not is_whole_up_to(node_id, MAX_NODE_ID):
+            raise ConfigurationError(
+                f"{where}: case {case}: invalid node id {node_id!r}: must be 0..{MAX_NODE_ID}"
+            )
+        if not (isinstance(place, list) and len(place) == 3 and all(map(is_number, place))):
+            raise ConfigurationError(
+                f"{where}: case {case}, drone {node_id}: invalid place {reprlib.repr(place)}: "
+                "expected three numbers [longitude, latitude, height]"
+            )
+        longitude, latitude, height = map(float, place)
+        try:
+            check_goal(latitude, longitude, height)
+        except GoalRefused as error:
+            raise ConfigurationError(f"{where}: case {case}, drone {node_id}: {error}") from error
+        layout[node_id] = Location(latitude, longitude, height)
+    return layout
 
 
 def _field_layout() -> Layout:
@@ -132,76 +173,3 @@ def _grid_layout() -> Layout:
         )
         for n in range(1, _GRID_DRONES + 1)
     }
-
-
-_Places = Dict[
-    Annotated[int, Field(ge=0, le=MAX_NODE_ID)],
-    Annotated[List[float], Field(min_length=3, max_length=3)],
-]
-_Cases = Dict[Annotated[int, Field(ge=0, le=MAX_CASE)], Annotated[_Places, Field(min_length=1)]]
-
-
-class _LayoutFile(BaseModel):
-    """The schema of a file like config/casus.yaml; `check_goal` checks the positions."""
-
-    model_config = ConfigDict(extra="forbid", strict=True)  # "1", 1.0 and true are not ids
-
-    cases: _Cases
-
-
-def _refusal(file: YamlFile, found: Sequence[Any]) -> ConfigurationError:
-    """The error for the first problem that pydantic found."""
-    unknown = [error["loc"][0] for error in found if error["type"] == "extra_forbidden"]
-    if unknown:
-        where = file.where(unknown[0])
-        return ConfigurationError(f"{where}: unknown key {unknown[0]}: expected only 'cases'")
-    loc = found[0]["loc"]
-    is_key = loc[-1] == "[key]"  # the key itself is wrong; the element before this is its text
-    keys = (*loc[:-2], found[0]["input"]) if is_key else loc
-    where = file.where(*keys)
-    if len(keys) == 1:
-        return ConfigurationError(f"{where}: expected 'cases:' with one layout per case number")
-    case = keys[1]
-    if len(keys) == 2 and is_key:
-        return ConfigurationError(
-            f"{where}: invalid case {case!r}: must be a whole number 0..{MAX_CASE}"
-        )
-    if len(keys) == 2:
-        return ConfigurationError(
-            f"{where}: case {case}: expected 'node id: [longitude, latitude, height]' lines"
-        )
-    node_id = keys[2]
-    if is_key:
-        return ConfigurationError(
-            f"{where}: case {case}: invalid node id {node_id!r}: must be 0..{MAX_NODE_ID}"
-        )
-    place = reprlib.repr(file.content["cases"][case][node_id])
-    return ConfigurationError(
-        f"{where}: case {case}, drone {node_id}: invalid place {place}: "
-        "expected three numbers [longitude, latitude, height]"
-    )
-
-
-def _layout(file: YamlFile, case: int, places: Mapping[int, Sequence[float]]) -> Layout:
-    layout: Layout = {}
-    for node_id, (longitude, latitude, height) in places.items():
-        try:
-            check_goal(latitude, longitude, height)
-        except GoalRefused as error:
-            where = file.where("cases", case, node_id)
-            raise ConfigurationError(f"{where}: case {case}, drone {node_id}: {error}") from error
-        layout[node_id] = Location(latitude=latitude, longitude=longitude, height=height)
-    return layout
-
-
-def _ranges(numbers: list[int]) -> str:
-    """Ascending numbers as ranges: 0..17, 100, 101."""
-    runs: list[list[int]] = []
-    for number in numbers:
-        if runs and number == runs[-1][-1] + 1:
-            runs[-1].append(number)
-        else:
-            runs.append([number])
-    return ", ".join(
-        f"{run[0]}..{run[-1]}" if len(run) > 2 else ", ".join(map(str, run)) for run in runs
-    )

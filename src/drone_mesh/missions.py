@@ -6,12 +6,12 @@ import reprlib
 from pathlib import Path
 from typing import Any, Callable, NamedTuple, Sequence
 
-from drone_mesh.drone.fleet import MAX_DRONES
+from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.drone.flight_path import Vector
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.errors import ConfigurationError, GoalRefused
 from drone_mesh.mobility.pilot import TrackPilot, along
-from drone_mesh.yaml_file import YamlFile, read_mapping
+from drone_mesh.yaml_file import YamlFile, is_number, is_whole_up_to, read_mapping
 
 MOST_WAYPOINTS = 1000  # our choice
 MAX_SPEED_M_S = 20.0  # our choice
@@ -77,8 +77,8 @@ def _read(file: YamlFile, index: int, row: Any) -> tuple[list[int], Mission]:
 
     drones = value("drones", "a list of ids", lambda v: _is_list(v, _is_id))
     places = value("waypoints", "a list of [x, y] in metres", lambda v: _is_list(v, _is_point))
-    height = value("height", "a number of metres", _is_number, 3.0)
-    speed = value("speed", "a number of metres per second", _is_number, 0.5)
+    height = value("height", "a number of metres", is_number, 3.0)
+    speed = value("speed", "a number of metres per second", is_number, 0.5)
     loop = value("loop", "true or false", lambda v: isinstance(v, bool), True)
     waypoints = [(float(x), float(y), float(height)) for x, y in places]
     mission = Mission(waypoints, float(speed), loop)
@@ -89,16 +89,12 @@ def _read(file: YamlFile, index: int, row: Any) -> tuple[list[int], Mission]:
     return drones, mission
 
 
-def _is_number(value: object) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
-
-
 def _is_id(value: object) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool) and 0 <= value < MAX_DRONES
+    return is_whole_up_to(value, MAX_NODE_ID)
 
 
 def _is_point(value: object) -> bool:
-    return isinstance(value, list) and len(value) == 2 and all(map(_is_number, value))
+    return isinstance(value, list) and len(value) == 2 and all(map(is_number, value))
 
 
 def _is_list(value: object, fits: Callable[[object], bool]) -> bool:

@@ -46,6 +46,16 @@ class YamlFile:
         return str(self.path)
 
 
+def is_number(value: object) -> bool:
+    """Whether this value in a file is a number; true and false are not."""
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def is_whole_up_to(value: object, most: int) -> bool:
+    """Whether this value in a file is a whole number 0..`most`."""
+    return isinstance(value, int) and not isinstance(value, bool) and 0 <= value <= most
+
+
 def read_mapping(path: str | Path, limited: bool = True) -> YamlFile:
     """Read this file like read_mapping_text; also raises ConfigurationError if unreadable."""
     return read_mapping_text(read_text(path, limited), path, limited)

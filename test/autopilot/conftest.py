@@ -17,7 +17,7 @@ collect_ignore_glob = [] if "ARDUCOPTER" in os.environ else ["test_*.py"]
 @pytest.fixture(scope="session")
 def program() -> tuple[Path, Path]:
     """The binary and its parameter file."""
-    from drone_mesh.raspberry.arducopter import program_from_environment
+    from arducopter import program_from_environment
 
     return program_from_environment()
 

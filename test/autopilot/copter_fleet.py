@@ -17,12 +17,12 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Callable, Iterator, Mapping
 
+from arducopter import SAFE, ArduCopter
 from copter_rig import ORIGIN, WORKER
+from pilot_side import PilotSide
 
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.location import Location
-from drone_mesh.raspberry.arducopter import SAFE, ArduCopter
-from drone_mesh.raspberry.pilot_side import PilotSide
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -87,7 +87,7 @@ class Fleet:
         for pilot in self.pilots.values():
             pilot.make_ready(READY_S / pace)
         serving = ("--emulated-air-serve", str(self._air), "--port", str(self._http))
-        self._start("gateway", "raspberry.gateway", *serving, *NODE_OPTIONS)
+        self._start("gateway", "raspberry.program:gateway", *serving, *NODE_OPTIONS)
         self.until("the gateway answers", lambda: bool(self.ask("ready")))
         for node in homes:
             self.start_router(node)
@@ -114,7 +114,7 @@ class Fleet:
 
     def start_router(self, node: int) -> None:
         self.routers[node] = self._start(
-            *(f"router{node}", "raspberry.router", "--id", str(node)),
+            *(f"router{node}", "raspberry.program:router", "--id", str(node)),
             *("--emulated-air", str(self._air), "--drone", f"mavlink:{self.copters[node].address}"),
             *(*self._flight_options, *NODE_OPTIONS),
         )
@@ -225,7 +225,7 @@ class Fleet:
         port = free_port()
         gateway = f"http://127.0.0.1:{self._http}"
         options = ("--gateway", gateway, "--port", str(port))
-        console = self._start("console", "console.gateway_command", *options)
+        console = self._start("console", "console.gateway_command:main", *options)
         self.watch_for(5.0 * self._pace)
         with sync_playwright() as playwright:
             browser = playwright.chromium.launch(
@@ -238,9 +238,10 @@ class Fleet:
             browser.close()
         console.kill()
 
-    def _start(self, name: str, module: str, *options: str) -> subprocess.Popen[bytes]:
+    def _start(self, name: str, program: str, *options: str) -> subprocess.Popen[bytes]:
+        module, _, main = program.partition(":")
         slow = f"import time; real = time.monotonic; time.monotonic = lambda: {self._pace} * real()"
-        code = f"import sys; {slow}; from drone_mesh.{module} import main; sys.exit(main())"
+        code = f"import sys; {slow}; from drone_mesh.{module} import {main}; sys.exit({main}())"
         with (self._folder / f"{name}.log").open("ab") as log:
             process = subprocess.Popen(
                 [sys.executable, "-c", code, *options],

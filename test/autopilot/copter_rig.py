@@ -10,12 +10,13 @@ from pathlib import Path
 from types import TracebackType
 from typing import Mapping
 
+from arducopter import GCS_TIMEOUT_S, SAFE, ArduCopter
+from pilot_side import PilotSide
+
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.engine import MavlinkEngine
 from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions
-from drone_mesh.raspberry.arducopter import GCS_TIMEOUT_S, SAFE, ArduCopter
-from drone_mesh.raspberry.pilot_side import PilotSide
 
 ORIGIN = Origin(52.0907, 5.1214, 3.0)
 ALL = Permissions(may_arm=True, may_take_off=True, may_change_mode=True)

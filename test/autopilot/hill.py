@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Final
 
 from copter_rig import ORIGIN
+from pilot_side import PilotSide
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from drone_mesh.drone.geodesy import EarthPlace
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.telemetry import Message
-from drone_mesh.raspberry.pilot_side import PilotSide
 
 SPACING_M = 10  # of the heights
 SQUARES_EAST = 8  # of a request, each of 4 x 4 heights; seven from south to north

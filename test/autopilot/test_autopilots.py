@@ -10,8 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
-
-from drone_mesh.raspberry.pilot_side import PilotSide, PilotSideError
+from pilot_side import PilotSide, PilotSideError
 
 ROOT = Path(__file__).resolve().parents[2]
 PILOTS_PORT = 5762  # of the first copter
@@ -22,7 +21,7 @@ def test_a_ready_copter_is_left_to_its_pilot_and_ctrl_c_leaves_nothing_behind(
     program: tuple[Path, Path], tmp_path: Path
 ) -> None:
     with subprocess.Popen(
-        [sys.executable, "-m", "drone_mesh.raspberry.autopilots", "1"],
+        [sys.executable, str(ROOT / "test" / "autopilot" / "autopilots.py"), "1"],
         env={**os.environ, "PYTHONPATH": str(ROOT / "src"), "TMPDIR": str(tmp_path)},
         stdout=subprocess.PIPE,
         text=True,

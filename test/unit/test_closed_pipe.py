@@ -15,21 +15,22 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.mark.parametrize(
-    ("module", "arguments"),
+    ("main", "arguments"),
     [
-        ("raspberry.radio_command", ["--help"]),
-        ("raspberry.radio_command", ["test", "--emulated"]),
-        ("raspberry.status_command", ["--help"]),
-        ("raspberry.key_command", ["--help"]),
-        ("users.ping_command", ["--help"]),
-        ("users.send_command", ["--help"]),
-        ("lab.command", ["--help"]),
+        ("raspberry.radio_command:main", ["--help"]),
+        ("raspberry.radio_command:main", ["test", "--emulated"]),
+        ("raspberry.status_command:main", ["--help"]),
+        ("raspberry.key_command:main", ["--help"]),
+        ("users.commands:ping", ["--help"]),
+        ("users.commands:send", ["--help"]),
+        ("lab.command:main", ["--help"]),
     ],
 )
-def test_a_reader_that_has_closed_the_pipe_is_no_error(module, arguments):
+def test_a_reader_that_has_closed_the_pipe_is_no_error(main, arguments):
+    module, _, function = main.partition(":")
     reader, writer = os.pipe()
     os.close(reader)
-    code = f"import sys; from drone_mesh.{module} import main; sys.exit(main())"
+    code = f"import sys; from drone_mesh.{module} import {function}; sys.exit({function}())"
     ended = subprocess.run(
         [sys.executable, "-c", code, *arguments],
         env={**os.environ, "PYTHONPATH": str(ROOT / "src")},

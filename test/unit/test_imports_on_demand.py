@@ -77,7 +77,7 @@ def test_a_program_does_not_load_what_only_others_need(program: str, unwanted: s
     assert loaded_by(ROOT / "nodes" / program) & unwanted == set()
 
 
-@pytest.mark.parametrize("module", ["raspberry.router", "raspberry.gateway", "inprocess.network"])
+@pytest.mark.parametrize("module", ["raspberry.program", "inprocess.network"])
 def test_no_web_server_is_in_memory_before_it_is_asked_for(module: str) -> None:
     code = f"import sys, drone_mesh.{module}; print(*sys.modules)"
     done = subprocess.run(

@@ -33,7 +33,7 @@ from drone_mesh.communication.messages import (
     sender,
 )
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.execution import PacketInbox
+from drone_mesh.execution import PacketInbox, Submit
 
 logger = logging.getLogger(__name__)
 
@@ -41,9 +41,6 @@ RECEIVE_TIMEOUT_S = 0.1  # our choice: how soon the receiving thread notices its
 DEBUG_PERIOD_S = 10.0  # our choice: one line per check period
 POWER_WANTED_S = 1.0  # our choice: longer than the pause between two questions of a repair
 DUPLICATE_S = 0.5  # our choice: the same bytes again within this time are a duplicate
-
-Submit = Callable[[Callable[[float], None]], None]
-"""Run a function, with now_s, on the thread that owns the node."""
 
 
 class PacketAntenna(IWirelessCommunication):

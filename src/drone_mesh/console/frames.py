@@ -70,12 +70,14 @@ class FrameStore:
         self._lost_links = LostLinks()
         self._forecast = LinkForecast()
         self._orders = OrderWatch()
-        self._story: tuple[int, Mapping[str, Any]] = (0, {})
         self._alarms = AlarmBook()
-        self._shown_alarms: tuple[int, list[dict[str, Any]]] = (0, [])
         self._run_began_at = 0
-        self._obstacles: list[dict[str, Any]] = []
-        self._obstacles_at = 0
+        # What is sent complete: the version in which it changed, and the content.
+        self._complete: dict[str, tuple[int, Any]] = {
+            "obstacles": (0, []),
+            "alarms": (0, []),
+            "story": (0, {}),
+        }
         self._cache: dict[int, str] = {}
 
     def update_mesh(
@@ -114,9 +116,7 @@ class FrameStore:
             del self._nodes[gone]
             del self._changed_at[gone]
             self._gone_at[gone] = self.version
-        obstacles = [_obstacle(box) for box in mesh.obstacles]
-        if obstacles != self._obstacles:
-            self._obstacles, self._obstacles_at = obstacles, self.version
+        self._replace("obstacles", [_obstacle(box) for box in mesh.obstacles])
         slots = fan_out(mesh.nodes)
         for node in mesh.nodes:
             fields = _fields(node, troubles.get(node.id))
@@ -125,7 +125,7 @@ class FrameStore:
         for node_id, fields in self._links(mesh, wall_s).items():
             self._update_node(node_id, fields)
         self._alarms.update(mesh)
-        self._show_alarms()
+        self._replace("alarms", self._alarms.groups())
         if wall_s - self._sampled_at_s >= SAMPLE_PERIOD_S and not mesh.paused:
             self._sampled_at_s = wall_s
             self._samples.append((self.version, take_sample(mesh)))
@@ -136,7 +136,7 @@ class FrameStore:
         self._next_version()
         self._orders.take(events)
         self._alarms.take(events)
-        self._show_alarms()
+        self._replace("alarms", self._alarms.groups())
         if self.history is not None:
             self.history.add_events(events)
         for event in events:
@@ -168,13 +168,8 @@ class FrameStore:
         """Somebody has seen all alarms with this text; returns how many."""
         seen = self._alarms.acknowledge(text)
         self._next_version()
-        self._show_alarms()
+        self._replace("alarms", self._alarms.groups())
         return seen
-
-    def _show_alarms(self) -> None:
-        groups = self._alarms.groups()
-        if groups != self._shown_alarms[1]:
-            self._shown_alarms = self.version, groups
 
     def _show_orders(self) -> None:
         self._next_version()
@@ -200,9 +195,9 @@ class FrameStore:
 
     def set_story(self, story: Mapping[str, Any]) -> None:
         """Set the story of a demonstration for the pages; empty: none."""
-        if story != self._story[1]:
+        if story != self._complete["story"][1]:
             self._next_version()
-            self._story = self.version, story
+            self._replace("story", story)
 
     def set_link(self, text: str) -> None:
         """Set the reason why no states arrive, as text for the page; empty: they do."""
@@ -247,18 +242,13 @@ class FrameStore:
             if max(self._changed_at[node].values()) > version
         }:
             frame["nodes"] = nodes
-        if self._obstacles_at > version:
-            frame["obstacles"] = self._obstacles
         if gone := [node for node, at in self._gone_at.items() if at > version]:
             frame["gone"] = gone
         if events := [event for at, event in self._events if at > version]:
             frame["events"] = events[-EVENTS_PER_FRAME:]
         if samples := [asdict(sample) for at, sample in self._samples if at > version]:
             frame["samples"] = samples
-        if self._shown_alarms[0] > version:
-            frame["alarms"] = self._shown_alarms[1]
-        if self._story[0] > version:
-            frame["story"] = self._story[1]
+        frame.update({part: what for part, (at, what) in self._complete.items() if at > version})
         return frame
 
     def _links(self, mesh: MeshStatus, wall_s: float) -> dict[int, dict[str, str]]:
@@ -289,6 +279,10 @@ class FrameStore:
             if key not in known or known[key] != value:
                 known[key] = value
                 changed_at[key] = self.version
+
+    def _replace(self, part: str, content: Any) -> None:
+        if content != self._complete[part][1]:
+            self._complete[part] = self.version, content
 
     def _next_version(self) -> None:
         self.version += 1

@@ -7,14 +7,9 @@ from types import MappingProxyType
 from typing import Any
 
 from drone_mesh.console.controls import MeshControls, OrderRefused
-from drone_mesh.errors import MeshError
 from drone_mesh.web.json_client import NoAnswer, ask_json
 
 ANSWER_WITHIN_S = 5.0  # our choice: the gateway itself answers within two seconds
-
-
-class GatewayGone(MeshError):
-    """The gateway does not answer, or its answer is invalid; the text gives details."""
 
 
 class GatewayClient:
@@ -26,25 +21,22 @@ class GatewayClient:
         self._token = token
 
     def mesh(self, after: int) -> dict[str, Any]:
-        """The mesh as the gateway reports it, with events after this number. Raises GatewayGone."""
+        """The mesh as the gateway reports it, with events after this number. Raises NoAnswer."""
         answer = self._ask("GET", f"/mesh?after={after}")
         if not isinstance(answer, dict) or "nodes" not in answer:
-            raise GatewayGone(f"{self.url} is not a gateway of this version")
+            raise NoAnswer(f"{self.url} is not a gateway of this version")
         return answer
 
     def order(
         self, drone: int, latitude: float, longitude: float, height: int, allow_shared_place: bool
     ) -> None:
-        """Send a drone to a position in metres. Raises GatewayGone with the gateway's reason."""
+        """Send a drone to a position in metres. Raises NoAnswer with the gateway's reason."""
         body = {"latitude": latitude, "longitude": longitude, "height": height}
         shared = "?allow_shared_place=true" if allow_shared_place else ""
         self._ask("POST", f"/drones/{drone}/goal{shared}", json.dumps(body).encode())
 
     def _ask(self, method: str, path: str, body: bytes | None = None) -> Any:
-        try:
-            return ask_json(f"{self.url}{path}", ANSWER_WITHIN_S, self._token, method, body)
-        except NoAnswer as error:
-            raise GatewayGone(str(error)) from error
+        return ask_json(f"{self.url}{path}", ANSWER_WITHIN_S, self._token, method, body)
 
 
 ONLY_SIMULATED = "layouts and formations exist only in the simulation"
@@ -76,6 +68,6 @@ class GatewayControls(MeshControls):
         """Order a drone to a place, through the mesh."""
         try:
             self._client.order(node, y, x, round(z), allow_shared_place)
-        except GatewayGone as error:
+        except NoAnswer as error:
             raise OrderRefused(str(error)) from error
         return f"ordered drone {node} to x {x:g}, y {y:g}, z {round(z)} m"

@@ -13,16 +13,17 @@ from typing import Mapping, Sequence
 from drone_mesh.arguments import whole
 from drone_mesh.console import DEFAULT_PORT
 from drone_mesh.console.frames import FrameStore
-from drone_mesh.console.gateway_client import GatewayClient, GatewayControls, GatewayGone
+from drone_mesh.console.gateway_client import GatewayClient, GatewayControls
 from drone_mesh.console.history import History
 from drone_mesh.console.page_token import PageToken
 from drone_mesh.console.real_mesh import events_of, origin_of, real_mesh
 from drone_mesh.console.runner import ConsoleRunner
 from drone_mesh.console.server import ConsoleServer
-from drone_mesh.console.tiles import Tiles, open_tiles
+from drone_mesh.console.tiles import open_tiles
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.stopping import StopRequest, ends_as
 from drone_mesh.web import LOOPBACK
+from drone_mesh.web.json_client import NoAnswer
 from drone_mesh.web.listening import MAX_PORT
 
 ASK_PERIOD_S = 1.0  # our choice
@@ -48,7 +49,7 @@ class GatewayFeed:
             origin = origin_of(answer)
             events = events_of(answer)
             last = max((int(event["number"]) for event in answer["events"]), default=self._seen)
-        except GatewayGone as error:
+        except NoAnswer as error:
             self._runner.in_loop(partial(self._store.set_link, str(error)))
             return
         except (ConfigurationError, KeyError, TypeError, ValueError) as error:
@@ -73,6 +74,31 @@ def main(
     arguments: Sequence[str] | None = None, environment: Mapping[str, str] = os.environ
 ) -> int:
     """Run until Ctrl-C or SIGTERM; the exit status."""
+    options = _parsed(arguments)
+    logging.basicConfig(format="%(levelname)s %(message)s", level="INFO")
+    token = PageToken.needed(options.bind, environment.get(PAGE_TOKEN, ""), f"${PAGE_TOKEN}")
+    with StopRequest() as stop:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, lambda *_: stop.make())
+        client = GatewayClient(options.gateway, environment.get(GATEWAY_TOKEN, ""))
+        tiles = open_tiles(options.tiles) if options.tiles else None
+        store, controls = FrameStore(History()), GatewayControls(client)
+        access = token.access(options.bind)
+        server = ConsoleServer(store, controls, access, actions=controls.ACTIONS, tiles=tiles)
+        runner = ConsoleRunner(server, options.bind, options.port)
+        runner.start()
+        print(token.greeting(options.bind, runner.port), flush=True)
+        feed = GatewayFeed(client, store, runner)
+        try:
+            feed.ask()
+            while not stop.wait(ASK_PERIOD_S):
+                feed.ask()
+        finally:
+            runner.stop()
+    return 0
+
+
+def _parsed(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         "drone_mesh_console",
         description="Serves the web console of a real mesh: it shows the state that the gateway "
@@ -109,37 +135,4 @@ def main(
     options = parser.parse_args(arguments)
     if not options.gateway.startswith(("http://", "https://")):
         parser.error(f"--gateway {options.gateway}: must begin with http:// or https://")
-    logging.basicConfig(format="%(levelname)s %(message)s", level="INFO")
-    token = PageToken.needed(options.bind, environment.get(PAGE_TOKEN, ""), f"${PAGE_TOKEN}")
-    with StopRequest() as stop:
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, lambda *_: stop.make())
-        client = GatewayClient(options.gateway, environment.get(GATEWAY_TOKEN, ""))
-        tiles = open_tiles(options.tiles) if options.tiles else None
-        _serve(client, options.bind, options.port, token, stop, tiles)
-    return 0
-
-
-def _serve(
-    client: GatewayClient,
-    address: str,
-    port: int,
-    token: PageToken,
-    stop: StopRequest,
-    tiles: Tiles | None,
-) -> None:
-    store = FrameStore(History())
-    controls = GatewayControls(client)
-    server = ConsoleServer(
-        store, controls, token.access(address), actions=GatewayControls.ACTIONS, tiles=tiles
-    )
-    runner = ConsoleRunner(server, address, port)
-    runner.start()
-    print(token.greeting(address, runner.port), flush=True)
-    feed = GatewayFeed(client, store, runner)
-    try:
-        feed.ask()
-        while not stop.wait(ASK_PERIOD_S):
-            feed.ask()
-    finally:
-        runner.stop()
+    return options

@@ -6,19 +6,17 @@ import bisect
 import math
 import pickle
 import zlib
-from dataclasses import fields, replace
 from typing import Any, Iterable, Sequence
 
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.console.dots import RecordedDots
-from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
+from drone_mesh.state.model import EventRecord, MeshStatus
 from drone_mesh.state.outages import MeshSample, take_sample
 
 KEPT_S = 1800.0  # simulated
 KEPT_BYTES = 64_000_000  # our choice; 254 nodes with 200 neighbours each need some 20 kB per state
 PERIOD_S = 0.4  # wall, between two states of a live run
 MOST_MARKS = 400
-_NODE_FIELDS = [field.name for field in fields(NodeStatus)]
 _MARKED = {
     MeshEventKind.POWER_OFF.value: "off",
     MeshEventKind.POWER_ON.value: "on",
@@ -29,10 +27,8 @@ _MARKED = {
 
 def unpacked(state: bytes) -> MeshStatus:
     """A state that a History keeps. Any thread."""
-    mesh: MeshStatus
-    mesh, rows = pickle.loads(zlib.decompress(state))
-    nodes = [NodeStatus(**dict(zip(_NODE_FIELDS, row))) for row in rows]
-    return replace(mesh, nodes=nodes)
+    mesh: MeshStatus = pickle.loads(zlib.decompress(state))
+    return mesh
 
 
 class History:
@@ -132,8 +128,7 @@ class History:
         return self._samples[: bisect.bisect_right(self.times, at_s)]
 
     def _append(self, mesh: MeshStatus) -> None:
-        rows = [[getattr(node, name) for name in _NODE_FIELDS] for node in mesh.nodes]
-        packed = zlib.compress(pickle.dumps((replace(mesh, nodes=()), rows)), 1)
+        packed = zlib.compress(pickle.dumps(mesh), 1)
         self._states.append(packed)
         self._bytes += len(packed)
         self.times.append(mesh.stamp_s)

@@ -78,10 +78,15 @@ class _Request(BaseModel):
     model_config = ConfigDict(strict=True, frozen=True)  # "3" is not a node, 1 not a switch
 
 
-class PageOrder(_Request, abc.ABC):
-    """One order of one page; the answer carries the same `number`."""
+class _Answered(_Request):
+    """What has an answer, which carries the same `number`."""
 
     number: int = Field(ge=0, le=MAX_ORDER_NUMBER)
+
+
+class PageOrder(_Answered, abc.ABC):
+    """One order of one page."""
+
     heard: HeardOrNone = None
 
     @abc.abstractmethod
@@ -198,11 +203,10 @@ class _Pilots(PageOrder):
         return controls.pilots(self.action)
 
 
-class ReadPlaces(_Request):
+class ReadPlaces(_Answered):
     """The page sends a file and asks for the positions of its drones."""
 
     do: Literal["places"]
-    number: int = Field(ge=0, le=MAX_ORDER_NUMBER)
     name: str = Field("the file", max_length=300)
     text: str = Field(max_length=MAX_CHARACTERS)
 
@@ -225,11 +229,10 @@ def _content_of(found: Placemarks) -> FileContent:
     )
 
 
-class PreviewLayout(_Request):
+class PreviewLayout(_Answered):
     """The page asks what would happen if it ordered a layout now."""
 
     do: Literal["preview"]
-    number: int = Field(ge=0, le=MAX_ORDER_NUMBER)
     case: int = Field(ge=0, le=MAX_CASE)
 
 
@@ -240,21 +243,19 @@ class NeighbourWatch(_Request):
     node: NodeOrNone
 
 
-class Demonstrate(_Request):
+class Demonstrate(_Answered):
     """Begin or end the demonstration of a repair, or ask what it would do (`plan`)."""
 
     do: Literal["demonstrate"]
-    number: int = Field(ge=0, le=MAX_ORDER_NUMBER)
     heard: HeardOrNone = None
     on: bool
     plan: bool = False
 
 
-class Acknowledge(_Request):
+class Acknowledge(_Answered):
     """Somebody has seen the alarms with this text."""
 
     do: Literal["acknowledge"]
-    number: int = Field(ge=0, le=MAX_ORDER_NUMBER)
     text: str = Field(max_length=300)
 
 
@@ -281,7 +282,11 @@ class _Numbered(_Request):
 
 
 Request = Union[
-    PageOrder,
+    _Power,
+    _Fly,
+    _Layout,
+    _Formation,
+    _Speed,
     NeighbourWatch,
     PacketWatch,
     Demonstrate,
@@ -289,31 +294,13 @@ Request = Union[
     PreviewLayout,
     TimeLine,
     Acknowledge,
+    _Add,
+    _Remove,
+    _Mission,
+    _Pilots,
 ]
 
-_REQUESTS: TypeAdapter[Request] = TypeAdapter(
-    Annotated[
-        Union[
-            _Power,
-            _Fly,
-            _Layout,
-            _Formation,
-            _Speed,
-            NeighbourWatch,
-            PacketWatch,
-            Demonstrate,
-            ReadPlaces,
-            PreviewLayout,
-            TimeLine,
-            Acknowledge,
-            _Add,
-            _Remove,
-            _Mission,
-            _Pilots,
-        ],
-        Field(discriminator="do"),
-    ]
-)
+_REQUESTS: TypeAdapter[Request] = TypeAdapter(Annotated[Request, Field(discriminator="do")])
 
 
 def parse_request(text: str) -> Request:

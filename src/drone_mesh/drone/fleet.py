@@ -24,15 +24,18 @@ class StartPlace(NamedTuple):
     latitude: float  # y, metres
 
 
-def ids_in_words(ids: Iterable[int]) -> str:
-    """For example: 0..3, 5."""
+def ids_in_words(ids: Iterable[int], shortest_run: int = 2) -> str:
+    """For example: 0..3, 5. Shorter runs are named one by one."""
     runs: list[list[int]] = []
     for node_id in sorted(ids):
         if runs and node_id == runs[-1][1] + 1:
             runs[-1][1] = node_id
         else:
             runs.append([node_id, node_id])
-    return ", ".join(str(a) if a == b else f"{a}..{b}" for a, b in runs)
+    return ", ".join(
+        f"{a}..{b}" if b - a + 1 >= shortest_run else ", ".join(map(str, range(a, b + 1)))
+        for a, b in runs
+    )
 
 
 def plan_fleet(

@@ -9,7 +9,7 @@ import math
 import time
 from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple, Union
 
-from fastapi import FastAPI, Path, Query, Response
+from fastapi import APIRouter, FastAPI, Path, Query, Response
 from pydantic import BaseModel, BeforeValidator, Discriminator, Field, Tag
 from starlette.exceptions import HTTPException
 from typing_extensions import Annotated
@@ -21,11 +21,11 @@ from drone_mesh.drone.geodesy import EarthPlace, Origin
 from drone_mesh.drone.goal import MAX_COORDINATE_M, MAX_HEIGHT_M
 from drone_mesh.drone.location import Location
 from drone_mesh.internet.asking import GatewayDesk
-from drone_mesh.internet.data import add_data_requests
-from drone_mesh.internet.guarded_app import REFUSALS, Refusal, Responses, guarded_app
+from drone_mesh.internet.data import data_requests
+from drone_mesh.internet.guarded_app import UNDONE, Refusal, Responses, guarded_app
 from drone_mesh.internet.numbers import DecimalDigits, WholeDigits
-from drone_mesh.internet.orders import add_order_requests
-from drone_mesh.internet.status import ReadStatus, add_status_request
+from drone_mesh.internet.orders import order_requests
+from drone_mesh.internet.status import ReadStatus, status_request
 from drone_mesh.users.desk import UsersDesk
 from drone_mesh.web.access import Access
 from drone_mesh.web.allowance import Allowance
@@ -154,35 +154,25 @@ def make_api(
     status, from any thread; `mesh` runs on the gateway's thread and returns what it knows of all
     nodes, with the events after a number. `users` sends and receives messages.
     """
-    app, guards = guarded_app(
-        "drone_mesh gateway",
-        "Sends drones to places and lists the nodes that this gateway knows.",
-        access,
-    )
-    refusals = REFUSALS
+    router = APIRouter(responses=UNDONE)
     order_refusals: Responses = {
-        **refusals,
         409: {"model": Refusal, "description": "The place of another drone, or no origin"},
         422: {"model": Refusal, "description": "Invalid drone id or place"},
     }
 
-    @app.get("/ready", dependencies=guards, responses=refusals)
+    @router.get("/ready")
     async def ready() -> Ready:
         """Whether the gateway is running; answered by its own thread."""
         return await desk.ask(
             lambda gateway, _now_s: Ready(ready=True, gateway=gateway.get_node_id())
         )
 
-    @app.get("/nodes", dependencies=guards, responses=refusals)
+    @router.get("/nodes")
     async def nodes() -> NodeRoutes:
         """The nodes known to the gateway, and its routes to them."""
         return await desk.ask(_routes_of)
 
-    @app.post(
-        "/DroneMovement/{id}/{latitude}/{longitude}/{height}",
-        dependencies=guards,
-        responses=order_refusals,
-    )
+    @router.post("/DroneMovement/{id}/{latitude}/{longitude}/{height}", responses=order_refusals)
     async def move_drone(
         id: DroneId,
         latitude: Coordinate,
@@ -196,9 +186,8 @@ def make_api(
         await send(id, place, response, allow_shared_place)
         return OrderSent(drone=id, latitude=latitude, longitude=longitude, height=height)
 
-    @app.post(
+    @router.post(
         "/drones/{id}/goal",
-        dependencies=guards,
         responses={
             **order_refusals,
             400: {"model": Refusal, "description": "The body is not text"},
@@ -254,23 +243,10 @@ def make_api(
         if log_lines.count(f"drone {drone}", time.monotonic()):
             _log.info("drone %d: order sent, to %s", drone, place.in_words())
 
-    not_found: Responses = {
-        404: {"model": Refusal, "description": "No such order, or no longer remembered"},
-        422: {"model": Refusal, "description": "Invalid number"},
-    }
-    add_order_requests(app, desk, guards, refusals, {**refusals, **not_found})
-
-    if users is not None:
-        bad_message: Responses = {
-            422: {"model": Refusal, "description": "Invalid node, port or message"}
-        }
-        add_data_requests(app, users, guards, {**refusals, **bad_message})
-    if status is not None:
-        add_status_request(app, guards, status)
     if mesh is not None:
         read_mesh = mesh
 
-        @app.get("/mesh", dependencies=guards, responses=order_refusals)
+        @router.get("/mesh", responses=order_refusals)
         async def whole_mesh(
             after: Annotated[
                 int, Query(ge=0, description="Events with higher numbers."), WholeDigits
@@ -279,7 +255,19 @@ def make_api(
             """All nodes as they reported themselves, and their events: for the web console."""
             return await desk.ask(lambda _gateway, _now_s: read_mesh(after))
 
-    return app
+    all_requests = APIRouter()
+    all_requests.include_router(router)
+    all_requests.include_router(order_requests(desk))
+    if users is not None:
+        all_requests.include_router(data_requests(users))
+    if status is not None:
+        all_requests.include_router(status_request(status))
+    return guarded_app(
+        "drone_mesh gateway",
+        "Sends drones to places and lists the nodes that this gateway knows.",
+        access,
+        all_requests,
+    )
 
 
 def _routes_of(gateway: IGatewayCommands, now_s: float) -> NodeRoutes:

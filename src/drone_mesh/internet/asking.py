@@ -9,9 +9,7 @@ from typing import Any, Callable, TypeVar
 
 from drone_mesh.communication.interfaces import IGatewayCommands
 from drone_mesh.errors import MeshError
-
-Submit = Callable[[Callable[[float], None]], None]
-"""Runs a function, with the time, on the thread that owns the gateway. Any thread may call it."""
+from drone_mesh.execution import Submit
 
 Answer = TypeVar("Answer")
 

@@ -7,10 +7,9 @@ Python 3.8.
 import asyncio
 import json
 import time
-from typing import AsyncIterator, Optional, Sequence
+from typing import AsyncIterator, Optional
 
-from fastapi import FastAPI, Path, Query, Request, Response
-from fastapi.params import Depends
+from fastapi import APIRouter, Path, Query, Request, Response
 from fastapi.responses import StreamingResponse
 from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
@@ -20,7 +19,7 @@ from drone_mesh.communication.data.packets import MAX_DATA_PORT
 from drone_mesh.communication.data.ticket import TO_ALL, TicketState
 from drone_mesh.communication.data.transport import ReceivedMessage
 from drone_mesh.errors import MessageRefused, QueueFull
-from drone_mesh.internet.guarded_app import Responses
+from drone_mesh.internet.guarded_app import UNDONE, Refusal
 from drone_mesh.internet.numbers import DecimalDigits, WholeDigits
 from drone_mesh.users.desk import HANDOVER_S, Sending, UsersDesk, in_json
 
@@ -44,15 +43,13 @@ class DataSent(BaseModel):
     state: TicketState
 
 
-def add_data_requests(
-    app: FastAPI, users: UsersDesk, guards: Sequence[Depends], refusals: Responses
-) -> None:
-    """Add both requests; `users` is the desk of the gateway's own node."""
+def data_requests(users: UsersDesk) -> APIRouter:
+    """Both requests; `users` is the desk of the gateway's own node."""
+    invalid = {"model": Refusal, "description": "Invalid node, port or message"}
+    router = APIRouter(responses={**UNDONE, 422: invalid})
 
-    @app.post(
+    @router.post(
         "/nodes/{id}/data",
-        dependencies=guards,
-        responses=refusals,
         openapi_extra={
             "requestBody": {
                 "content": {
@@ -87,10 +84,9 @@ def add_data_requests(
             raise HTTPException(504, sending.in_words(wait))
         return DataSent(ticket=ticket.number, state=ticket.state)
 
-    @app.get(
+    @router.get(
         "/data",
-        dependencies=guards,
-        responses={**refusals, 200: {"content": {"text/event-stream": {}}}},
+        responses={200: {"content": {"text/event-stream": {}}}},
         response_class=Response,
     )
     async def data(
@@ -106,14 +102,16 @@ def add_data_requests(
         """
         return StreamingResponse(_events(users, port), media_type="text/event-stream")
 
+    return router
+
 
 async def _over(sending: Sending, wait_s: float) -> None:
     """Wait until the node has accepted the message, then for its final state."""
     until_s = time.monotonic() + wait_s
     give_up_s = time.monotonic() + HANDOVER_S  # then `ticket` raises
-    while not sending.is_over:
+    while not sending.over.done():
         now_s = time.monotonic()
-        if now_s >= (until_s if sending.is_taken else give_up_s):
+        if now_s >= (until_s if sending.taken.done() else give_up_s):
             return
         await asyncio.sleep(_POLL_S)
 

@@ -1,4 +1,4 @@
-"""The common base of all nodes' HTTP applications: guard, token, and errors with a reason.
+"""The common base of all nodes' HTTP servers: guard, token, and errors with a reason.
 
 No `from __future__ import annotations` here: FastAPI reads the annotations at run time, also on
 Python 3.8.
@@ -7,25 +7,28 @@ Python 3.8.
 import functools
 import logging
 import time
-from typing import Any, Dict, List, Optional, Tuple, Union
+from typing import Any, Dict, Optional, Union
 
-from fastapi import Depends, FastAPI, Request
+from fastapi import APIRouter, Depends, FastAPI, Request
 from fastapi.exceptions import RequestValidationError
-from fastapi.params import Depends as Guard
 from fastapi.responses import JSONResponse
 from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
 from fastapi_offline import FastAPIOffline
 from pydantic import BaseModel
 from starlette.exceptions import HTTPException
+from starlette.types import ASGIApp
 from typing_extensions import Annotated
 
 from drone_mesh.communication.throttle import Throttle
 from drone_mesh.errors import GoalRefused, PlaceTaken
 from drone_mesh.internet.asking import AnswerLate, NotCarriedOut
+from drone_mesh.internet.http_settings import HttpSettings
 from drone_mesh.internet.request_guard import RequestGuard
 from drone_mesh.web.access import Access, TooManyGuesses
+from drone_mesh.web.server_thread import ServerThread
 
 REFUSAL_LOG_PERIOD_S = 10.0  # our choice
+MOST_CONNECTIONS = 64  # our choice; further ones get 503
 
 _log = logging.getLogger(__name__)
 
@@ -47,14 +50,34 @@ REFUSALS: Responses = {
     414: {"model": Refusal, "description": "Address too long"},
     429: {"model": Refusal, "description": "Too many orders, or wrong tokens; wait 1 s"},
     431: {"model": Refusal, "description": "Headers too large"},
-    503: {"model": Refusal, "description": "Not done; nothing was sent"},
-    504: {"model": Refusal, "description": "Started, but not finished in time"},
 }
 """Possible refusals of any request."""
 
+UNDONE: Responses = {
+    503: {"model": Refusal, "description": "Not done; nothing was sent"},
+    504: {"model": Refusal, "description": "Started, but not finished in time"},
+}
+"""Possible refusals of any request to the gateway's own thread."""
 
-def guarded_app(title: str, description: str, access: Access) -> Tuple[FastAPI, List[Guard]]:
-    """The application, and the dependencies of each operation that needs the token.
+
+class HttpServer(ServerThread):
+    """Serves the application of one node, in its own thread."""
+
+    def __init__(self, app: ASGIApp, http: HttpSettings) -> None:
+        """Open the port. Raises ConfigurationError if it is not available."""
+        super().__init__(
+            app,
+            http.address,
+            http.port,
+            name="http",
+            certificate=http.certificate,
+            ws="none",
+            limit_concurrency=MOST_CONNECTIONS,
+        )
+
+
+def guarded_app(title: str, description: str, access: Access, router: APIRouter) -> FastAPI:
+    """The application; each operation of the router needs the token.
 
     Its page /docs loads nothing from the internet.
     """
@@ -90,7 +113,8 @@ def guarded_app(title: str, description: str, access: Access) -> Tuple[FastAPI, 
             _log.warning("HTTP: refused %s: %s (refusal %d)", address, reason, number)
         raise HTTPException(status, reason, headers=headers)
 
-    return app, [Depends(check_token)]
+    app.include_router(router, dependencies=[Depends(check_token)], responses=REFUSALS)
+    return app
 
 
 def _answer_errors_with_a_reason(app: FastAPI) -> None:

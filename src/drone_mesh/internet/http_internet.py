@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 from typing import Any, Callable
 
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
 from drone_mesh.communication.interfaces import IGatewayCommands, IInternetConnection
 from drone_mesh.drone.geodesy import Origin
+from drone_mesh.execution import Submit
 from drone_mesh.internet.api import make_api
-from drone_mesh.internet.asked_watch import AskedWatch
-from drone_mesh.internet.asking import GatewayDesk, Submit
-from drone_mesh.internet.http_server import HttpServer
+from drone_mesh.internet.asking import GatewayDesk
+from drone_mesh.internet.guarded_app import HttpServer
 from drone_mesh.internet.http_settings import HttpSettings
 from drone_mesh.internet.status import ReadStatus
 from drone_mesh.users.desk import UsersDesk
@@ -82,3 +85,41 @@ class HttpInternet(IInternetConnection):
         else:
             _log.warning("gateway %d: not asked over HTTP: it says that it has no internet", node)
         self._submit(lambda now_s: commands.set_internet(works, now_s))
+
+
+class AskedWatch:
+    """ASGI middleware. Belongs to the server's event loop; refused requests do not count."""
+
+    def __init__(self, app: ASGIApp, silence_s: float, changed: Callable[[bool], None]) -> None:
+        """`changed(False)`: nobody has asked for `silence_s` (wall); `changed(True)`: again."""
+        self._app = app
+        self._silence_s = silence_s
+        self._changed = changed
+        self._is_asked = True
+        self._timer: asyncio.TimerHandle | None = None
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        is_accepted = False
+
+        async def watched(message: Message) -> None:
+            nonlocal is_accepted
+            if message["type"] == "http.response.start":
+                is_accepted = message["status"] < 400
+            if is_accepted:  # also with each piece of a long answer
+                self.begin()
+                self._tell(True)
+            await send(message)
+
+        await self._app(scope, receive, watched)
+
+    def begin(self) -> None:
+        """Count the silence from now on."""
+        if self._timer is not None:
+            self._timer.cancel()
+        loop = asyncio.get_running_loop()
+        self._timer = loop.call_later(self._silence_s, self._tell, False)
+
+    def _tell(self, is_asked: bool) -> None:
+        if is_asked is not self._is_asked:
+            self._is_asked = is_asked
+            self._changed(is_asked)

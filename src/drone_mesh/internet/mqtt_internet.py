@@ -13,6 +13,7 @@ import math
 import ssl
 import sys
 import threading
+from concurrent.futures import Future
 from pathlib import Path
 from typing import Any, Callable
 
@@ -31,8 +32,8 @@ from drone_mesh.communication.interfaces import (
     KnownNode,
 )
 from drone_mesh.communication.observer import MeshEvent
-from drone_mesh.errors import ConfigurationError, QueueFull
-from drone_mesh.internet.asking import Submit
+from drone_mesh.errors import ConfigurationError, MessageRefused, QueueFull
+from drone_mesh.execution import Submit
 from drone_mesh.internet.mqtt_topics import Broker, Topics
 from drone_mesh.users.desk import UsersDesk
 
@@ -216,21 +217,21 @@ class MqttInternet(IInternetConnection):
             return
         sending = self._users.send(destination.to, message.payload, destination.port)
 
-        def ended(ticket: Ticket | None, refusal: Exception | None) -> None:
-            if isinstance(refusal, QueueFull):
+        def ended(over: Future[Ticket]) -> None:
+            try:
+                ticket = over.result()
+            except QueueFull:
                 with self._lock:
                     self._to_retry.append(message)
                 return
-            if ticket is None:
-                self._say(node, {"state": "refused", "reason": str(refusal)})
+            except MessageRefused as error:
+                event: dict[str, Any] = {"state": "refused", "reason": str(error)}
             else:
-                self._say(
-                    node,
-                    {"state": ticket.state.value, "reason": ticket.reason, "bytes": ticket.size},
-                )
+                event = {"state": ticket.state.value, "reason": ticket.reason, "bytes": ticket.size}
+            self._say(node, event)
             self._acknowledge(message)
 
-        sending.when_over(ended)
+        sending.over.add_done_callback(ended)
 
     def _acknowledge(self, message: mqtt.MQTTMessage) -> None:
         with self._lock:

@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
+from typing import Callable
+
 from pydantic import BeforeValidator
 
 from drone_mesh.arguments import is_decimal, is_whole
 
 
-def _whole(value: object) -> object:
-    if isinstance(value, str) and not is_whole(value):
-        raise ValueError("must be a whole number in decimal digits")
-    return value
+def _digits(is_number: Callable[[str], bool], what: str) -> BeforeValidator:
+    def check(value: object) -> object:
+        if isinstance(value, str) and not is_number(value):
+            raise ValueError(f"must be {what} in decimal digits")
+        return value
+
+    return BeforeValidator(check)
 
 
-def _decimal(value: object) -> object:
-    if isinstance(value, str) and not is_decimal(value):
-        raise ValueError("must be a number in decimal digits")
-    return value
-
-
-WholeDigits = BeforeValidator(_whole)
-DecimalDigits = BeforeValidator(_decimal)
+WholeDigits = _digits(is_whole, "a whole number")
+DecimalDigits = _digits(is_decimal, "a number")

@@ -9,7 +9,7 @@ from drone_mesh.communication.interfaces import IInternetConnection
 from drone_mesh.errors import ConfigurationError
 
 if TYPE_CHECKING:
-    from drone_mesh.internet.asking import Submit
+    from drone_mesh.execution import Submit
     from drone_mesh.internet.http_settings import HttpSettings
     from drone_mesh.internet.mqtt_internet import MqttInternet
     from drone_mesh.internet.mqtt_topics import Broker

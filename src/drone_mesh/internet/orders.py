@@ -4,10 +4,9 @@ No `from __future__ import annotations` here: FastAPI reads the annotations at r
 Python 3.8.
 """
 
-from typing import List, Sequence
+from typing import List
 
-from fastapi import FastAPI, Path
-from fastapi.params import Depends
+from fastapi import APIRouter, Path
 from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 from typing_extensions import Annotated
@@ -16,7 +15,7 @@ from drone_mesh.communication.interfaces import IGatewayCommands
 from drone_mesh.communication.order_record import OrderRecord, OrderState
 from drone_mesh.communication.orders.book import HIGHEST_NUMBER
 from drone_mesh.internet.asking import GatewayDesk
-from drone_mesh.internet.guarded_app import Responses
+from drone_mesh.internet.guarded_app import UNDONE, Refusal
 from drone_mesh.internet.numbers import WholeDigits
 
 OrderNumber = Annotated[
@@ -48,27 +47,30 @@ class OrderReports(BaseModel):
     orders: List[OrderReport]
 
 
-def add_order_requests(
-    app: FastAPI,
-    desk: GatewayDesk,
-    guards: Sequence[Depends],
-    refusals: Responses,
-    order_refusals: Responses,
-) -> None:
-    """Add `GET /orders`, which may also answer with `refusals`, and `GET /orders/{id}`."""
+def order_requests(desk: GatewayDesk) -> APIRouter:
+    """`GET /orders` and `GET /orders/{id}`."""
+    router = APIRouter(responses=UNDONE)
 
-    @app.get("/orders", dependencies=guards, responses=refusals)
+    @router.get("/orders")
     async def orders() -> OrderReports:
         """The outcomes of the orders: the latest of each drone, and up to 100 older ones."""
         return await desk.ask(_report_orders)
 
-    @app.get("/orders/{id}", dependencies=guards, responses=order_refusals)
+    @router.get(
+        "/orders/{id}",
+        responses={
+            404: {"model": Refusal, "description": "No such order, or no longer remembered"},
+            422: {"model": Refusal, "description": "Invalid number"},
+        },
+    )
     async def order(id: OrderNumber) -> OrderReport:
         """The outcome of one order."""
         for report in (await desk.ask(_report_orders)).orders:
             if report.id == id:
                 return report
         raise HTTPException(404, f"unknown order {id}: the gateway keeps only the latest")
+
+    return router
 
 
 def _report_orders(gateway: IGatewayCommands, now_s: float) -> OrderReports:

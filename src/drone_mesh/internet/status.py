@@ -4,27 +4,27 @@ No `from __future__ import annotations` here: FastAPI reads the annotations at r
 Python 3.8.
 """
 
-from typing import Any, Callable, Dict, Sequence
+from typing import Any, Callable, Dict
 
-from fastapi import FastAPI
-from fastapi.params import Depends as Guard
+from fastapi import APIRouter
 
-from drone_mesh.internet.guarded_app import REFUSALS, guarded_app
-from drone_mesh.internet.http_server import HttpServer
+from drone_mesh.internet.guarded_app import HttpServer, guarded_app
 from drone_mesh.internet.http_settings import HttpSettings
 
 ReadStatus = Callable[[], Dict[str, Any]]
 """Returns a node's status; any thread may call it."""
 
 
-def add_status_request(app: FastAPI, guards: Sequence[Guard], status: ReadStatus) -> None:
+def status_request(status: ReadStatus) -> APIRouter:
     """`GET /status`."""
-    refusals = {number: what for number, what in REFUSALS.items() if number not in (503, 504)}
+    router = APIRouter()
 
-    @app.get("/status", dependencies=list(guards), responses=refusals)
+    @router.get("/status")
     async def node_status() -> Dict[str, Any]:
         """The status of this node: mesh, radio, flight, version."""
         return status()
+
+    return router
 
 
 class StatusServer(HttpServer):
@@ -33,6 +33,5 @@ class StatusServer(HttpServer):
     def __init__(self, status: ReadStatus, http: HttpSettings) -> None:
         """Open the port. Raises ConfigurationError as HttpInternet does."""
         about = "Reports the status of this node."
-        app, guards = guarded_app("drone_mesh router", about, http.access())
-        add_status_request(app, guards, status)
-        super().__init__(app, http)
+        request = status_request(status)
+        super().__init__(guarded_app("drone_mesh router", about, http.access(), request), http)

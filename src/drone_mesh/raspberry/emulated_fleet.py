@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 import dataclasses
 import logging
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from drone_mesh.drone.engines import GROUND, MAVLINK, FlightOptions, create_engine
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.interfaces import IDroneEngine
-from drone_mesh.errors import ConfigurationError, LocationUnknown
+from drone_mesh.errors import ConfigurationError
 from drone_mesh.raspberry.emulated_air import EmulatedAir
-
-if TYPE_CHECKING:  # pymavlink takes a second to load on a Raspberry Pi
-    from drone_mesh.drone.mavlink_vehicle.vehicle import MavlinkVehicle
 
 DEMONSTRATION_ORIGIN = Origin(52.0907, 5.1214, 3.0)  # Utrecht; only without --origin
 _KINDS = (GROUND, "mavlink", "px4")
@@ -62,16 +57,16 @@ def fleet_options(parsed: argparse.Namespace) -> FleetOptions:
 
 
 class EmulatedFleet:
-    """Engines for the nodes on an emulated air; each radio follows its drone."""
+    """Engines for the nodes on an emulated air."""
 
     def __init__(self, fleet: FleetOptions, flight: FlightOptions, air: EmulatedAir) -> None:
         """Start the simulated vehicles, if there are any; `close` ends them."""
-        self.air = air
+        self._air = air
         self._flight = flight
-        self._engines: dict[int, IDroneEngine] = {}
         self._server = None
         if fleet.drones == GROUND:
             return
+        # pymavlink takes a second to load on a Raspberry Pi
         from drone_mesh.drone.mavlink.autopilots import ARDUPILOT, PX4
         from drone_mesh.drone.mavlink_vehicle.server import VehicleServer, parse_ground_station
 
@@ -93,25 +88,12 @@ class EmulatedFleet:
         if self._server is not None:
             address = self._server.addresses[node_id]
             flight = dataclasses.replace(flight, drone=f"{MAVLINK}{address}")
-        engine = create_engine(node_id, self.air.place(node_id), flight)
-        self._engines[node_id] = engine
-        return engine
-
-    def move_radios(self) -> None:
-        """Move each radio to the position of its drone."""
-        for node_id, engine in self._engines.items():
-            with contextlib.suppress(LocationUnknown):
-                self.air.move(node_id, engine.get_location())
+        return create_engine(node_id, self._air.place(node_id), flight)
 
     @property
     def origin(self) -> Origin | None:
         """The geographic origin of the drones' frame; None: they have none."""
         return self._flight.origin
-
-    @property
-    def vehicles(self) -> list[MavlinkVehicle]:
-        """The simulated vehicles, by node id; none on the ground."""
-        return self._server.vehicles if self._server is not None else []
 
     def close(self) -> None:
         """End the simulated vehicles; the engines belong to their nodes."""

@@ -43,15 +43,6 @@ class Sent(NamedTuple):
     retransmits: int
 
 
-class NeitherSentNorFailed(RadioError):
-    """The chip took a payload but did not send it: CE never went high."""
-
-    def __init__(self) -> None:
-        super().__init__(
-            "the radio reported a packet neither sent nor failed: is CE wired, and --ce right?"
-        )
-
-
 class FieldRadio:
     """A radio with the registers of a node, from `set_up` to `close`."""
 
@@ -116,11 +107,11 @@ class FieldRadio:
         self.set_up()
 
     def send(self, to: bytes, payload: bytes, retransmits: int = 0) -> Sent:
-        """Send with acknowledgement. Raises NeitherSentNorFailed."""
+        """Send with acknowledgement. Raises RadioError if the chip keeps the packet."""
         return self._transmit(Command.W_TX_PAYLOAD, to, payload, retransmits)
 
     def broadcast(self, payload: bytes, *, keep_flags: bool = False) -> None:
-        """Send without acknowledgement. Raises NeitherSentNorFailed.
+        """Send without acknowledgement. Raises RadioError if the chip keeps the packet.
 
         `keep_flags` leaves TX_DS set, and so the IRQ pin low, until `clear_flags`.
         """
@@ -182,4 +173,6 @@ class FieldRadio:
             if is_over:
                 break
             self.runtime.sleep(_POLL_S)
-        raise NeitherSentNorFailed
+        raise RadioError(
+            "the radio reported a packet neither sent nor failed: is CE wired, and --ce right?"
+        )

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Callable
 
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.execution import Work
+from drone_mesh.execution import Submit
 
 PERIOD_S = 1.0  # our choice
 
@@ -26,7 +26,7 @@ class MeshRecord:
     def __init__(
         self,
         path: Path,
-        submit: Callable[[Work], None],
+        submit: Submit,
         mesh: Callable[[int], dict[str, Any]],
     ) -> None:
         """`mesh` returns the state and the events after a number. Raises ConfigurationError."""

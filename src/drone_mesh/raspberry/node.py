@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import logging
 import random
@@ -14,7 +15,8 @@ from drone_mesh.communication.gateway import MeshnetworkGateway
 from drone_mesh.communication.interfaces import IInternetConnection, IWirelessCommunication
 from drone_mesh.communication.seals.sealed_antenna import SealedAntenna
 from drone_mesh.drone.interfaces import IDroneEngine
-from drone_mesh.errors import ConfigurationError
+from drone_mesh.drone.location import Location
+from drone_mesh.errors import ConfigurationError, LocationUnknown
 from drone_mesh.execution import MeshExecutor, Work
 from drone_mesh.nrf24.high_level import NRF24HighLevelInterface
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
@@ -48,14 +50,17 @@ class RadioNode:
         options: Options,
         make_internet: MakeInternet | None = None,
         events: EventHistory | None = None,
+        move: Callable[[Location], None] | None = None,
     ) -> None:
         """Takes ownership of radio and engine. Raises what `make_internet` raises.
 
         `events` is shared by the nodes of one program: each reports its own events. Without it, a
-        gateway derives the events of its routers from their packets.
+        gateway derives the events of its routers from their packets. `move` moves an emulated
+        radio; a real one moves with its drone.
         """
         self.radio = radio
         self.engine = engine
+        self._move = move
         self._executor = MeshExecutor(time.monotonic, False, name=f"mesh {radio.node_id}")
         self._slot = self._executor.slot()
         self._antenna = NRF24HighLevelInterface(
@@ -126,6 +131,12 @@ class RadioNode:
         if self._changes is not None:
             self._slot.submit(self._note_changes)
 
+    def move_radio(self) -> None:
+        """Have an emulated radio follow its drone; to be called periodically."""
+        if self._move is not None:
+            with contextlib.suppress(LocationUnknown):
+                self._move(self.engine.get_location())
+
     def _note_changes(self, now_s: float) -> None:
         component = self.component
         assert self._changes is not None
@@ -136,13 +147,7 @@ class RadioNode:
         """The result of `node_status`; any thread may call it."""
         now_s = time.monotonic()
         return node_status(
-            self.component,
-            self.engine,
-            self._antenna.statistics(),
-            self._antenna.link_quality(),
-            self._antenna.on(),
-            now_s - self._started_s,
-            now_s,
+            self.component, self.engine, self._antenna, now_s - self._started_s, now_s
         )
 
     def is_alive(self) -> bool:

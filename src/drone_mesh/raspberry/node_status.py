@@ -3,27 +3,25 @@
 from __future__ import annotations
 
 from importlib import metadata
-from typing import Any, Mapping
+from typing import Any
 
-from drone_mesh.channel.link_quality import Quality
-from drone_mesh.channel.statistics import RadioStatistics
 from drone_mesh.communication.component import MeshnetworkComponent
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.observer import in_hops
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.errors import LocationUnknown
+from drone_mesh.nrf24.high_level import NRF24HighLevelInterface
 
 
 def node_status(
     component: MeshnetworkComponent,
     engine: IDroneEngine,
-    radio: RadioStatistics,
-    links: Mapping[int, Quality],
-    on: bool,
+    antenna: NRF24HighLevelInterface,
     uptime_s: float,
     now_s: float,
 ) -> dict[str, Any]:
     """The complete status as JSON values. Reads snapshots, so any thread may call it."""
+    radio, links = antenna.statistics(), antenna.link_quality()
     neighbours = [
         {
             "id": node,
@@ -37,7 +35,7 @@ def node_status(
         "node": component.get_node_id(),
         "version": version(),
         "uptime_s": round(uptime_s, 1),
-        "on": on,
+        "on": antenna.on(),
         "connected": component.get_connected_to_gateway(),
         "gateway": _known(component.get_preferred_gateway()),
         "hops": _known(component.get_hops_from_gateway_away()),

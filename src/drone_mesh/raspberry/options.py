@@ -29,13 +29,17 @@ from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError, MeshError, naming_argument
 from drone_mesh.internet.http_settings import HttpSettings
 from drone_mesh.nrf24.settings import DATA_RATES, BroadcastMode, RadioSettings, TxPower
-from drone_mesh.nrf24.spi import SPI_HZ
 from drone_mesh.raspberry.air_options import AirOptions, add_air_options, air_options
 from drone_mesh.raspberry.emulated_fleet import FleetOptions, add_fleet_options, fleet_options
 from drone_mesh.raspberry.flight_options import add_flight_options, flight_options
 from drone_mesh.raspberry.http_options import add_http_options, http_options
 from drone_mesh.raspberry.mqtt_options import MqttOptions, add_mqtt_options, mqtt_options
-from drone_mesh.raspberry.wiring_options import add_channel_options, add_wiring_options
+from drone_mesh.raspberry.wiring_options import (
+    Hardware,
+    add_channel_options,
+    add_wiring_options,
+    wired_hardware,
+)
 
 MOST_EMULATED = 17  # our choice: as in the field case, and what one machine can emulate
 CHECK_DRONE = "check-drone"  # the last argument of raspberry_router
@@ -45,16 +49,6 @@ _BROADCASTS = {mode.value: mode for mode in BroadcastMode}
 
 OUTDOOR_CLEARANCE_M = 5.0  # our choice: satellite positions are accurate to a few metres
 OUTDOOR_RANGE_M = 100.0  # our choice: hardly any loss so near (nrf24/emulator/nrf24_range.csv)
-
-
-@dataclass(frozen=True)
-class Hardware:
-    """Where the radio is connected."""
-
-    spi: tuple[int, int]  # bus, device
-    ce_gpio: int
-    irq_gpio: int | None  # None: the radio is polled
-    spi_hz: int = SPI_HZ
 
 
 @dataclass(frozen=True)
@@ -308,7 +302,7 @@ def _options(
         create_repair_strategy(parsed.repair)
         return Options(
             node_id=parsed.id or 0,
-            hardware=Hardware(parsed.spi, parsed.ce, parsed.irq, parsed.spi_hz),
+            hardware=wired_hardware(parsed),
             radio=RadioSettings(
                 channel=parsed.channel,
                 data_rate=DATA_RATES[parsed.rate],

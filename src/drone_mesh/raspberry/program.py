@@ -1,4 +1,4 @@
-"""Runs raspberry_router and raspberry_gateway, from start to end."""
+"""The programs raspberry_router and raspberry_gateway, from start to end."""
 
 from __future__ import annotations
 
@@ -6,33 +6,29 @@ import contextlib
 import dataclasses
 import logging
 import signal
+import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from types import FrameType
-from typing import TYPE_CHECKING, Callable, Iterator, Sequence
+from typing import Callable, Iterable, Iterator, Sequence
 
 from drone_mesh.communication.interfaces import IInternetConnection
-from drone_mesh.internet.http_settings import HttpSettings
 from drone_mesh.internet.on_demand import http_internet, mqtt_internet, status_server
 from drone_mesh.internet.several import SeveralInternets
-from drone_mesh.nrf24.gpio import GpiodCe, GpiodIrq
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
-from drone_mesh.nrf24.settings import RadioSettings
-from drone_mesh.nrf24.spi import open_spi
+from drone_mesh.raspberry.drone_check import check_drone
 from drone_mesh.raspberry.emulated_air import EmulatedAir
 from drone_mesh.raspberry.emulated_fleet import EmulatedFleet
 from drone_mesh.raspberry.event_history import EventHistory
 from drone_mesh.raspberry.mesh_record import MeshRecord
 from drone_mesh.raspberry.node import MakeInternet, RadioNode
 from drone_mesh.raspberry.node_status import one_line
-from drone_mesh.raspberry.options import Hardware, Options
-from drone_mesh.raspberry.served_air import MoveRadio, joining_node, node_with_drone, serving_node
+from drone_mesh.raspberry.options import CHECK_DRONE, Options, parse_gateway, parse_router
+from drone_mesh.raspberry.served_air import joining_node, node_with_drone, serving_node
 from drone_mesh.raspberry.service_manager import ServiceManager
-from drone_mesh.stopping import StopRequest
+from drone_mesh.stopping import StopRequest, ends_as
 from drone_mesh.users.local_socket import warn_of_unreachable
-
-if TYPE_CHECKING:
-    from drone_mesh.internet.status import StatusServer
 
 POLL_PERIOD_S = 0.5  # our choice: how often the main thread checks the nodes
 ALIVE_PERIOD_S = 5.0  # our choice: several times in WatchdogSec of the units
@@ -44,65 +40,70 @@ END_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _log = logging.getLogger(__name__)
 
 
+@ends_as("raspberry_router")
+def router() -> int:
+    """Run until Ctrl-C or SIGTERM, or check the drone; the exit status."""
+    if sys.argv[-1] != CHECK_DRONE:
+        return run(parse_router)
+    return check_drone(parse_router(sys.argv[1:-1]))
+
+
+@ends_as("raspberry_gateway")
+def gateway() -> int:
+    """Run until Ctrl-C or SIGTERM; the exit status."""
+    return run(parse_gateway)
+
+
 def run(parse: Callable[[], Options]) -> int:
-    """Run until a signal ends it; returns the exit status."""
-    with _signals() as request:
-        options = parse()
-        logging.basicConfig(
-            format="%(asctime)s %(levelname)s %(message)s", level=options.log_level.upper()
-        )
-        _run(options, request)
-    return 0
-
-
-@contextlib.contextmanager
-def _signals() -> Iterator[StopRequest]:
-    """A stop request set by Ctrl-C, TERM or HUP; a second signal ends the program at once."""
+    """Run until a signal ends it, a second one at once; returns the exit status."""
     with StopRequest() as request:
 
         def end(number: int, _frame: FrameType | None) -> None:
             request.make()
             signal.signal(number, signal.SIG_DFL)
 
-        before = {number: signal.signal(number, end) for number in END_SIGNALS}
-        try:
-            yield request
-        finally:
-            for number, handler in before.items():
-                signal.signal(number, handler)
+        with _handling(END_SIGNALS, end):
+            options = parse()
+            logging.basicConfig(
+                format="%(asctime)s %(levelname)s %(message)s", level=options.log_level.upper()
+            )
+            _run(options, request)
+    return 0
+
+
+@contextlib.contextmanager
+def _handling(
+    numbers: Iterable[signal.Signals], handler: Callable[[int, FrameType | None], None]
+) -> Iterator[None]:
+    """Let this function handle these signals; at the end they are handled as before."""
+    before = {number: signal.signal(number, handler) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, earlier in before.items():
+            signal.signal(number, earlier)
 
 
 class _DebugSwitch:
     """The signal USR1 begins and ends the lines of --debug, within POLL_PERIOD_S."""
 
-    def __init__(self) -> None:
-        self.pressed = False
+    pressed = False
 
-    def __enter__(self) -> _DebugSwitch:
-        self._before = signal.signal(signal.SIGUSR1, self._press)
-        return self
-
-    def __exit__(self, *_error: object) -> None:
-        signal.signal(signal.SIGUSR1, self._before)
-
-    def _press(self, _number: int, _frame: FrameType | None) -> None:
+    def press(self, _number: int, _frame: FrameType | None) -> None:
+        """Two presses between two looks at it change nothing."""
         self.pressed = not self.pressed
 
 
 def _run(options: Options, request: StopRequest) -> None:
     with contextlib.ExitStack() as stack:
-        move_radios: MoveRadio = _stay
         if options.emulated:
-            fleet = _emulated_fleet(options, stack)
-            nodes, move_radios = _emulated_nodes(options, fleet), fleet.move_radios
+            nodes = _emulated_nodes(options, stack)
         elif options.air.join is not None:
-            node, move_radios = joining_node(options, options.air.join, _orders(options))
-            nodes = [node]
+            nodes = [joining_node(options, options.air.join, _orders(options))]
         elif options.air.serve is not None:
             air = EmulatedAir(options.radio, 1, options.trace)
             stack.callback(air.close)
-            node, move_radios = serving_node(options, air, options.air.serve, _orders(options))
-            nodes = [node]
+            nodes = [serving_node(options, air, options.air.serve, _orders(options))]
         else:
             nodes = [_real_node(options)]
         stack.callback(_stop, nodes)
@@ -115,14 +116,16 @@ def _run(options: Options, request: StopRequest) -> None:
                 "fly; raspberry_key new makes a key, --key-file uses it"
             )
         if not options.gateway and options.http is not None:
-            server = _status_server(nodes[0], options.http)
+            server = status_server(nodes[0].status, options.http)
+            _log.info("node %d: its status over HTTP at %s/status", options.node_id, server.url)
             server.start()
             stack.callback(server.stop)
         record: MeshRecord | None = None
         if options.record is not None:
             record = MeshRecord(options.record, nodes[0].submit, nodes[0].mesh)
             stack.callback(record.close)
-        switch = stack.enter_context(_DebugSwitch())  # first: without it, USR1 ends the program
+        switch = _DebugSwitch()  # first: without it, USR1 ends the program
+        stack.enter_context(_handling([signal.SIGUSR1], switch.press))
         for node in nodes:
             node.start()
         manager = ServiceManager()
@@ -134,10 +137,10 @@ def _run(options: Options, request: StopRequest) -> None:
                 record.check(time.monotonic())
             for node in nodes:
                 node.check_others()
+                node.move_radio()
                 if switch.pressed:
                     node.switch_debug()
             switch.pressed = False
-            move_radios()
         manager.stopping()
         _log.info("stopping")
 
@@ -150,9 +153,11 @@ def _stop(nodes: Sequence[RadioNode]) -> None:
 
 
 def _real_node(options: Options) -> RadioNode:
-    radio = _open_radio(options.node_id, options.hardware, options.radio)
-    node = node_with_drone(radio, options, options.location, _orders(options))
     hardware = options.hardware
+    radio = NRF24LowLevelInterface(
+        *hardware.open(), node_id=options.node_id, settings=options.radio
+    )
+    node = node_with_drone(radio, options, options.location, _orders(options))
     _log.info(
         "node %d: nRF24L01+ on SPI %d.%d, CE on GPIO%d, %s; channel %d, %d kbit/s, CRC %d bit",
         options.node_id,
@@ -166,28 +171,11 @@ def _real_node(options: Options) -> RadioNode:
     return node
 
 
-def _open_radio(
-    node_id: int, hardware: Hardware, settings: RadioSettings
-) -> NRF24LowLevelInterface:
-    with contextlib.ExitStack() as opened:
-        spi = open_spi(*hardware.spi, hardware.spi_hz)
-        opened.callback(spi.close)
-        ce = GpiodCe(hardware.ce_gpio)
-        opened.callback(ce.close)
-        irq = None if hardware.irq_gpio is None else GpiodIrq(hardware.irq_gpio)
-        opened.pop_all()
-    return NRF24LowLevelInterface(spi, ce, irq, node_id=node_id, settings=settings)
-
-
-def _emulated_fleet(options: Options, stack: contextlib.ExitStack) -> EmulatedFleet:
+def _emulated_nodes(options: Options, stack: contextlib.ExitStack) -> list[RadioNode]:
     air = EmulatedAir(options.radio, options.emulated, options.trace)
     stack.callback(air.close)
     fleet = EmulatedFleet(options.fleet, options.flight, air)
     stack.callback(fleet.close)
-    return fleet
-
-
-def _emulated_nodes(options: Options, fleet: EmulatedFleet) -> list[RadioNode]:
     _log.info("%d nodes on emulated radios; node 0 is the gateway", options.emulated)
     options = dataclasses.replace(
         options, flight=dataclasses.replace(options.flight, origin=fleet.origin)
@@ -196,63 +184,47 @@ def _emulated_nodes(options: Options, fleet: EmulatedFleet) -> list[RadioNode]:
     make_internet = _orders(options) or without_internet
     return [
         RadioNode(
-            fleet.air.radio(node_id, options.radio),
+            air.radio(node_id, options.radio),
             fleet.engine(node_id),
             options,
             None if node_id else make_internet,
             events,
+            partial(air.move, node_id),
         )
         for node_id in range(options.emulated)
     ]
 
 
-def _stay() -> None:
-    """Does nothing: real radios move with their drones."""
-
-
 def _orders(options: Options) -> MakeInternet | None:
     """How a gateway receives orders; None for a router."""
-    return _internet(options) if options.gateway else None
+    return partial(_internet, options) if options.gateway else None
 
 
-def _internet(options: Options) -> MakeInternet:
+def _internet(options: Options, node: RadioNode) -> IInternetConnection:
     http, mqtt = options.http, options.mqtt
-
-    def make(node: RadioNode) -> IInternetConnection:
-        connections: list[IInternetConnection] = []
-        if mqtt is not None:
-            to_broker = mqtt_internet(
-                node.submit,
-                node.users,
-                mqtt.broker,
-                ca_file=mqtt.ca_file,
-                is_internet=mqtt.is_internet,
-            )
-            node.events.others.add(to_broker.observe)
-            connections.append(to_broker)
-        if http is not None:
-            connections.append(_http(node, http, options))
-        return SeveralInternets(*connections)
-
-    return make
-
-
-def _http(node: RadioNode, http: HttpSettings, options: Options) -> IInternetConnection:
-    return http_internet(
-        node.submit,
-        http,
-        origin=options.flight.origin,
-        status=node.status,
-        mesh=node.mesh,
-        users=node.users,
-        silence_s=options.silence_s,
-    )
-
-
-def _status_server(node: RadioNode, http: HttpSettings) -> StatusServer:
-    server = status_server(node.status, http)
-    _log.info("node %d: its status over HTTP at %s/status", node.radio.node_id, server.url)
-    return server
+    connections: list[IInternetConnection] = []
+    if mqtt is not None:
+        to_broker = mqtt_internet(
+            node.submit,
+            node.users,
+            mqtt.broker,
+            ca_file=mqtt.ca_file,
+            is_internet=mqtt.is_internet,
+        )
+        node.events.others.add(to_broker.observe)
+        connections.append(to_broker)
+    if http is not None:
+        over_http = http_internet(
+            node.submit,
+            http,
+            origin=options.flight.origin,
+            status=node.status,
+            mesh=node.mesh,
+            users=node.users,
+            silence_s=options.silence_s,
+        )
+        connections.append(over_http)
+    return SeveralInternets(*connections)
 
 
 def without_internet(_node: RadioNode) -> IInternetConnection:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import platform
+import random
 import sys
 import time
 from pathlib import Path
@@ -15,19 +16,26 @@ from drone_mesh.channel.runtime import Runtime, SystemRuntime
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError, MeshError
+from drone_mesh.nrf24.emulator.air import Air
+from drone_mesh.nrf24.emulator.chip import EmulatedChip
+from drone_mesh.nrf24.emulator.links import LogDistance
 from drone_mesh.nrf24.emulator.pcapng import LINKTYPE_PAYLOADS, CapturedPacket, PcapngWriter
 from drone_mesh.nrf24.emulator.wall_clock import WallClock
-from drone_mesh.nrf24.gpio import CePin, GpiodCe, GpiodIrq, IrqPin
+from drone_mesh.nrf24.gpio import CePin, IrqPin
 from drone_mesh.nrf24.settings import DATA_RATES, RadioSettings
-from drone_mesh.nrf24.spi import SpiDevice, open_spi
+from drone_mesh.nrf24.spi import SpiDevice
 from drone_mesh.raspberry import radio_tests, range_test
-from drone_mesh.raspberry.emulated_partner import PARTNER_ID, EmulatedPartner
 from drone_mesh.raspberry.field_radio import FieldRadio
 from drone_mesh.raspberry.node_status import version
-from drone_mesh.raspberry.wiring_options import add_channel_options, add_wiring_options
+from drone_mesh.raspberry.wiring_options import (
+    add_channel_options,
+    add_wiring_options,
+    wired_hardware,
+)
 from drone_mesh.stopping import ends_as
 
 REPORT_ROUNDS = 20
+PARTNER_ID = 1  # with an emulated radio
 USUAL_NODES = 17  # our choice: the field case
 DISSECTOR = Path(__file__).with_name("drone_mesh.lua")
 
@@ -149,24 +157,38 @@ def _opened(options: argparse.Namespace) -> Iterator[tuple[FieldRadio, IrqPin | 
             partner = EmulatedPartner(clock, settings, Location(0.0, options.emulated, 0.0))
             stack.callback(partner.close)
             chip = partner.other_chip()
-            spi, ce, runtime = chip.spi, chip.ce, clock.runtime
-            irq = chip.irq
+            spi, ce, irq, runtime = chip.spi, chip.ce, chip.irq, clock.runtime
         else:
-            spi, ce, runtime = _hardware(options)
-            irq = None if options.irq is None else GpiodIrq(options.irq)
+            spi, ce, irq = wired_hardware(options).open()
+            runtime = SystemRuntime()
         radio = FieldRadio(spi, ce, options.id, settings, runtime)
         stack.callback(radio.close)
         yield radio, irq
 
 
-def _hardware(options: argparse.Namespace) -> tuple[SpiDevice, CePin, Runtime]:
-    bus, device = options.spi
-    spi = open_spi(bus, device, options.spi_hz)
-    with contextlib.ExitStack() as opened:
-        opened.callback(spi.close)
-        ce = GpiodCe(options.ce)
-        opened.pop_all()
-    return spi, ce, SystemRuntime()
+class EmulatedPartner:
+    """Node 1 at this place; it acknowledges what it receives, and follows a range measurement."""
+
+    def __init__(self, clock: WallClock, settings: RadioSettings, place: Location) -> None:
+        self._air = Air(clock, LogDistance(random.Random()), random.Random())
+        chip = EmulatedChip(self._air, "partner", place.to_vector())
+        self._radio = FieldRadio(chip.spi, chip.ce, PARTNER_ID, settings, clock.runtime)
+        self._ended = False
+        self._answering = clock.runtime.start(self._answer, "partner")
+
+    def other_chip(self) -> EmulatedChip:
+        """The chip that the tools work on, at (0, 0, 0)."""
+        return EmulatedChip(self._air, "radio")
+
+    def close(self) -> None:
+        """Stop answering."""
+        self._ended = True
+        self._answering.join()
+        self._radio.close()
+
+    def _answer(self) -> None:
+        for _ in range_test.answer(self._radio, lambda: self._ended):
+            pass
 
 
 def _parser() -> argparse.ArgumentParser:

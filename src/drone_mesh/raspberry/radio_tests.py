@@ -19,6 +19,7 @@ SPI_ROUNDS = 500  # our choice: each writes and reads an address of five bytes
 BURST = 100  # our choice: packets at full power, to make the supply dip
 CHANNELS = 126
 BAR = 40  # columns of a bar
+SUGGESTED = 3  # channels; our choice
 BAND_END = 83  # the licence-free band ends at 2483.5 MHz
 WIFI = ((1, 12), (6, 37), (11, 62))  # Wi-Fi channel and its middle, as a channel of the radio
 MOST_NODES = ((50, "250k"), (101, "1M"), (254, "2M"))  # docs/performance.md, "The shared channel"
@@ -74,7 +75,7 @@ def _check_irq(radio: FieldRadio, irq: IrqPin) -> str:
     )
 
 
-def scan(radio: FieldRadio, rounds: int, nodes: int, suggest: int = 3) -> Lines:
+def scan(radio: FieldRadio, rounds: int, nodes: int) -> Lines:
     """How often each channel carried a signal of more than -64 dBm, and the quietest channels.
 
     The last line gives the options for a mesh of this many nodes.
@@ -90,7 +91,7 @@ def scan(radio: FieldRadio, rounds: int, nodes: int, suggest: int = 3) -> Lines:
         wifi = [f"Wi-Fi {number}" for number, middle in WIFI if abs(channel - middle) <= 10]
         note = f"  {wifi[0]}" if wifi and channel % 10 == 2 else ""
         yield f"{channel:3d} {2400 + channel} MHz {count / rounds:5.0%} {bar}{note}"
-    quiet = quietest(heard, suggest)
+    quiet = quietest(heard, SUGGESTED)
     yield f"quietest in the licence-free band: {' '.join(map(str, quiet))}"
     yield f"data rate by number of nodes (a lower rate reaches further): {_RATES_IN_WORDS}"
     yield f"options for all nodes: --channel {quiet[0]} --rate {rate_for(nodes)}"
@@ -165,5 +166,5 @@ def decoded(payload: bytes) -> str:
 _HEADER = ("creator", "from_", "to", "forward")
 
 
-def _probe(to: int = BROADCAST) -> bytes:
-    return messages.packet(TEST_TYPE, MAX_NODE_ID, MAX_NODE_ID, to, to)
+def _probe() -> bytes:
+    return messages.packet(TEST_TYPE, MAX_NODE_ID, MAX_NODE_ID, BROADCAST, BROADCAST)

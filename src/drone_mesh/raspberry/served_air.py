@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import logging
+from functools import partial
 from typing import Callable
 
 from drone_mesh.drone.engines import create_engine
-from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
-from drone_mesh.errors import ConfigurationError, LocationUnknown
+from drone_mesh.errors import ConfigurationError
 from drone_mesh.nrf24.emulator.remote_chip import RemoteChip
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
 from drone_mesh.raspberry.air_options import AirAddress
@@ -20,13 +20,10 @@ from drone_mesh.web.access import is_loopback
 
 _log = logging.getLogger(__name__)
 
-MoveRadio = Callable[[], None]
-"""Moves the radio to the position of the drone."""
-
 
 def joining_node(
     options: Options, address: AirAddress, make_internet: MakeInternet | None
-) -> tuple[RadioNode, MoveRadio]:
+) -> RadioNode:
     """A node on the air served at this address. Raises ConfigurationError."""
     place = _place(options)
     try:
@@ -39,13 +36,14 @@ def joining_node(
     radio = NRF24LowLevelInterface(
         chip.spi, chip.ce, chip.irq, node_id=options.node_id, settings=options.radio
     )
-    node = node_with_drone(radio, options, place, make_internet)
-    return node, lambda: _follow(node.engine, lambda here: chip.move(here.to_vector()))
+    return node_with_drone(
+        radio, options, place, make_internet, lambda here: chip.move(here.to_vector())
+    )
 
 
 def serving_node(
     options: Options, air: EmulatedAir, address: AirAddress, make_internet: MakeInternet | None
-) -> tuple[RadioNode, MoveRadio]:
+) -> RadioNode:
     """A node on `air`, which other processes may join. Raises ConfigurationError."""
     host, port = air.serve(*address)
     _log.info("emulated air: others join it with --emulated-air %s:%d", host, port)
@@ -57,8 +55,7 @@ def serving_node(
         )
     place = _place(options)
     radio = air.radio(options.node_id, options.radio, place)
-    node = node_with_drone(radio, options, place, make_internet)
-    return node, lambda: _follow(node.engine, lambda here: air.move(options.node_id, here))
+    return node_with_drone(radio, options, place, make_internet, partial(air.move, options.node_id))
 
 
 def _place(options: Options) -> Location:
@@ -70,17 +67,13 @@ def node_with_drone(
     options: Options,
     place: Location | None,
     make_internet: MakeInternet | None,
+    move: Callable[[Location], None] | None = None,
 ) -> RadioNode:
     """A node with this radio, and the drone of the options. Raises ConfigurationError."""
     with contextlib.ExitStack() as opened:
         opened.callback(radio.close)
         engine = create_engine(options.node_id, place, options.flight)
         opened.callback(engine.close)
-        node = RadioNode(radio, engine, options, make_internet)
+        node = RadioNode(radio, engine, options, make_internet, move=move)
         opened.pop_all()
     return node
-
-
-def _follow(engine: IDroneEngine, move: Callable[[Location], None]) -> None:
-    with contextlib.suppress(LocationUnknown):
-        move(engine.get_location())

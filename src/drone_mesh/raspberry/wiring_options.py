@@ -3,14 +3,37 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
+from dataclasses import dataclass
 
 from drone_mesh.arguments import whole
-from drone_mesh.nrf24.gpio import CE_GPIO, IRQ_GPIO
+from drone_mesh.nrf24.gpio import CE_GPIO, IRQ_GPIO, CePin, GpiodCe, GpiodIrq, IrqPin
 from drone_mesh.nrf24.settings import DATA_RATES, DEFAULT_RATE, RadioSettings
-from drone_mesh.nrf24.spi import SPI_HZ
+from drone_mesh.nrf24.spi import SPI_HZ, SpiDevice, open_spi
 
 HIGHEST_GPIO = 27  # of the 40-pin header
 SPI_HZ_RANGE = (10_000, 10_000_000)  # [DS 8.3.2]: 10 MHz at most
+
+
+@dataclass(frozen=True)
+class Hardware:
+    """Where the radio is connected."""
+
+    spi: tuple[int, int]  # bus, device
+    ce_gpio: int
+    irq_gpio: int | None  # None: the radio is polled
+    spi_hz: int = SPI_HZ
+
+    def open(self) -> tuple[SpiDevice, CePin, IrqPin | None]:
+        """Open all, or raise RadioError and leave none open."""
+        with contextlib.ExitStack() as opened:
+            spi = open_spi(*self.spi, self.spi_hz)
+            opened.callback(spi.close)
+            ce = GpiodCe(self.ce_gpio)
+            opened.callback(ce.close)
+            irq = None if self.irq_gpio is None else GpiodIrq(self.irq_gpio)
+            opened.pop_all()
+        return spi, ce, irq
 
 
 def add_wiring_options(parser: argparse.ArgumentParser) -> None:
@@ -44,6 +67,11 @@ def add_wiring_options(parser: argparse.ArgumentParser) -> None:
         metavar="HZ",
         help="SPI clock; 1000000 for long wires (default: %(default)s)",
     )
+
+
+def wired_hardware(parsed: argparse.Namespace) -> Hardware:
+    """The parsed options."""
+    return Hardware(parsed.spi, parsed.ce, parsed.irq, parsed.spi_hz)
 
 
 def add_channel_options(group: argparse._ActionsContainer) -> None:

@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import base64
-import queue
 import threading
-from typing import Callable, Optional
+from collections import deque
+from concurrent import futures
+from typing import Callable
 
 from drone_mesh.communication.data.echo import EchoAnswer
 from drone_mesh.communication.data.ticket import Ticket, TicketState
 from drone_mesh.communication.data.transport import ReceivedMessage, Receiver, Transport
 from drone_mesh.errors import MessageRefused
+from drone_mesh.execution import Submit
 
 HANDOVER_S = 5.0  # our choice: a node accepts a message within this time
 LONGEST_WAIT_S = 300.0  # our choice: a reliable message is given up before
 MOST_UNREAD = 256  # messages that may wait for a slow listener; the oldest is dropped
-
-Submit = Callable[[Callable[[float], None]], None]
-"""Runs a function, with the time, on the thread that owns the node. Any thread may call it."""
 
 
 def in_json(message: ReceivedMessage) -> dict[str, object]:
@@ -27,9 +26,6 @@ def in_json(message: ReceivedMessage) -> dict[str, object]:
     return {**fields, "payload": base64.b64encode(message.payload).decode()}
 
 
-WhenOver = Callable[[Optional[Ticket], Optional[MessageRefused]], None]
-
-
 def check_wait(seconds: float) -> None:
     """Raise MessageRefused unless a caller may wait for so long."""
     if not 0.0 <= seconds <= LONGEST_WAIT_S:  # NaN neither
@@ -37,30 +33,25 @@ def check_wait(seconds: float) -> None:
 
 
 class Sending:
-    """One message submitted by another thread. The node's thread sets its fields."""
+    """One message submitted by another thread. The node's thread ends its futures."""
 
     def __init__(self, to: int, payload: bytes, port: int, reliable: bool) -> None:
         self._arguments = (to, payload, port, reliable)
-        self._handed_in = threading.Event()
-        self._ended = threading.Event()
-        self._ticket: Ticket | None = None
-        self._refusal: MessageRefused | None = None
-        self._lock = threading.Lock()
-        self._when_over: WhenOver | None = None
+        self.taken: futures.Future[Ticket] = futures.Future()  # or MessageRefused
+        self.over: futures.Future[Ticket] = futures.Future()  # in its final state, or refused
 
     def ticket(self) -> Ticket:
         """The ticket; raises MessageRefused with the reason if there is none."""
-        if not self._handed_in.wait(HANDOVER_S):
-            raise MessageRefused("the node is too busy to take a message, or it has stopped")
-        if self._refusal is not None:
-            raise self._refusal
-        assert self._ticket is not None
-        return self._ticket
+        try:
+            return self.taken.result(HANDOVER_S)
+        except futures.TimeoutError:
+            reason = "the node is too busy to take a message, or it has stopped"
+            raise MessageRefused(reason) from None
 
     def wait(self, seconds: float) -> bool:
         """Whether the message was delivered (without acknowledgement: sent) within `seconds`."""
         ticket = self.ticket()
-        if seconds > 0 and not self._ended.wait(seconds):
+        if seconds > 0 and not futures.wait([self.over], seconds).done:
             return False
         return ticket.state is not TicketState.GIVEN_UP
 
@@ -71,48 +62,22 @@ class Sending:
             return f"{ticket}; not delivered within {waited_s:g} s, the node keeps trying"
         return str(ticket)
 
-    @property
-    def is_taken(self) -> bool:
-        """Whether the node has accepted or refused it."""
-        return self._handed_in.is_set()
-
-    @property
-    def is_over(self) -> bool:
-        """Whether the message was refused or has its final state."""
-        return self._ended.is_set() or (self._handed_in.is_set() and self._ticket is None)
-
-    def when_over(self, call: WhenOver) -> None:
-        """Call `call` with the ticket or refusal once it is over; on this or the node's thread."""
-        self._when_over = call
-        self._call_when_over()
-
     def hand_in(self, transport: Transport, now_s: float) -> None:
         """Pass the message to the node's transport; called on the node's thread."""
         to, payload, port, reliable = self._arguments
         try:
             ticket = transport.send(to, payload, now_s, port=port, reliable=reliable)
         except MessageRefused as error:
-            self._refusal = error
+            self.taken.set_exception(error)
+            self.over.set_exception(error)
         else:
             ticket.changed = self._changed
-            self._ticket = ticket
+            self.taken.set_result(ticket)
             self._changed(ticket)
-        self._handed_in.set()
-        self._call_when_over()
 
     def _changed(self, ticket: Ticket) -> None:
-        if ticket.final:
-            self._ended.set()
-            self._call_when_over()
-
-    def _call_when_over(self) -> None:
-        """Call the function of `when_over` once it is set and the sending is over."""
-        with self._lock:
-            call = self._when_over if self._handed_in.is_set() and self.is_over else None
-            if call is not None:
-                self._when_over = None
-        if call is not None:
-            call(self._ticket, self._refusal)
+        if ticket.final and not self.over.done():
+            self.over.set_result(ticket)
 
 
 class Listener:
@@ -121,30 +86,24 @@ class Listener:
     def __init__(self, port: int | None) -> None:
         self._port = port
         self.close: Callable[[], None] = lambda: None  # no more messages
-        self._messages: queue.Queue[ReceivedMessage] = queue.Queue(MOST_UNREAD)
+        self._messages: deque[ReceivedMessage] = deque(maxlen=MOST_UNREAD)
+        self._arrived = threading.Condition()  # guards the messages
         self.dropped = 0  # messages dropped because they were not read in time
 
     def next(self, timeout_s: float) -> ReceivedMessage | None:
         """The next message; None if none arrived in time."""
-        try:
-            return self._messages.get(timeout=timeout_s)
-        except queue.Empty:
-            return None
+        with self._arrived:
+            has_one = self._arrived.wait_for(lambda: len(self._messages) > 0, timeout_s)
+            return self._messages.popleft() if has_one else None
 
     def put(self, message: ReceivedMessage) -> None:
         """Add a message; called on the node's thread."""
         if self._port not in (None, message.port):
             return
-        while True:
-            try:
-                self._messages.put_nowait(message)
-                return
-            except queue.Full:
-                self.dropped += 1
-                try:
-                    self._messages.get_nowait()
-                except queue.Empty:
-                    continue
+        with self._arrived:
+            self.dropped += len(self._messages) == MOST_UNREAD
+            self._messages.append(message)
+            self._arrived.notify()
 
 
 class UsersDesk:
@@ -198,28 +157,25 @@ class UsersDesk:
         answer came.
         """
         transport = self._require()
-        answers: queue.Queue[EchoAnswer | str] = queue.Queue()
+        answer: futures.Future[EchoAnswer] = futures.Future()
         hint = ""
 
         def ask(now_s: float) -> None:
             nonlocal hint
             hint = transport.hint()
             try:
-                if transport.echo(to, answers.put, now_s) is None:
-                    answers.put(transport.unreachable(to))
+                if transport.echo(to, answer.set_result, now_s) is None:
+                    raise MessageRefused(transport.unreachable(to))
             except MessageRefused as error:
-                answers.put(str(error))
+                answer.set_exception(error)
 
         self._submit(ask)
         try:
-            answer = answers.get(timeout=timeout_s)
-        except queue.Empty:
+            return answer.result(timeout_s)
+        except futures.TimeoutError:
             if hint:
                 raise MessageRefused(f"no answer within {timeout_s:g} s{hint}") from None
             return None
-        if isinstance(answer, str):
-            raise MessageRefused(answer)
-        return answer
 
     def _require(self) -> Transport:
         if self._transport is None:

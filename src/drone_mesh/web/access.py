@@ -8,15 +8,14 @@ In both cases a WebSocket is accepted only from the page that this server sent.
 from __future__ import annotations
 
 import hmac
-import ipaddress
 import socket
 from dataclasses import dataclass, field
 from typing import Iterable
-from urllib.parse import urlsplit
+from urllib.parse import SplitResult, urlsplit
 
 from drone_mesh.errors import ConfigurationError, MeshError
 from drone_mesh.web import LOOPBACK
-from drone_mesh.web.allowance import Allowance, client_of
+from drone_mesh.web.allowance import Allowance, client_of, numeric_address
 
 SHORTEST_TOKEN = 16  # characters; our choice: too long to be guessed over a network
 FREE_GUESSES = 10  # our choice: an old cookie or a typing error costs no time
@@ -47,16 +46,16 @@ class Access:
 
     def check_host(self, host: str) -> None:
         """Check the Host header. Raises AccessDenied."""
-        name = _host_name(f"//{host}")
+        name = _parts(f"//{host}").hostname or ""
         if self.token is None:
             if not is_loopback(name):
                 raise AccessDenied(f"{host!r} is not a loopback name of this machine")
-        elif self.names and name.lower() not in self.names and not _is_address(name):
+        elif self.names and name.lower() not in self.names and numeric_address(name) is None:
             raise AccessDenied(f"{host!r} is not a name of this machine; --name adds one")
 
     def check_origin(self, origin: str | None, host: str) -> None:
         """Check the Origin header: the requesting page must be ours. Raises AccessDenied."""
-        if origin is None or _authority(origin) != host.lower():
+        if origin is None or _parts(origin).netloc.lower() != host.lower():
             raise AccessDenied(
                 f"the page {origin or 'without an origin'} was not sent by this server"
             )
@@ -101,31 +100,13 @@ def own_names(*more: str) -> frozenset[str]:
 
 def is_loopback(name: str) -> bool:
     """Whether this host name or address is loopback."""
-    if name.lower() == "localhost":
-        return True
+    address = numeric_address(name)
+    return name.lower() == "localhost" or (address is not None and address.is_loopback)
+
+
+def _parts(address: str) -> SplitResult:
+    """All parts are empty if it is no address."""
     try:
-        return ipaddress.ip_address(name).is_loopback
+        return urlsplit(address)
     except ValueError:
-        return False
-
-
-def _is_address(name: str) -> bool:
-    try:
-        ipaddress.ip_address(name)
-    except ValueError:
-        return False
-    return True
-
-
-def _authority(origin: str) -> str:
-    try:
-        return urlsplit(origin).netloc.lower()
-    except ValueError:
-        return ""
-
-
-def _host_name(address: str) -> str:
-    try:
-        return urlsplit(address).hostname or ""
-    except ValueError:
-        return ""
+        return urlsplit("")

@@ -37,10 +37,13 @@ class Allowance:
 
 def client_of(address: str) -> str:
     """What counts as one client: an address, of IPv6 a whole /64."""
+    parsed = numeric_address(address)
+    return str(int(parsed) >> 64) if isinstance(parsed, ipaddress.IPv6Address) else address
+
+
+def numeric_address(text: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
+    """The IP address in this text; None for a name, or for a socket of this machine."""
     try:
-        parsed = ipaddress.ip_address(address)
-    except ValueError:  # a socket of this machine
-        return address
-    if isinstance(parsed, ipaddress.IPv6Address):
-        return str(int(parsed) >> 64)
-    return address
+        return ipaddress.ip_address(text)
+    except ValueError:
+        return None

@@ -13,11 +13,12 @@ import pytest
 
 from drone_mesh.console.controls import OrderRefused
 from drone_mesh.console.frames import FrameStore
-from drone_mesh.console.gateway_client import GatewayClient, GatewayControls, GatewayGone
+from drone_mesh.console.gateway_client import GatewayClient, GatewayControls
 from drone_mesh.console.gateway_command import GatewayFeed, main
 from drone_mesh.console.real_mesh import origin_of
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.errors import ConfigurationError
+from drone_mesh.web.json_client import NoAnswer
 
 NODE = {
     "id": 0,
@@ -192,7 +193,7 @@ def test_orders_that_only_a_simulation_knows_are_refused():
 
 def test_an_error_page_without_a_reason_is_named_by_its_status(gateway):
     gateway.status, gateway.answer = 500, "oops"
-    with pytest.raises(GatewayGone, match="500"):
+    with pytest.raises(NoAnswer, match="500"):
         GatewayClient(gateway.url).mesh(0)
 
 

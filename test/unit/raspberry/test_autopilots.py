@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import pytest
 
-from drone_mesh.raspberry.autopilots import main
+sys.path.insert(0, str(Path(__file__).parents[2] / "autopilot"))
+from arducopter import program_from_environment
+from autopilots import main
 
 
 @pytest.mark.parametrize(
@@ -34,8 +37,6 @@ def test_without_the_autopilot_s_software_it_says_what_to_set(
 
 
 def test_the_parameters_may_lie_elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from drone_mesh.raspberry.arducopter import program_from_environment
-
     file = tmp_path / "copter.parm"
     file.write_text("FRAME_CLASS 1\n")
     monkeypatch.setenv("ARDUCOPTER", "/bin/true")

@@ -10,7 +10,7 @@ import pytest
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.mavlink.autopilots import ARDUPILOT
 from drone_mesh.drone.mavlink_vehicle.server import VehicleServer
-from drone_mesh.raspberry import router
+from drone_mesh.raspberry.program import router
 
 pytestmark = pytest.mark.slow  # the vehicle lives in real time
 
@@ -27,7 +27,7 @@ def check(server: VehicleServer, monkeypatch: pytest.MonkeyPatch) -> int:
     drone = f"--drone mavlink:{server.addresses[0]} --origin 52.0907,5.1214,3"
     line = f"raspberry_router --id 3 {drone} check-drone"
     monkeypatch.setattr(sys, "argv", line.split())
-    return router.main()
+    return router()
 
 
 def test_a_safe_drone_passes_and_every_parameter_is_printed(
@@ -54,5 +54,5 @@ def test_without_an_autopilot_it_says_what_is_missing(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(sys, "argv", ["raspberry_router", "--id", "3", "check-drone"])
-    assert router.main() == 1
+    assert router() == 1
     assert "check-drone needs --drone mavlink:ADDRESS" in capsys.readouterr().err

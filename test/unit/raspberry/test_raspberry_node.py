@@ -19,7 +19,7 @@ from drone_mesh.nrf24.emulator.chip import EmulatedChip
 from drone_mesh.nrf24.emulator.links import IdealDisc
 from drone_mesh.nrf24.emulator.states import State
 from drone_mesh.nrf24.emulator.wall_clock import WallClock
-from drone_mesh.raspberry import program
+from drone_mesh.raspberry import program, wiring_options
 from drone_mesh.raspberry.options import parse_gateway, parse_router
 from drone_mesh.stopping import ends_as
 
@@ -55,9 +55,9 @@ def wired(monkeypatch):
     clock = WallClock()
     chip = EmulatedChip(Air(clock, IdealDisc(), random.Random(1)), "the chip")
     chip.pins = {5: Pin(chip.ce), 6: Pin(chip.irq)}
-    monkeypatch.setattr(program, "open_spi", lambda *where: {(0, 1): chip.spi}[where[:2]])
-    monkeypatch.setattr(program, "GpiodCe", chip.pins.__getitem__)
-    monkeypatch.setattr(program, "GpiodIrq", chip.pins.__getitem__)
+    monkeypatch.setattr(wiring_options, "open_spi", lambda *where: {(0, 1): chip.spi}[where[:2]])
+    monkeypatch.setattr(wiring_options, "GpiodCe", chip.pins.__getitem__)
+    monkeypatch.setattr(wiring_options, "GpiodIrq", chip.pins.__getitem__)
     yield chip
     clock.close()
 

@@ -18,12 +18,8 @@ from drone_mesh.internet.http_settings import HttpSettings
 from drone_mesh.nrf24.settings import BroadcastMode, DataRate, RadioSettings, TxPower
 from drone_mesh.raspberry.air_options import AirAddress, AirOptions
 from drone_mesh.raspberry.emulated_fleet import FleetOptions
-from drone_mesh.raspberry.options import (
-    Hardware,
-    Options,
-    parse_gateway,
-    parse_router,
-)
+from drone_mesh.raspberry.options import Options, parse_gateway, parse_router
+from drone_mesh.raspberry.wiring_options import Hardware
 
 TOKEN = "0123456789abcdef"
 

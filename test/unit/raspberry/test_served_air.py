@@ -18,7 +18,7 @@ def test_an_air_is_served_on_this_machine_only_unless_requested_and_then_with_a_
     assert options.air.serve is not None
     air = EmulatedAir(options.radio, 1)
     try:
-        node, _move = serving_node(options, air, options.air.serve, without_internet)
+        node = serving_node(options, air, options.air.serve, without_internet)
         node.stop()
     finally:
         air.close()

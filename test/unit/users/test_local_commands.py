@@ -13,14 +13,14 @@ import threading
 import pytest
 
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.users import listen_command, ping_command, send_command, trace_command
+from drone_mesh.users import commands
 from drone_mesh.users.local_client import LocalClient
 from drone_mesh.users.local_socket import LocalSocket, warn_of_unreachable
 from drone_mesh.users.socket_path import socket_path
 
 
 def test_ping_prints_hops_time_and_loss(rig, capsys):
-    assert ping_command.main(["--node", "0", "-c", "2", "-i", "0", "2"]) == 0
+    assert commands.ping(["--node", "0", "-c", "2", "-i", "0", "2"]) == 0
     assert capsys.readouterr().out == (
         "node 2: number 1, 2 hops, 8.0 ms\n"
         "node 2: number 2, 2 hops, 8.0 ms\n"
@@ -29,32 +29,32 @@ def test_ping_prints_hops_time_and_loss(rig, capsys):
 
 
 def test_ping_of_a_node_without_a_route_reports_it(rig, capsys):
-    assert ping_command.main(["--node", "0", "-c", "1", "77"]) == 1
+    assert commands.ping(["--node", "0", "-c", "1", "77"]) == 1
     assert capsys.readouterr().out == (
         "node 77: number 1: no route to node 77\n1 sent, 0 answered, 100 % lost\n"
     )
 
 
 def test_trace_names_the_nodes_on_the_route(rig, capsys):
-    assert trace_command.main(["--node", "0", "2"]) == 0
+    assert commands.trace(["--node", "0", "2"]) == 0
     assert capsys.readouterr().out == ("  1  node 1\n  2  node 2\nround trip: 8.0 ms\n")
 
 
 @pytest.mark.parametrize("to", ["gateway", "0"])
 def test_send_reports_that_the_message_arrived(rig, capsys, to):
-    assert send_command.main(["--node", "2", to, "21.5 degrees"]) == 0
+    assert commands.send(["--node", "2", to, "21.5 degrees"]) == 0
     assert "delivered" in capsys.readouterr().out
     assert [message.payload for message in rig.network.received[0]] == [b"21.5 degrees"]
 
 
 def test_send_takes_an_argument_that_is_no_text_as_the_bytes_that_it_is(rig):
-    assert send_command.main(["--node", "2", "0", os.fsdecode(b"\xff\xfe")]) == 0
+    assert commands.send(["--node", "2", "0", os.fsdecode(b"\xff\xfe")]) == 0
     assert [message.payload for message in rig.network.received[0]] == [b"\xff\xfe"]
 
 
 def test_send_takes_any_bytes_from_standard_input(rig, monkeypatch):
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(b"\x00\xff")))
-    assert send_command.main(["--node", "2", "--no-ack", "--port", "9", "1"]) == 0
+    assert commands.send(["--node", "2", "--no-ack", "--port", "9", "1"]) == 0
     (message,) = rig.network.received[1]
     assert (message.payload, message.port, message.reliable) == (b"\x00\xff", 9, False)
 
@@ -73,14 +73,14 @@ def test_send_takes_any_bytes_from_standard_input(rig, monkeypatch):
     ],
 )
 def test_an_error_about_a_message_is_one_line(rig, capsys, arguments, reason):
-    assert send_command.main(arguments) == 1
+    assert commands.send(arguments) == 1
     said = capsys.readouterr()
     assert reason in said.out + said.err
     assert (said.out + said.err).count("\n") == 1
 
 
 def test_a_ping_with_a_size_times_messages_of_that_size(rig, capsys):
-    assert ping_command.main(["--node", "2", "-c", "1", "-s", "200", "0"]) == 0
+    assert commands.ping(["--node", "2", "-c", "1", "-s", "200", "0"]) == 0
     said = capsys.readouterr().out
     assert re.match(r"node 0: number 1, 200 bytes, [\d.]+ ms\n1 sent, 1 answered, 0 % lost; ", said)
     (message,) = rig.network.received[0]
@@ -91,7 +91,7 @@ def test_listen_prints_what_arrives_as_text_or_as_json(rig, capsys):
     lines = []
     for options in ([], ["--json"]):
         listening = threading.Thread(
-            target=listen_command.main, args=([*options, "--node", "0", "-c", "1"],)
+            target=commands.listen, args=([*options, "--node", "0", "-c", "1"],)
         )
         listening.start()
         while not rig.desks[0]._receivers:
@@ -107,7 +107,7 @@ def test_listen_prints_what_arrives_as_text_or_as_json(rig, capsys):
 
 
 def test_without_a_node_the_command_says_what_to_start(capsys):
-    assert trace_command.main(["3"]) == 1
+    assert commands.trace(["3"]) == 1
     assert "no node runs here" in capsys.readouterr().err
 
 
@@ -115,25 +115,25 @@ def test_a_killed_node_is_not_offered(rig, capsys):
     for left in (4, 5):
         with socket.socket(socket.AF_UNIX) as dead:
             dead.bind(str(socket_path(left)))
-    assert trace_command.main(["3"]) == 1
+    assert commands.trace(["3"]) == 1
     assert "several nodes run here (0, 1, 2): choose one" in capsys.readouterr().err
 
 
 def test_a_ping_that_was_never_sent_is_not_counted(capsys):
-    assert ping_command.main(["3"]) == 1
+    assert commands.ping(["3"]) == 1
     said = capsys.readouterr()
     assert said.out == ""
     assert said.err.count("\n") == 1
 
 
 def test_a_message_far_too_large_is_named_as_that(rig, capsys):
-    assert send_command.main(["--node", "2", "0", "x" * 9000]) == 1
+    assert commands.send(["--node", "2", "0", "x" * 9000]) == 1
     assert "too large: 9000 bytes" in capsys.readouterr().err
 
 
 def test_an_invalid_receiver_is_named_with_all_valid_ones(capsys):
     with pytest.raises(SystemExit):
-        send_command.main(["banana", "21.5"])
+        commands.send(["banana", "21.5"])
     assert (
         "invalid value 'banana': must be a whole number 0..253, gateway or all"
         in capsys.readouterr().err
@@ -142,7 +142,7 @@ def test_an_invalid_receiver_is_named_with_all_valid_ones(capsys):
 
 def test_an_invalid_node_in_the_environment_gives_one_line(monkeypatch, capsys):
     monkeypatch.setenv("DRONE_MESH_NODE", "five")
-    assert trace_command.main(["3"]) == 1
+    assert commands.trace(["3"]) == 1
     assert capsys.readouterr().err == (
         "mesh_trace: DRONE_MESH_NODE: invalid value 'five': must be a whole number 0..253\n"
     )
@@ -160,7 +160,7 @@ def test_an_invalid_node_in_the_environment_gives_one_line(monkeypatch, capsys):
 )
 def test_invalid_numbers_are_refused(capsys, arguments, reason):
     with pytest.raises(SystemExit):
-        ping_command.main(arguments)
+        commands.ping(arguments)
     assert reason in capsys.readouterr().err
 
 

@@ -11,14 +11,15 @@ import time
 from pathlib import Path
 from typing import Sequence
 
+from arducopter import ArduCopter, program_from_environment
+from pilot_side import PilotSide
+
 from drone_mesh.arguments import whole
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.nrf24.settings import DataRate
-from drone_mesh.raspberry.arducopter import ArduCopter, program_from_environment
 from drone_mesh.raspberry.emulated_air import column_place
 from drone_mesh.raspberry.emulated_fleet import DEMONSTRATION_ORIGIN
-from drone_mesh.raspberry.pilot_side import PilotSide
 from drone_mesh.stopping import ends_as
 
 MOST_COPTERS = 16  # our choice
