@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Callable, Optional, Protocol
+from typing import Callable, Optional
 
 from drone_mesh.air.obstacles import NO_PATH
 from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath, PlanFlight
@@ -11,15 +11,7 @@ from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused
-
-
-class Time(Protocol):
-    """The functions of a clock that a drone needs."""
-
-    @property
-    def now_s(self) -> float: ...
-
-    def call_at(self, at_s: float, function: Callable[[Any], None], argument: Any) -> None: ...
+from drone_mesh.inprocess.clock import Clock
 
 
 OnPath = Callable[[Optional[FlightPath], FlightPath], None]
@@ -31,7 +23,7 @@ class InProcessDrone(IDroneEngine):
 
     def __init__(
         self,
-        clock: Time,
+        clock: Clock,
         start: Location,
         on_flight: Callable[[bool], None],
         why_not_fly: str = "",
