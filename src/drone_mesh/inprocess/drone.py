@@ -13,7 +13,6 @@ from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused
 from drone_mesh.inprocess.clock import Clock
 
-
 OnPath = Callable[[Optional[FlightPath], FlightPath], None]
 """Called with the path so far (None: at rest) and the new one."""
 

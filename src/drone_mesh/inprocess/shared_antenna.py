@@ -261,7 +261,7 @@ class SharedAntenna(IInProcessAntenna, SharedRadio):
         answers = packet.priority if broadcast and is_answered(packet.payload) else None
         self.access.heard(sender_id, self._clock.now_s, broadcast=answers, train=train)
         payload = readdressed(packet.payload, self.node_id) if broadcast else packet.payload
-        self._air.payloads += 1
+        self._air.delivered += 1
         self._submit(lambda now_s: mesh.on_msg(payload, now_s))
 
 

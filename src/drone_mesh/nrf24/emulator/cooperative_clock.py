@@ -45,7 +45,7 @@ class _Turn:
         self.parked = 0  # number of waits, to recognise wake-ups for earlier ones
 
 
-class _VirtualTask(Task):
+class _VirtualTask:
     def __init__(self, clock: CooperativeClock, run: Callable[[], None], name: str) -> None:
         self.turn = _Turn(greenlet.greenlet(self._live, clock.first_stack))
         self.name = name

@@ -40,7 +40,7 @@ class EmulatedIrq:
 
     def __init__(self, clock: EmulatorClock) -> None:
         self._clock = clock
-        self._signal = clock.signal()
+        self._signal = clock.runtime.signal()
         self._value = True
         self.fell_ns: int | None = None  # when it last went low
 

@@ -16,7 +16,7 @@ import threading
 import time
 from typing import Any, Callable, Iterator
 
-from drone_mesh.channel.runtime import Runtime, Signal, SystemRuntime, ThreadSignal
+from drone_mesh.channel.runtime import Runtime, SystemRuntime
 from drone_mesh.nrf24.airtime import NS_PER_S
 from drone_mesh.nrf24.emulator.clock import EmulatorClock
 
@@ -69,9 +69,6 @@ class WallClock(EmulatorClock):
 
     def elapse(self, duration_ns: int) -> None:
         """Does nothing: the host is slower than SPI anyway."""
-
-    def signal(self) -> Signal:
-        return ThreadSignal()
 
     def _catch_up(self) -> None:
         while True:
