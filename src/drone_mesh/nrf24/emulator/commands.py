@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from drone_mesh.nrf24.emulator.chip_core import ChipCore
+from drone_mesh.nrf24.emulator.chip_core import ANSWERING, SENDING, ChipCore, State
 from drone_mesh.nrf24.emulator.fifos import TxPayload
-from drone_mesh.nrf24.emulator.states import ANSWERING, SENDING, State
 from drone_mesh.nrf24.emulator.transmitter import Transmitter
 from drone_mesh.nrf24.registers import (
     ARC_CNT,

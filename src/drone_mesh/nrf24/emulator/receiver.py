@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from drone_mesh.nrf24.airtime import SETTLING_NS
-from drone_mesh.nrf24.emulator.chip_core import ChipCore
+from drone_mesh.nrf24.emulator.chip_core import ChipCore, State
 from drone_mesh.nrf24.emulator.fifos import Incoming, TxPayload
 from drone_mesh.nrf24.emulator.frames import Frame, Packet
-from drone_mesh.nrf24.emulator.states import State
 from drone_mesh.nrf24.registers import PIPES, RX_DR, TX_DS
 
 _NOTHING_YET = (-1, -1)
