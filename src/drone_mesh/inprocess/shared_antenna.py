@@ -23,7 +23,6 @@ from drone_mesh.inprocess.clock import VirtualClock
 from drone_mesh.inprocess.interfaces import Host, IInProcessAntenna
 from drone_mesh.inprocess.shared_air import SharedAir, SharedRadio, Transmission
 from drone_mesh.nrf24.airtime import NS_PER_S, SETTLING_NS, ard_s
-from drone_mesh.nrf24.pace import access_rules, medium_of
 from drone_mesh.nrf24.registers import FIFO_DEPTH
 from drone_mesh.nrf24.transceiver import CE_PULSE_S, TX_DELAY_S
 
@@ -42,13 +41,13 @@ class SharedAntenna(IInProcessAntenna, SharedRadio):
         self.node_id = host.node_id
         self.drone = host.drone
         self.listening_since_s: float | None = None
-        self.access = MediumAccess(access_rules(air.settings), rng)
+        self.access = MediumAccess(air.settings.access_rules, rng)
         self._air = air
         self._clock: VirtualClock = air.clock
         self._submit = host.submit
         self._settings = air.settings
         self._tx_delay_s = TX_DELAY_S[air.settings.data_rate]
-        self._medium = medium_of(air.settings)
+        self._medium = air.settings.medium
         self._mesh: IMeshNetwork | None = None
         self.powered = True
         self._planned_s = math.inf

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import random
 from dataclasses import replace
-from typing import Callable
+from typing import Callable, Iterator
 
-from drone_mesh.channel.access_rules import AccessRules
 from drone_mesh.channel.medium_access import Fate, MediumAccess
 from drone_mesh.channel.packet_queue import OutgoingPacket
 from drone_mesh.channel.radio import Try
@@ -18,7 +18,6 @@ from drone_mesh.communication.packet_types import Priority
 from drone_mesh.nrf24.errors import RadioError
 from drone_mesh.nrf24.gpio import CePin, IrqPin
 from drone_mesh.nrf24.irq_watch import IrqWatch
-from drone_mesh.nrf24.pace import access_rules, medium_of
 from drone_mesh.nrf24.settings import RadioSettings
 from drone_mesh.nrf24.spi import SpiDevice
 from drone_mesh.nrf24.transceiver import PipePayload, Transceiver
@@ -54,15 +53,13 @@ class NRF24LowLevelInterface:
         settings: RadioSettings = RadioSettings(),  # noqa: B008 (frozen)
         runtime: Runtime | None = None,
         rng: random.Random | None = None,
-        rules: AccessRules | None = None,
     ) -> None:
-        """`rules`: of access to the channel; by default those of `pace.access_rules`."""
         self.node_id = node_id
         self.settings = settings
-        self.medium = medium_of(settings)
+        self.medium = settings.medium
         self._spi, self._ce, self._irq = spi, ce, irq
         self._runtime = runtime or SystemRuntime()
-        self.access = MediumAccess(rules or access_rules(settings), rng or random.Random())
+        self.access = MediumAccess(settings.access_rules, rng or random.Random())
         self._lock = self._runtime.lock()  # guards the chip and all fields below
         self._statistics = RadioStatistics()
         self._chip = Transceiver(spi, ce, node_id, settings, self._runtime, self._statistics)
@@ -150,10 +147,8 @@ class NRF24LowLevelInterface:
         and acknowledged packets of that node. Therefore pipe 3 stays closed.
         """
         chip, address = self._chip, self.settings.node_address(node_id)
-        with self._lock:
-            if not self._ready():
-                return Try(False, 0)
-            try:
+        with self._noting_failure():
+            if self._ready():
                 chip.become_transmitter(address)
                 chip.load(address, payload, again=again)
                 chip.set_retries(delay, retransmits)
@@ -167,32 +162,23 @@ class NRF24LowLevelInterface:
                     chip.set_retries(delay, retransmits)
                     outcome = chip.transmit()
                 chip.listen()
-            except RadioError as error:
-                self._failed(error)
-                return Try(False, 0)
-            return outcome
+                return outcome
+        return Try(False, 0)
 
     def drop(self) -> None:
         """Give up the packet that was tried last: remove it from the chip."""
-        with self._lock:
-            try:
-                if self._working:
-                    self._chip.drop()
-            except RadioError as error:
-                self._failed(error)
+        with self._noting_failure():
+            if self._working:
+                self._chip.drop()
 
     def broadcast(self, payload: bytes) -> bool:
         """Send 32 bytes to every node in range; True if they were sent."""
         _check(payload)
-        with self._lock:
-            if not self._ready():
-                return False
-            try:
+        with self._noting_failure():
+            if self._ready():
                 self._chip.transmit_to_all(payload)
-            except RadioError as error:
-                self._failed(error)
-                return False
-            return True
+                return True
+        return False
 
     def receive(self, timeout_s: float) -> list[PipePayload]:
         """Received payloads, oldest first; waits up to `timeout_s` for one. For one thread."""
@@ -213,14 +199,10 @@ class NRF24LowLevelInterface:
 
     def hears_power(self) -> bool | None:
         """Whether more than -64 dBm were in the channel for 40 us (RPD); None: it fails now."""
-        with self._lock:
-            if not self._ready():
-                return None
-            try:
+        with self._noting_failure():
+            if self._ready():
                 return self._chip.received_power()
-            except RadioError as error:
-                self._failed(error)
-                return None
+        return None
 
     def _pause(self, duration_s: float) -> None:
         """Wait, and keep receiving."""
@@ -280,6 +262,15 @@ class NRF24LowLevelInterface:
             return False
         logger.warning("node %d: the radio works again", self.node_id)
         return True
+
+    @contextlib.contextmanager
+    def _noting_failure(self) -> Iterator[None]:
+        """Use the chip under the lock; if it fails, what follows this block runs."""
+        with self._lock:
+            try:
+                yield
+            except RadioError as error:
+                self._failed(error)
 
     def _failed(self, error: RadioError) -> None:
         """Note that the chip must be set up again before use."""
