@@ -37,7 +37,7 @@ from typing import Any
 
 from drone_mesh.channel.access_rules import AccessRules
 from drone_mesh.channel.packet_queue import ALL_NODES, OutgoingPacket, PacketQueue
-from drone_mesh.channel.yielding import InTrain, Yielding
+from drone_mesh.channel.trains import InTrain, Yielding
 from drone_mesh.communication.packet_types import Priority
 
 

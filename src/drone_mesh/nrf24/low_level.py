@@ -17,7 +17,6 @@ from drone_mesh.communication.interfaces import PAYLOAD_BYTES
 from drone_mesh.communication.packet_types import Priority
 from drone_mesh.nrf24.errors import RadioError
 from drone_mesh.nrf24.gpio import CePin, IrqPin
-from drone_mesh.nrf24.irq_watch import IrqWatch
 from drone_mesh.nrf24.settings import RadioSettings
 from drone_mesh.nrf24.spi import SpiDevice
 from drone_mesh.nrf24.transceiver import PipePayload, Transceiver
@@ -28,7 +27,37 @@ logger = logging.getLogger(__name__)
 
 POLL_S = 5e-3  # three payloads fit in the FIFO, and take 5.4 ms to arrive at 250 kbit/s
 VERIFY_PERIOD_S = 1.0  # our choice: how long a brown-out may stay unnoticed while listening
+IRQ_PATIENCE = 3  # contradictions between pin and chip; a single one may be a race
 RESTART_PERIOD_S = 1.0  # our choice: shortest time between two attempts to find a lost chip
+
+
+class IrqWatch:
+    """Decides whether the IRQ pin works, or the chip must be polled. For the receiving thread."""
+
+    def __init__(self) -> None:
+        self.trusted = True
+        self._said: bool | None = None  # whether the pin was low; None: not read
+        self._contradictions = 0
+
+    def woken(self, low: bool) -> None:
+        """The wait for the pin is over."""
+        self._said = low
+
+    def polled(self, found: bool, low_for_nothing: bool) -> bool:
+        """The chip was read after the wait; returns whether the pin is now considered broken.
+
+        `found`: there were payloads, so the pin should have been low. `low_for_nothing`: all flags
+        are clear, but the pin is low.
+        """
+        said, self._said = self._said, None
+        if low_for_nothing or (found and said is False):
+            self._contradictions += 1
+        elif found and said:
+            self._contradictions = 0
+        if self._contradictions < IRQ_PATIENCE or not self.trusted:
+            return False
+        self.trusted = False
+        return True
 
 
 class NRF24LowLevelInterface:

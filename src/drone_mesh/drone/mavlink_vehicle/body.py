@@ -1,11 +1,28 @@
-"""The body of the simulated drone: position, movement, battery."""
+"""The body of the simulated drone: position, movement, battery; and the faults of a vehicle."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 from drone_mesh.drone.location import Location
 
 LANDING_SPEED_M_S = 1.0  # our choice
 ARRIVED_M = 0.05  # our choice
+
+
+@dataclass
+class VehicleFaults:
+    """Faults, which may be set at any time; none by default."""
+
+    silent: bool = False  # the link is broken in both directions
+    fix_type: int = 3  # GPS_FIX_TYPE
+    estimate_good: bool = True
+    positions_stop: bool = False
+    fence_breached: bool = False
+    refuses_to_arm: bool = False
+    spool_up_s: float = 0.0  # from the acknowledgement of a take-off to the first movement
+    battery_known: bool = True
+    stick_us: int = 1500  # of the roll stick
 
 
 class Body:

@@ -11,8 +11,7 @@ from drone_mesh.drone.geodesy import EarthPlace, Origin
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.autopilots import OUR_SYSTEM_ID, PX4, Autopilot
 from drone_mesh.drone.mavlink.telemetry import Message
-from drone_mesh.drone.mavlink_vehicle.body import LANDING_SPEED_M_S, Body
-from drone_mesh.drone.mavlink_vehicle.faults import VehicleFaults
+from drone_mesh.drone.mavlink_vehicle.body import LANDING_SPEED_M_S, Body, VehicleFaults
 from drone_mesh.drone.mavlink_vehicle.inquiries import Inquiries
 from drone_mesh.drone.mavlink_vehicle.modes import Mode, mode_of
 from drone_mesh.drone.mavlink_vehicle.parameters import Parameters
