@@ -185,12 +185,10 @@ class Commander:
 
     def target(self, place: EarthPlace) -> None:
         """Send the position to fly to now."""
-        telemetry = self._telemetry
         self._send(
             mavlink.MAVLink_set_position_target_global_int_message(
                 0,
-                telemetry.system_id,
-                telemetry.component_id,
+                *self._telemetry.sender,
                 mavlink.MAV_FRAME_GLOBAL_INT,
                 POSITION_ONLY,
                 round(place.latitude_deg * 1e7),
@@ -202,20 +200,11 @@ class Commander:
 
     def read_parameter(self, name: str) -> None:
         """Request one parameter; the answer is a PARAM_VALUE."""
-        telemetry = self._telemetry
-        self._send(
-            mavlink.MAVLink_param_request_read_message(
-                telemetry.system_id, telemetry.component_id, name.encode(), -1
-            )
-        )
+        sender = self._telemetry.sender
+        self._send(mavlink.MAVLink_param_request_read_message(*sender, name.encode(), -1))
 
     def _send_command(
         self, command: int, parameters: tuple[float, ...], confirmation: int = 0
     ) -> None:
-        telemetry = self._telemetry
-        padded = (*parameters, *(0.0,) * (7 - len(parameters)))
-        self._send(
-            mavlink.MAVLink_command_long_message(
-                telemetry.system_id, telemetry.component_id, command, confirmation, *padded
-            )
-        )
+        sender, padded = self._telemetry.sender, (*parameters, *(0.0,) * (7 - len(parameters)))
+        self._send(mavlink.MAVLink_command_long_message(*sender, command, confirmation, *padded))

@@ -56,19 +56,22 @@ STREAMS_HZ = {
 ESTIMATE_HZ = 4.0
 
 
+def sender_of(message: Message) -> tuple[int, int]:
+    """The system and the component that sent a message."""
+    return message.get_srcSystem(), message.get_srcComponent()
+
+
 class Telemetry:
     """The latest report of one autopilot on each subject. Times are of the caller's clock."""
 
     def __init__(self) -> None:
         self.autopilot: Autopilot | None = None  # None until one was heard
-        self.system_id = 0
-        self.component_id = 0
+        self.sender = (0, 0)  # its system and component
         self.heartbeat_s = -math.inf
         self.mode = -1  # custom_mode
         self.armed = False
         self.failsafe = False
         self.home: EarthPlace | None = None
-        self.foreign = 0  # messages of other systems
         self._other_vehicle = False  # an unsupported autopilot was heard
         self._place: EarthPlace | None = None
         self._place_s = -math.inf
@@ -104,11 +107,8 @@ class Telemetry:
                 self.autopilot = autopilot_of(message.autopilot)
             if message.get_srcComponent() == mavlink.MAV_COMP_ID_AUTOPILOT1:
                 self._other_vehicle = self.autopilot is None
-            self.system_id = message.get_srcSystem()
-            self.component_id = message.get_srcComponent()
-        sender = (message.get_srcSystem(), message.get_srcComponent())
-        if self.autopilot is None or sender != (self.system_id, self.component_id):
-            self.foreign += 1
+            self.sender = sender_of(message)
+        if self.autopilot is None or sender_of(message) != self.sender:
             return False
         take = self._takes.get(message.get_type())
         if take is not None:

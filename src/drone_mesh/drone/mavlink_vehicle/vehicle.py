@@ -42,19 +42,13 @@ class MavlinkVehicle:
         home: Origin,
         send: Callable[[Message], None],
         system_id: int = 1,
-        speed_m_s: float = 5.0,
-        drain_percent_s: float = 0.05,
     ) -> None:
-        """At home, disarmed, in its holding mode.
-
-        `speed_m_s` is its speed unless targets are slower. `drain_percent_s` is the discharge per
-        second in the air.
-        """
+        """At home, disarmed, in its holding mode."""
         self.autopilot = autopilot
         self.system_id = system_id
         self.home = home
         self.faults = VehicleFaults()
-        self.body = Body(speed_m_s, drain_percent_s)
+        self.body = Body()
         self.parameters = Parameters(autopilot)
         self.mode = Mode.HOLD
         self.in_failsafe = False
@@ -66,8 +60,11 @@ class MavlinkVehicle:
         self._lifts_s = -math.inf  # when the motors have spooled up
         self._ground_station_s = math.nan  # when its heartbeat was heard; NaN: never
         # ArduPilot keeps home in item 0.
-        self.mission = UploadedMission(self._send, self._place, 0 if autopilot is PX4 else 1)
+        self.mission = UploadedMission(
+            self._send, self._place, lambda: self.now_s, 0 if autopilot is PX4 else 1
+        )
         self._reports = Reports(self)
+        mission = self.mission
         inquiries = Inquiries(self._reports, self.parameters, self._send, lambda: self.now_s)
         self._inquiries = inquiries
         self._takes: dict[str, Callable[[Message], None]] = {
@@ -80,9 +77,6 @@ class MavlinkVehicle:
             "PARAM_REQUEST_LIST": inquiries.take_parameter_list_request,
             "PARAM_SET": inquiries.take_parameter,
             "TIMESYNC": inquiries.take_timesync,
-        }
-        mission = self.mission
-        self._takes_of_mission: dict[str, Callable[[Message, float], None]] = {
             "MISSION_REQUEST_LIST": mission.take_list_request,
             "MISSION_REQUEST_INT": mission.take_request,
             "MISSION_REQUEST": mission.take_request,
@@ -121,16 +115,13 @@ class MavlinkVehicle:
         take = self._takes.get(message.get_type())
         if take is not None:
             take(message)
-        of_mission = self._takes_of_mission.get(message.get_type())
-        if of_mission is not None:
-            of_mission(message, now_s)
 
     def tick(self, now_s: float) -> None:
         """Fly on to this time and send what is due."""
         passed_s = min(1.0, max(0.0, now_s - self.now_s))
         self.now_s = now_s
         self._watch_for_failsafes()
-        self.mission.tick(now_s)
+        self.mission.tick()
         self._fly(passed_s)
         for message in self._reports.due(now_s):
             self._send(message)
@@ -159,7 +150,7 @@ class MavlinkVehicle:
         if self.mode is Mode.TAKE_OFF and arrived:
             self._enter(Mode.HOLD)
         elif self.mode is Mode.MISSION and arrived and self.mission.item() is not None:
-            self.mission.arrived(self.now_s)
+            self.mission.arrived()
         self._disarm_on_ground()
 
     def _next_way_point(self, here: Location) -> Location:
