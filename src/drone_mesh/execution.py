@@ -69,7 +69,7 @@ class Driven(Protocol):
 
 
 class _Periodic:
-    """A function that is called once per period."""
+    """Calls a function once per period, until it is cancelled."""
 
     def __init__(self, period_s: float, function: Work, first_s: float) -> None:
         self._period_s = period_s
@@ -77,10 +77,11 @@ class _Periodic:
         self.next_tick_s = first_s
 
     def tick(self, now_s: float) -> None:
-        """Call it; skip periods that have already passed."""
-        missed = max(0.0, (now_s - self.next_tick_s) // self._period_s)
-        self.next_tick_s += self._period_s * (missed + 1.0)
-        self._function(now_s)
+        """Call it, if it is due; skip periods that have already passed."""
+        if now_s >= self.next_tick_s:
+            passed = (now_s - self.next_tick_s) // self._period_s
+            self.next_tick_s += self._period_s * (passed + 1.0)
+            self._function(now_s)
 
     def cancel(self) -> None:
         self.next_tick_s = math.inf
@@ -152,7 +153,7 @@ class MeshExecutor:
         self._next_due_s = math.inf
         self._worst_lag_s = 0.0
         # Only for the worker.
-        self._deadlines: list[tuple[float, int, ExecutorSlot | _Periodic]] = []
+        self._deadlines: list[tuple[float, int, ExecutorSlot]] = []
         self._order = itertools.count()
         self._served_s, self._served = -math.inf, 0  # requests, and at which time of the clock
         self._logged_s: dict[str, float] = {}
@@ -197,7 +198,8 @@ class MeshExecutor:
     def call_every(self, period_s: float, function: Work) -> Callable[[], None]:
         """Call `function` once per period, first after one; returns a function to stop it."""
         periodic = _Periodic(period_s, function, self._clock() + period_s)
-        self.submit(lambda _now_s: self._schedule(periodic, periodic.next_tick_s))
+        slot = self.slot()
+        slot.submit(lambda _now_s: slot.take(periodic))
         return periodic.cancel
 
     def time_advanced(self) -> None:
@@ -277,18 +279,13 @@ class MeshExecutor:
             return None
 
     def _tick_first(self, now_s: float) -> None:
-        due_s, _, driven = heapq.heappop(self._deadlines)
-        if isinstance(driven, ExecutorSlot):
-            if due_s != driven.scheduled_s:
-                return  # it has been rescheduled
-            driven.scheduled_s = math.inf
-        elif due_s != driven.next_tick_s:
-            return  # cancelled
+        due_s, _, slot = heapq.heappop(self._deadlines)
+        if due_s != slot.scheduled_s:
+            return  # it has been rescheduled
+        slot.scheduled_s = math.inf
         self._working_since_s = due_s
         self._worst_lag_s = max(self._worst_lag_s, now_s - due_s)
-        self._run(driven.tick, now_s, driven if isinstance(driven, ExecutorSlot) else None)
-        if isinstance(driven, _Periodic):
-            self._schedule(driven, driven.next_tick_s)
+        self._run(slot.tick, now_s, slot)
 
     def _run(self, function: Work, now_s: float, slot: ExecutorSlot | None) -> None:
         not_before_s = -math.inf
@@ -299,11 +296,8 @@ class MeshExecutor:
             not_before_s = now_s + RETRY_AFTER_S
         if slot is not None and slot.next_tick_s != slot.scheduled_s:
             slot.scheduled_s = max(slot.next_tick_s, not_before_s)
-            self._schedule(slot, slot.scheduled_s)
-
-    def _schedule(self, driven: ExecutorSlot | _Periodic, due_s: float) -> None:
-        if due_s < math.inf:
-            heapq.heappush(self._deadlines, (due_s, next(self._order), driven))
+            if slot.scheduled_s < math.inf:
+                heapq.heappush(self._deadlines, (slot.scheduled_s, next(self._order), slot))
 
     def _stop(self, _now_s: float) -> None:
         self._stopping = True
