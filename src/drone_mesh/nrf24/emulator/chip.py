@@ -86,7 +86,7 @@ class EmulatedChip(ChipCore):
         if self.registers.receiver:
             if self.ce.value:
                 self.state = State.RX_SETTLING
-                self.after(SETTLING_NS, self.receiver.listen)
+                self.after(SETTLING_NS, lambda: self.listen(State.RX))
             else:
                 self.state = State.STANDBY_I
         elif not self.ce.value:
@@ -148,7 +148,7 @@ class EmulatedChip(ChipCore):
         else:
             taken = self.receiver.frame_arrived(frame)
         if taken:
-            self.latch_rpd(power_dbm > RPD_DBM)
+            self.rpd_latched = power_dbm > RPD_DBM  # even if a stronger frame came before
 
     def frame_left(self) -> None:
         self.transmission = None

@@ -92,7 +92,8 @@ class ChipCore(abc.ABC):
         self.transmission: Transmission | None = None  # its own frame on the air
         self.ce_rose_ns = -SETTLING_NS
         self._epoch = 0  # timers of an earlier epoch are void
-        self._rpd_latched: bool | None = False  # None: the current state of the channel
+        # RPD as a valid packet or the end of listening left it; None: the state of the channel.
+        self.rpd_latched: bool | None = False
         self.ce = EmulatedCe(self.clock, self._ce_changed)
         self.irq = EmulatedIrq(self.clock)
 
@@ -182,14 +183,14 @@ class ChipCore(abc.ABC):
     def listen(self, state: State) -> None:
         """The receiver has settled."""
         self.state = state
-        self._rpd_latched = None
+        self.rpd_latched = None
         self._listening_to = (self.registers.channel, self.registers.bits_per_s)
         self.air.listen(self, *self._listening_to)
 
     def stop_listening(self) -> None:
         """The receiver is switched off; RPD keeps its last value."""
         if self.listening_since_ns is not None:
-            self._rpd_latched = self.rpd()
+            self.rpd_latched = self.rpd()
             self.air.stop_listening(self, *self._listening_to)
 
     def retune(self) -> None:
@@ -200,8 +201,8 @@ class ChipCore(abc.ABC):
 
     def rpd(self) -> bool:
         """Received power detector: above -64 dBm now, when a packet arrived, or at the end."""
-        if self._rpd_latched is not None:
-            return self._rpd_latched
+        if self.rpd_latched is not None:
+            return self.rpd_latched
         if self.listening_since_ns is None:
             return False
         channel, bits_per_s = self._listening_to
@@ -232,10 +233,6 @@ class ChipCore(abc.ABC):
         if self.transmission is not None:
             self.air.abort(self.transmission)
             self.transmission = None
-
-    def latch_rpd(self, strong: bool) -> None:
-        """A valid packet arrived: RPD shows its power, even if a stronger one came before."""
-        self._rpd_latched = strong
 
     def recognised_until_ns(self) -> int | None:
         """End of the incoming recognised frame, or None."""

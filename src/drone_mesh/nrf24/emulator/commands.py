@@ -67,7 +67,7 @@ class CommandDecoder:
             self._push(TxPayload(data[:MAX_PAYLOAD_BYTES], ack_pipe=command & 7))
         elif command == Command.FLUSH_TX:
             chip.tx_fifo.flush()
-            self._transmitter.flushed()
+            self._transmitter.reuse = False  # the current packet ends without TX_DS or MAX_RT
         elif command == Command.FLUSH_RX:
             if chip.state in ANSWERING:
                 chip.warn("FLUSH_RX while an acknowledgement is being sent")

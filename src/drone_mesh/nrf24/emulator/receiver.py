@@ -18,10 +18,6 @@ class Receiver:
         self._chip = chip
         self._last: list[tuple[int, int]] = [_NOTHING_YET] * PIPES  # PID and CRC
 
-    def listen(self) -> None:
-        """RX has settled."""
-        self._chip.listen(State.RX)
-
     def frame_arrived(self, frame: Frame) -> bool:
         """A frame with the address of an open pipe arrived; returns whether it was valid there."""
         chip, registers = self._chip, self._chip.registers

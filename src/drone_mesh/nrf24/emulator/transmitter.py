@@ -41,10 +41,6 @@ class Transmitter:
         if self._chip.state is State.STANDBY_II and self.has_work():
             self.start(SETTLING_NS)
 
-    def flushed(self) -> None:
-        """FLUSH_TX: the current packet ends without TX_DS or MAX_RT."""
-        self.reuse = False
-
     def ce_rose(self) -> None:
         """CE rises in standby."""
         if self._chip.flags & MAX_RT.mask and self._chip.tx_fifo.oldest is not None:
