@@ -5,8 +5,7 @@ from __future__ import annotations
 from importlib import metadata
 from typing import Any, Mapping
 
-from drone_mesh.channel.link_quality import Quality
-from drone_mesh.channel.statistics import RadioStatistics
+from drone_mesh.channel.statistics import Quality, RadioStatistics
 from drone_mesh.communication.component import MeshnetworkComponent
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.observer import in_hops

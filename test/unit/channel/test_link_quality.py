@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from drone_mesh.channel.link_quality import LinkQuality
+from drone_mesh.channel.statistics import LinkQuality
 
 
 def test_the_first_packet_is_all_that_is_known():
