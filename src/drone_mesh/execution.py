@@ -147,7 +147,7 @@ class MeshExecutor:
         self._thread = threading.Thread(target=self._work, name=name, daemon=True)
         self._stopping = False
         self._on_idle: Callable[[], None] = lambda: None
-        self._idle = False  # written by the worker
+        self.idle = False  # whether the worker, which writes it, waits for work
         # Written by the worker, read by others; single floats need no lock.
         self._working_since_s = math.inf  # when the current work was due
         self._next_due_s = math.inf
@@ -211,11 +211,6 @@ class MeshExecutor:
         """How long the oldest unfinished work has waited at `now_s`, in seconds; 0: none."""
         return max(0.0, now_s - min(self._working_since_s, self._next_due_s))
 
-    @property
-    def idle(self) -> bool:
-        """Whether the worker waits for work."""
-        return self._idle
-
     def take_worst_lag_s(self) -> float:
         """The longest delay of a timer since the last call of this function, in seconds."""
         worst_s, self._worst_lag_s = self._worst_lag_s, 0.0
@@ -234,9 +229,9 @@ class MeshExecutor:
                         self._serve()
                         continue
                     self._on_idle()
-                    self._idle = True
+                    self.idle = True
                 waiting = self._take(block)
-                self._idle = False
+                self.idle = False
             now_s = self._clock()
             due_s = deadlines[0][0] if deadlines else math.inf
             if due_s <= now_s and (waiting is None or due_s <= waiting[0]):

@@ -181,7 +181,7 @@ class PacketAntenna(IWirelessCommunication):
 
     def link_quality(self) -> Mapping[int, Quality]:
         """How well packets reach each neighbour. Any thread."""
-        return self._quality.figures()
+        return self._quality.figures
 
     def _delivered(self, node: int, frames: int) -> None:
         self._quality.packet(node, frames, delivered=True)

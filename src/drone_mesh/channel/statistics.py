@@ -68,16 +68,12 @@ class LinkQuality:
     """One thread writes, any thread reads: the figures are replaced, never modified."""
 
     def __init__(self) -> None:
-        self._of: dict[int, Quality] = {}
+        self.figures: Mapping[int, Quality] = {}  # for each neighbour that packets were sent to
 
     def packet(self, neighbour: int, tries: int, delivered: bool) -> None:
         """A packet to a neighbour was delivered or given up, after `tries`."""
-        before = self._of.get(neighbour)
+        before = self.figures.get(neighbour)
         latest = Quality(float(tries), float(delivered))
         if before is not None:
             latest = Quality(*(old + _LEARNING * (new - old) for old, new in zip(before, latest)))
-        self._of = {**self._of, neighbour: latest}
-
-    def figures(self) -> Mapping[int, Quality]:
-        """The quality for each neighbour that packets were sent to."""
-        return self._of
+        self.figures = {**self.figures, neighbour: latest}

@@ -94,7 +94,7 @@ class NRF24LowLevelInterface:
         self._chip = Transceiver(spi, ce, node_id, settings, self._runtime, self._statistics)
         self._irq_watch = IrqWatch()
         self._powered = False
-        self._working = False
+        self.working = False  # the chip answered and held its settings when it was last used
         self._next_restart_s = 0.0
         self._next_verify_s = 0.0
 
@@ -114,7 +114,7 @@ class NRF24LowLevelInterface:
     def power_down(self) -> None:
         """Neither send nor receive until `begin`. Ignores a missing chip."""
         with self._lock:
-            self._powered = self._working = False
+            self._powered = self.working = False
             try:
                 self._chip.power_down()
             except RadioError as error:
@@ -131,11 +131,6 @@ class NRF24LowLevelInterface:
     def statistics(self) -> RadioStatistics:
         """The current counters."""
         return replace(self._statistics, **self.access.figures())
-
-    @property
-    def working(self) -> bool:
-        """Whether the chip answered and held its settings when it was last used."""
-        return self._working
 
     def send(self, node_id: int, payload: bytes) -> bool:
         """Send 32 bytes to a node, and wait; True once its chip has acknowledged them.
@@ -197,7 +192,7 @@ class NRF24LowLevelInterface:
     def drop(self) -> None:
         """Give up the packet that was tried last: remove it from the chip."""
         with self._noting_failure():
-            if self._working:
+            if self.working:
                 self._chip.drop()
 
     def broadcast(self, payload: bytes) -> bool:
@@ -221,7 +216,7 @@ class NRF24LowLevelInterface:
             left_s = until_s - self._runtime.now_s()
             if left_s <= 0:
                 return []
-            if self._irq is None or not self._irq_watch.trusted or not self._working:
+            if self._irq is None or not self._irq_watch.trusted or not self.working:
                 self._runtime.sleep(min(left_s, POLL_S))
             else:
                 self._irq_watch.woken(self._irq.wait_low(left_s))
@@ -246,7 +241,7 @@ class NRF24LowLevelInterface:
 
     def _poll(self) -> None:
         """Empty the FIFO, and periodically check that the chip still holds its settings."""
-        if not self._powered or (not self._working and not self._ready()):
+        if not self._powered or (not self.working and not self._ready()):
             return
         chip = self._chip
         try:
@@ -265,16 +260,16 @@ class NRF24LowLevelInterface:
             self._ready()
 
     def _set_up(self) -> None:
-        self._working = False
+        self.working = False
         self._chip.set_up()
-        self._working = True
+        self.working = True
         self._next_verify_s = self._runtime.now_s() + VERIFY_PERIOD_S
 
     def _ready(self) -> bool:
         """Whether the chip can be used; sets it up again after it lost its settings."""
         if not self._powered:
             return False
-        if self._working:
+        if self.working:
             try:
                 self._chip.check_config()
                 return True
@@ -303,10 +298,10 @@ class NRF24LowLevelInterface:
 
     def _failed(self, error: RadioError) -> None:
         """Note that the chip must be set up again before use."""
-        if self._working:
+        if self.working:
             self._statistics.restarts += 1
             logger.warning("node %d: %s", self.node_id, error)
-        self._working = False
+        self.working = False
         self._chip.disable()
 
 

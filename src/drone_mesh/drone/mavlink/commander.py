@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any, Callable
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -35,67 +36,63 @@ TAKEN = (mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_IN_PROGRESS)
 LATER = mavlink.MAV_RESULT_TEMPORARILY_REJECTED
 
 
+@dataclass
 class PendingCommand:
     """One command, from its first try to its effect or its refusal.
 
     It knows what was sent and what came back; the caller sends, and sees the effect.
     """
 
-    def __init__(
-        self,
-        number: int,
-        parameters: tuple[float, ...],
-        now_s: float,
-        within_s: float,
-        once: bool,
-    ) -> None:
-        """MAV_CMD `number`. `within_s`: the time for its effect; `once`: see `is_due`."""
-        self.number = number
-        self.parameters = parameters
-        self.tries = 0
-        self.words = ""  # the autopilot's own
-        self._until_s = now_s + within_s
-        self._within_s = within_s
-        self._once = once
-        self._sent_s = -math.inf
-        self._result: int | None = None  # of the latest acknowledgement
-        self._refused_s = math.inf
+    number: int  # of MAV_CMD
+    parameters: tuple[float, ...]
+    begun_s: float
+    within_s: float  # the time for its effect
+    once: bool  # see `is_due`
+    tries: int = 0
+    words: str = ""  # the autopilot's own
+    sent_s: float = -math.inf
+    result: int | None = None  # of the latest acknowledgement
+    refused_s: float = math.inf
+
+    @property
+    def _until_s(self) -> float:
+        return self.begun_s + self.within_s
 
     def is_due(self, now_s: float) -> bool:
         """Whether to send it now: at first, while no answer comes, and when it was put off.
 
         With `once` silence is no reason: the autopilot may have carried it out.
         """
-        if now_s < self._sent_s + PERIOD_S or self.tries and now_s >= self._until_s:
+        if now_s < self.sent_s + PERIOD_S or self.tries and now_s >= self._until_s:
             return False
-        if self._result is None:
-            return self.tries == 0 or not self._once
-        return bool(self._result == LATER)
+        if self.result is None:
+            return self.tries == 0 or not self.once
+        return bool(self.result == LATER)
 
     def sent_at(self, now_s: float) -> None:
         """It is being sent."""
         self.tries += 1
-        self._sent_s = now_s
+        self.sent_s = now_s
 
     def acknowledged(self, result: int, now_s: float) -> None:
         """COMMAND_ACK with this MAV_RESULT."""
-        if self._result in TAKEN:
+        if self.result in TAKEN:
             return  # a repetition may be refused because the first try is being carried out
-        self._result = result
-        if result not in TAKEN and result != LATER and self._refused_s == math.inf:
-            self._refused_s = now_s + REFUSED_AFTER_S
+        self.result = result
+        if result not in TAKEN and result != LATER and self.refused_s == math.inf:
+            self.refused_s = now_s + REFUSED_AFTER_S
 
     def refusal(self, now_s: float) -> str:
         """Why it is not carried out, if its time is over or it was refused; otherwise empty."""
-        if now_s < min(self._until_s, self._refused_s):
+        if now_s < min(self._until_s, self.refused_s):
             return ""
         if self.words:
             return self.words[:MOST_WORDS]
-        if self._result is None:
-            return f"the autopilot did not answer within {self._within_s:g} s"
-        if self._result in TAKEN:
-            return f"the autopilot accepted it, nothing happened for {self._within_s:g} s"
-        return f"the autopilot refused: {result_name(self._result)}"
+        if self.result is None:
+            return f"the autopilot did not answer within {self.within_s:g} s"
+        if self.result in TAKEN:
+            return f"the autopilot accepted it, nothing happened for {self.within_s:g} s"
+        return f"the autopilot refused: {result_name(self.result)}"
 
 
 def result_name(result: int) -> str:

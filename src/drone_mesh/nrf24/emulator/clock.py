@@ -15,10 +15,8 @@ from drone_mesh.channel.runtime import Runtime
 class EmulatorClock(abc.ABC):
     """The time of one air, its event queue, and the exclusive access to its chips."""
 
-    @property
-    @abc.abstractmethod
-    def now_ns(self) -> int:
-        """Time of the air. Within an event: the time for which the event was scheduled."""
+    now_ns: int
+    """Time of the air. Within an event: the time for which the event was scheduled."""
 
     @property
     @abc.abstractmethod
