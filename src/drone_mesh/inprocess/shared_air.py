@@ -18,7 +18,7 @@ from typing import Callable, Iterable
 from drone_mesh.channel.packet_queue import ALL_NODES, OutgoingPacket
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.inprocess.clock import VirtualClock
-from drone_mesh.inprocess.interfaces import IInProcessAir
+from drone_mesh.inprocess.interfaces import IInProcessAir, IInProcessAntenna
 from drone_mesh.nrf24.airtime import NS_PER_S
 from drone_mesh.nrf24.emulator.air import CAPTURE_DB, RPD_DBM, RPD_NS
 from drone_mesh.nrf24.emulator.links import Hop, LinkModel
@@ -40,12 +40,11 @@ class Transmission:
     others: list[Transmission]  # that overlap with it
 
 
-class SharedRadio(abc.ABC):
+class SharedRadio(IInProcessAntenna):
     """A radio as seen by the air."""
 
     node_id: int
     drone: IDroneEngine
-    powered: bool
     listening_since_s: float | None  # None: it sends, switches over or has no power
 
     @abc.abstractmethod

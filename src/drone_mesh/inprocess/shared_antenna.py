@@ -20,7 +20,7 @@ from drone_mesh.communication.messages import (
     receiver,
 )
 from drone_mesh.inprocess.clock import VirtualClock
-from drone_mesh.inprocess.interfaces import Host, IInProcessAntenna
+from drone_mesh.inprocess.interfaces import Host
 from drone_mesh.inprocess.shared_air import SharedAir, SharedRadio, Transmission
 from drone_mesh.nrf24.airtime import NS_PER_S, SETTLING_NS, ard_s
 from drone_mesh.nrf24.registers import FIFO_DEPTH
@@ -34,7 +34,7 @@ LOAD_S = 50e-6  # from TX_DS to the rise of CE for the next packet of a train
 READ_S = 80e-6  # from the end of a frame until its payload is in the driver
 
 
-class SharedAntenna(IInProcessAntenna, SharedRadio):
+class SharedAntenna(SharedRadio):
     """One node's radio."""
 
     def __init__(self, air: SharedAir, host: Host, rng: random.Random) -> None:
