@@ -12,7 +12,10 @@ _LEARNING = 0.1  # weight of the latest packet in the quality of a link
 
 @dataclass
 class RadioStatistics:
-    """Counters since the driver was created; each is written only under the driver's lock."""
+    """Counters since the driver was created; each is written under one lock only.
+
+    That is the lock of the queue for packets by outcome, and that of the driver for the rest.
+    """
 
     sent: int = 0  # packets that request an acknowledgement
     acknowledged: int = 0  # of these: received

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import random
-from dataclasses import replace
 
 from drone_mesh.channel.medium_access import Fate, MediumAccess
 from drone_mesh.channel.packet_queue import ALL_NODES, OutgoingPacket
@@ -58,7 +57,7 @@ class SharedAntenna(SharedRadio):
         self._answered = False
         self._last_taken: OutgoingPacket | None = None  # the last packet to this node alone
         self._unread = 0  # payloads in the FIFO
-        self._radio = RadioStatistics()
+        self._counters = self.access.counters
         self._meter = ChannelMeter(self._clock.now_s)
 
     # IWirelessCommunication ------------------------------------------------------------------
@@ -119,7 +118,7 @@ class SharedAntenna(SharedRadio):
 
     def statistics(self) -> RadioStatistics:
         """The current counters."""
-        return replace(self._radio, **self.access.figures())
+        return self.access.statistics()
 
     def switch_power(self, on: bool) -> None:
         """Power on or off, and inform the mesh software; waiting packets are dropped."""
@@ -158,7 +157,7 @@ class SharedAntenna(SharedRadio):
     def _send_frame(self, packet: OutgoingPacket) -> None:
         if packet is self._trying:
             packet.frames += 1
-            self._radio.airtime_s += self._settings.frame_s
+            self._counters.airtime_s += self._settings.frame_s
             self._air.transmit(self, packet)
 
     def frame_left(self, frame: Transmission) -> None:
@@ -178,7 +177,7 @@ class SharedAntenna(SharedRadio):
         self.listening_since_s = None
         if self._retransmits > 0:
             self._retransmits -= 1
-            self._radio.retries += 1
+            self._counters.retries += 1
             self._clock.call_at(self._clock.now_s + SETTLING_S, self._send_frame, frame.packet)
         else:
             self._finish(False)
@@ -245,12 +244,12 @@ class SharedAntenna(SharedRadio):
             self._clock.call_at(now_s + SETTLING_S, self._answer, frame)
 
     def _answer(self, frame: Transmission) -> None:
-        self._radio.airtime_s += self._settings.answer_frame_s
+        self._counters.airtime_s += self._settings.answer_frame_s
         self._air.transmit(self, frame.packet, answers=frame.sender)
 
     def _read(self, arrived: tuple[int, OutgoingPacket]) -> None:
         self._unread -= 1
-        self._radio.received += 1
+        self._counters.received += 1
         sender_id, packet = arrived
         mesh = self._mesh
         if mesh is None or not self.powered:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import logging
 import random
-from dataclasses import replace
 from typing import Callable, Iterator
 
 from drone_mesh.channel.medium_access import Fate, MediumAccess
@@ -90,8 +89,7 @@ class NRF24LowLevelInterface:
         self._runtime = runtime or SystemRuntime()
         self.access = MediumAccess(settings.access_rules, rng or random.Random())
         self._lock = self._runtime.lock()  # guards the chip and all fields below
-        self._statistics = RadioStatistics()
-        self._chip = Transceiver(spi, ce, node_id, settings, self._runtime, self._statistics)
+        self._chip = Transceiver(spi, ce, node_id, settings, self._runtime, self.access.counters)
         self._irq_watch = IrqWatch()
         self._powered = False
         self.working = False  # the chip answered and held its settings when it was last used
@@ -130,7 +128,7 @@ class NRF24LowLevelInterface:
 
     def statistics(self) -> RadioStatistics:
         """The current counters."""
-        return replace(self._statistics, **self.access.figures())
+        return self.access.statistics()
 
     def send(self, node_id: int, payload: bytes) -> bool:
         """Send 32 bytes to a node, and wait; True once its chip has acknowledged them.
@@ -249,7 +247,7 @@ class NRF24LowLevelInterface:
             if self._irq is not None and self._irq_watch.trusted:
                 low_for_nothing = not chip.flags_seen and self._irq.wait_low(0.0)
                 if self._irq_watch.polled(found, low_for_nothing):
-                    self._statistics.irq_fallbacks += 1
+                    self.access.counters.irq_fallbacks += 1
                     logger.warning("node %d: the IRQ pin does not work; polling", self.node_id)
             now_s = self._runtime.now_s()
             if now_s >= self._next_verify_s:
@@ -299,7 +297,7 @@ class NRF24LowLevelInterface:
     def _failed(self, error: RadioError) -> None:
         """Note that the chip must be set up again before use."""
         if self.working:
-            self._statistics.restarts += 1
+            self.access.counters.restarts += 1
             logger.warning("node %d: %s", self.node_id, error)
         self.working = False
         self._chip.disable()
