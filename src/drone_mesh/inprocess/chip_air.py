@@ -104,10 +104,6 @@ class ChipAir(IInProcessAir):
         """Of all frames together."""
         return self.air.airtime_s
 
-    def warnings(self) -> list[str]:
-        """Misuse of chips so far."""
-        return [text for antenna in self.antennas.values() for text in antenna.chip.warnings]
-
     def antenna(self, host: Host, rng: random.Random) -> ChipAntenna:
         """A new antenna for that node."""
         antenna = self.antennas[host.node_id] = ChipAntenna(self, host, rng)

@@ -23,11 +23,6 @@ def frame_bits(address_bytes: int, payload_bytes: int, crc_bytes: int) -> int:
     return PREAMBLE_BITS + PCF_BITS + 8 * (address_bytes + payload_bytes + crc_bytes)
 
 
-def bit_ns(bits_per_s: int) -> int:
-    """Duration of one bit in ns."""
-    return NS_PER_S // bits_per_s
-
-
 def ard_s(delay: int) -> float:
     """ARD of SETUP_RETR in seconds: from the end of a frame until the chip starts the next one."""
     return (delay + 1) * ARD_STEP_NS / NS_PER_S

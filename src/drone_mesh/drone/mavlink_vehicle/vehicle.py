@@ -98,12 +98,6 @@ class MavlinkVehicle:
         self.body.armed = True
         self._stands_since_s = self.now_s
 
-    def lift(self, height_m: float) -> None:
-        """The pilot has taken it to this height, where it hovers."""
-        self.arm()
-        self.body.place = self.body.place._replace(height=height_m)
-        self.choose_mode(Mode.HOLD)
-
     # From outside ----------------------------------------------------------------------------
 
     def on_message(self, message: Message, now_s: float) -> None:
