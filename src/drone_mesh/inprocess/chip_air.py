@@ -12,8 +12,8 @@ import random
 from typing import Callable, Iterable
 
 from drone_mesh.channel.runtime import Task
+from drone_mesh.inprocess.clock import TaskClock
 from drone_mesh.inprocess.interfaces import Host, IInProcessAir, IInProcessAntenna
-from drone_mesh.inprocess.task_clock import TaskClock
 from drone_mesh.nrf24.emulator.air import Air
 from drone_mesh.nrf24.emulator.chip import EmulatedChip
 from drone_mesh.nrf24.emulator.links import LinkModel
