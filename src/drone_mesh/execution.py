@@ -29,9 +29,6 @@ _log = logging.getLogger(__name__)
 Work = Callable[[float], None]
 """A function of the time at which it runs."""
 
-Submit = Callable[[Work], None]
-"""Runs a function on the thread that owns a node. Any thread may call it."""
-
 
 class PacketInbox:
     """Packets that wait for one node. When too many do, new ones are dropped, as on the air.
@@ -39,7 +36,7 @@ class PacketInbox:
     Any thread may call `put`; the function runs where `submit` runs it.
     """
 
-    def __init__(self, submit: Submit, most: int = MOST_WAITING) -> None:
+    def __init__(self, submit: Callable[[Work], None], most: int = MOST_WAITING) -> None:
         self._submit = submit
         self._free = threading.BoundedSemaphore(most)
         self._counting = threading.Lock()
@@ -72,7 +69,7 @@ class Driven(Protocol):
 
 
 class _Periodic:
-    """A function that is called once per period: driven as a component is."""
+    """Calls a function once per period, until it is cancelled."""
 
     def __init__(self, period_s: float, function: Work, first_s: float) -> None:
         self._period_s = period_s
@@ -80,12 +77,11 @@ class _Periodic:
         self.next_tick_s = first_s
 
     def tick(self, now_s: float) -> None:
-        """Call it, unless it was cancelled; skip periods that have already passed."""
-        if self.next_tick_s == math.inf:
-            return
-        missed = max(0.0, (now_s - self.next_tick_s) // self._period_s)
-        self.next_tick_s += self._period_s * (missed + 1.0)
-        self._function(now_s)
+        """Call it, if it is due; skip periods that have already passed."""
+        if now_s >= self.next_tick_s:
+            passed = (now_s - self.next_tick_s) // self._period_s
+            self.next_tick_s += self._period_s * (passed + 1.0)
+            self._function(now_s)
 
     def cancel(self) -> None:
         self.next_tick_s = math.inf
@@ -151,7 +147,7 @@ class MeshExecutor:
         self._thread = threading.Thread(target=self._work, name=name, daemon=True)
         self._stopping = False
         self._on_idle: Callable[[], None] = lambda: None
-        self._idle = False  # written by the worker
+        self.idle = False  # whether the worker, which writes it, waits for work
         # Written by the worker, read by others; single floats need no lock.
         self._working_since_s = math.inf  # when the current work was due
         self._next_due_s = math.inf
@@ -201,8 +197,9 @@ class MeshExecutor:
 
     def call_every(self, period_s: float, function: Work) -> Callable[[], None]:
         """Call `function` once per period, first after one; returns a function to stop it."""
-        periodic, slot = _Periodic(period_s, function, self._clock() + period_s), self.slot()
-        self.submit(lambda _now_s: slot.take(periodic), slot)
+        periodic = _Periodic(period_s, function, self._clock() + period_s)
+        slot = self.slot()
+        slot.submit(lambda _now_s: slot.take(periodic))
         return periodic.cancel
 
     def time_advanced(self) -> None:
@@ -213,11 +210,6 @@ class MeshExecutor:
     def lag_s(self, now_s: float) -> float:
         """How long the oldest unfinished work has waited at `now_s`, in seconds; 0: none."""
         return max(0.0, now_s - min(self._working_since_s, self._next_due_s))
-
-    @property
-    def idle(self) -> bool:
-        """Whether the worker waits for work."""
-        return self._idle
 
     def take_worst_lag_s(self) -> float:
         """The longest delay of a timer since the last call of this function, in seconds."""
@@ -237,9 +229,9 @@ class MeshExecutor:
                         self._serve()
                         continue
                     self._on_idle()
-                    self._idle = True
+                    self.idle = True
                 waiting = self._take(block)
-                self._idle = False
+                self.idle = False
             now_s = self._clock()
             due_s = deadlines[0][0] if deadlines else math.inf
             if due_s <= now_s and (waiting is None or due_s <= waiting[0]):

@@ -7,12 +7,11 @@ import math
 from dataclasses import replace
 from typing import Callable, Mapping
 
-from drone_mesh.channel.link_quality import LinkQuality, Quality
 from drone_mesh.channel.packet_queue import ALL_NODES
 from drone_mesh.channel.radio import PacketRadio, Received
 from drone_mesh.channel.runtime import Runtime, SystemRuntime, Task
 from drone_mesh.channel.sender import Sender
-from drone_mesh.channel.statistics import ChannelMeter, RadioStatistics
+from drone_mesh.channel.statistics import ChannelMeter, LinkQuality, Quality, RadioStatistics
 from drone_mesh.channel.trains import place_in_train
 from drone_mesh.communication.interfaces import (
     BROADCAST,
@@ -58,16 +57,13 @@ class PacketAntenna(IWirelessCommunication):
         *,
         runtime: Runtime | None = None,
         on_payload: Callable[[bytes], None] | None = None,
-        debug_period_s: float = DEBUG_PERIOD_S,
     ) -> None:
         """`on_payload` is called with each payload as the mesh gets it, in the receiving thread."""
-        self._debug_period_s = debug_period_s
         self._radio = radio
         self._submit = submit
         self._inbox = PacketInbox(submit)
         self._runtime = runtime or SystemRuntime()
         self._sender = Sender(radio, self._runtime, self._delivered, self._given_up)
-        self._medium = radio.medium
         self._meter = ChannelMeter(self._runtime.now_s())
         self._quality = LinkQuality()
         self._on_payload = on_payload
@@ -84,7 +80,7 @@ class PacketAntenna(IWirelessCommunication):
 
     @property
     def medium(self) -> Medium:
-        return self._medium
+        return self._radio.medium
 
     def channel_use(self) -> ChannelUse:
         return self._meter.read(self.statistics(), self._runtime.now_s())
@@ -170,7 +166,7 @@ class PacketAntenna(IWirelessCommunication):
         return self._sender.data_room()
 
     def debugging_mode(self, info: IMeshDebugInfo, on: bool) -> None:
-        """Log one line about the node and the channel every `debug_period_s`, or stop."""
+        """Log one line about the node and the channel every DEBUG_PERIOD_S, or stop."""
         self._info = info if on else None
 
     def on(self) -> bool:
@@ -182,7 +178,7 @@ class PacketAntenna(IWirelessCommunication):
 
     def link_quality(self) -> Mapping[int, Quality]:
         """How well packets reach each neighbour. Any thread."""
-        return self._quality.figures()
+        return self._quality.figures
 
     def _delivered(self, node: int, frames: int) -> None:
         self._quality.packet(node, frames, delivered=True)
@@ -218,11 +214,11 @@ class PacketAntenna(IWirelessCommunication):
         )
 
     def _receive(self) -> None:
-        show_s = self._runtime.now_s() + self._debug_period_s
+        show_s = self._runtime.now_s() + DEBUG_PERIOD_S
         while not self._ending:
             info, late_s = self._info, self._runtime.now_s() - show_s
             if late_s >= 0.0:
-                show_s += self._debug_period_s * (late_s // self._debug_period_s + 1.0)
+                show_s += DEBUG_PERIOD_S * (late_s // DEBUG_PERIOD_S + 1.0)
                 if info is not None:
                     self._show(info)
             for received in self._radio.receive(RECEIVE_TIMEOUT_S):

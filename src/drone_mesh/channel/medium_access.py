@@ -33,11 +33,11 @@ import enum
 import math
 import random
 from dataclasses import replace
-from typing import Any
 
 from drone_mesh.channel.access_rules import AccessRules
 from drone_mesh.channel.packet_queue import ALL_NODES, OutgoingPacket, PacketQueue
-from drone_mesh.channel.yielding import InTrain, Yielding
+from drone_mesh.channel.statistics import RadioStatistics
+from drone_mesh.channel.trains import InTrain, Yielding
 from drone_mesh.communication.packet_types import Priority
 
 
@@ -70,7 +70,7 @@ class MediumAccess:
         self._train_left = 0  # packets that may still follow in the train that is being sent
         self._silent: set[int] = set()  # receivers that let a packet fail and were not heard since
         self._heard_s: dict[int, float] = {}
-        self._counts = {"sent": 0, "acknowledged": 0, "lost": 0, "tries": 0, "broadcasts": 0}
+        self.counters = RadioStatistics()  # of packets by outcome here, of the rest in the radio
         # Share of first tries that failed recently, 0 to _MOST_CONTENTION. Tries to reach a
         # receiver that is gone do not count, because they say nothing about the channel.
         self.contention = 0.0
@@ -175,15 +175,15 @@ class MediumAccess:
             # After a success leave time for an answer; after a failure there will be none.
             pause_s = rules.train_gap_s if acknowledged else rules.train_pause_s
             self._free_s = now_s + pause_s + self._rng.random() * gap_s
-        counts = self._counts
+        counters = self.counters
         if receiver == ALL_NODES:
-            counts["broadcasts"] += acknowledged
+            counters.broadcasts += acknowledged
             self._queue.remove(packet)
             return Fate.DELIVERED
-        counts["tries"] += packet.tries > 1
+        counters.tries += packet.tries > 1
         if acknowledged:
-            counts["sent"] += 1
-            counts["acknowledged"] += 1
+            counters.sent += 1
+            counters.acknowledged += 1
             self._learn(packet.tries > 1)
             self._silent.discard(receiver)
             self._heard_s[receiver] = now_s
@@ -193,8 +193,8 @@ class MediumAccess:
             packet.tries >= self._most_tries(receiver, now_s)
             or now_s - packet.queued_s > rules.lifetime_s
         ):
-            counts["sent"] += 1
-            counts["lost"] += 1
+            counters.sent += 1
+            counters.lost += 1
             if self._heard_s.get(receiver, -math.inf) > packet.queued_s - rules.still_there_s:
                 self._learn(True)  # it is there, so the channel is to blame
             self._silent.add(receiver)
@@ -210,9 +210,9 @@ class MediumAccess:
         gone = receiver in self._silent or silent_s > rules.perhaps_gone_s
         return rules.tries_when_silent if gone else rules.tries
 
-    def figures(self) -> dict[str, Any]:
-        """Packets by outcome, and the state of the queue, as in RadioStatistics."""
-        return {**self._counts, "waiting": len(self._queue), "contention": self.contention}
+    def statistics(self) -> RadioStatistics:
+        """The current counters, and the state of the queue."""
+        return replace(self.counters, waiting=len(self._queue), contention=self.contention)
 
     @property
     def patience(self) -> float:

@@ -5,13 +5,12 @@ from __future__ import annotations
 import abc
 import threading
 import time
-from typing import Callable, ContextManager
+from typing import Callable, ContextManager, Protocol
 
 
-class Task(abc.ABC):
-    """A task that runs concurrently with its creator."""
+class Task(Protocol):
+    """A task that runs concurrently with its creator, such as a thread."""
 
-    @abc.abstractmethod
     def join(self) -> None:
         """Wait until it has ended."""
 
@@ -56,14 +55,6 @@ class Runtime(abc.ABC):
         """Run `run` concurrently with the caller."""
 
 
-class _ThreadTask(Task):
-    def __init__(self, thread: threading.Thread) -> None:
-        self._thread = thread
-
-    def join(self) -> None:
-        self._thread.join()
-
-
 class ThreadSignal(Signal):
     """A signal between threads."""
 
@@ -97,4 +88,4 @@ class SystemRuntime(Runtime):
     def start(self, run: Callable[[], None], name: str) -> Task:
         thread = threading.Thread(target=run, name=name, daemon=True)
         thread.start()
-        return _ThreadTask(thread)
+        return thread

@@ -1,15 +1,21 @@
-"""Counters of a radio."""
+"""Counters of a radio, and how well packets reach each neighbour."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Mapping, NamedTuple
 
 from drone_mesh.communication.medium import ChannelUse
+
+_LEARNING = 0.1  # weight of the latest packet in the quality of a link
 
 
 @dataclass
 class RadioStatistics:
-    """Counters since the driver was created; each is written only under the driver's lock."""
+    """Counters since the driver was created; each is written under one lock only.
+
+    That is the lock of the queue for packets by outcome, and that of the driver for the rest.
+    """
 
     sent: int = 0  # packets that request an acknowledgement
     acknowledged: int = 0  # of these: received
@@ -52,3 +58,25 @@ class ChannelMeter:
         return ChannelUse(
             self._share, statistics.tries_per_packet, statistics.waiting, statistics.lost
         )
+
+
+class Quality(NamedTuple):
+    """Quality of one link: moving averages over recent packets."""
+
+    tries: float  # per packet, delivered or not; those included that the radio made by itself
+    delivered: float  # share, 0..1
+
+
+class LinkQuality:
+    """One thread writes, any thread reads: the figures are replaced, never modified."""
+
+    def __init__(self) -> None:
+        self.figures: Mapping[int, Quality] = {}  # for each neighbour that packets were sent to
+
+    def packet(self, neighbour: int, tries: int, delivered: bool) -> None:
+        """A packet to a neighbour was delivered or given up, after `tries`."""
+        before = self.figures.get(neighbour)
+        latest = Quality(float(tries), float(delivered))
+        if before is not None:
+            latest = Quality(*(old + _LEARNING * (new - old) for old, new in zip(before, latest)))
+        self.figures = {**self.figures, neighbour: latest}

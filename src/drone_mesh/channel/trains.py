@@ -1,11 +1,58 @@
-"""Trains on the air: whether the sender of a packet is about to send more."""
+"""Trains on the air (rule 5 of medium_access.py): what packets show of them, and who waits."""
 
 from __future__ import annotations
 
-from drone_mesh.channel.yielding import InTrain
+import enum
+import math
+
+from drone_mesh.channel.access_rules import AccessRules
 from drone_mesh.communication import messages
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.interfaces import BROADCAST
+
+_NO_SENDER = -1
+
+
+class InTrain(enum.Enum):
+    """What an overheard packet shows about its train."""
+
+    NO = "no"  # it belongs to none
+    PERHAPS = "perhaps"  # another packet may follow at once
+    MORE = "more"  # another packet follows, and the last one will say so
+    LAST = "last"
+
+
+class Yielding:
+    """How long one node sends nothing because others send trains."""
+
+    def __init__(self, rules: AccessRules) -> None:
+        self._rules = rules
+        self._since_s = -math.inf
+        self.until_s = -math.inf
+        self._to = _NO_SENDER  # whose train is under way
+        self._enough = False  # it has waited long enough, so it is this node's turn
+
+    def heard(self, sender: int, train: InTrain, now_s: float, wants_to_send: bool) -> None:
+        """A packet of a train came in: wait for the end of that train."""
+        if self._enough:
+            return
+        if now_s > self.until_s:
+            self._since_s, self._to = now_s, _NO_SENDER
+        if train is InTrain.LAST:
+            if sender == self._to:
+                self.until_s, self._to = now_s, _NO_SENDER
+            return
+        if train is InTrain.MORE:
+            self._to = sender
+        rules, announced = self._rules, self._to != _NO_SENDER
+        pause_s = rules.train_hold_s if announced else rules.train_pause_s
+        last_s = self._since_s + (rules.most_hold_s if announced else rules.most_yield_s)
+        self.until_s = min(now_s + pause_s, last_s)
+        self._enough = wants_to_send and self.until_s == last_s
+
+    def has_sent(self) -> None:
+        """The node had its turn."""
+        self._enough = False
 
 
 def place_in_train(payload: bytes, receiver: int) -> InTrain:

@@ -40,14 +40,9 @@ class Route:
             corners.append(goal)
         self._corners = corners
         self._next = 1  # the corner that the target moves to
-        self._target = start
+        self.target = start  # the position to fly to now
         self._speed_m_s = speed_m_s
         self._lead_m = max(SHORTEST_LEAD_M, LEAD_S * speed_m_s)
-
-    @property
-    def target(self) -> Location:
-        """The position to fly to now."""
-        return self._target
 
     @property
     def end(self) -> Location:
@@ -59,7 +54,7 @@ class Route:
         budget_m = self._speed_m_s * passed_s
         while budget_m > 0.0:
             corner = self._corners[self._next]
-            remaining_m = self._target.distance_m(corner)
+            remaining_m = self.target.distance_m(corner)
             if remaining_m == 0.0:
                 if here.distance_m(corner) > CORNER_M:
                     break  # it waits at the corner
@@ -67,12 +62,12 @@ class Route:
                     return True
                 self._next += 1
                 continue
-            if self._target.distance_m(here) > self._lead_m:
+            if self.target.distance_m(here) > self._lead_m:
                 break  # it waits for the drone
             step_m = min(budget_m, remaining_m)
             budget_m -= step_m
             if step_m == remaining_m:
-                self._target = corner
+                self.target = corner
             else:
-                self._target = self._target.towards(corner, step_m)
+                self.target = self.target.towards(corner, step_m)
         return False

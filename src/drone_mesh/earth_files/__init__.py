@@ -8,8 +8,7 @@ from __future__ import annotations
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.earth_files.geojson import geojson_of, read_geojson
 from drone_mesh.earth_files.kml import kml_of, read_kml
-from drone_mesh.earth_files.placemarks import Path, Placemarks, Point
-from drone_mesh.earth_files.tracks import tracks_of
+from drone_mesh.earth_files.placemarks import Path, Placemarks, Point, tracks_of
 from drone_mesh.errors import ConfigurationError
 
 __all__ = [

@@ -1,11 +1,11 @@
-"""What a file contains: points and lines, and the drones that they are for."""
+"""What a file contains: points and lines, and the drones that they are for or come from."""
 
 from __future__ import annotations
 
 import math
 import re
 from dataclasses import dataclass, field
-from typing import Mapping, NamedTuple, Sequence
+from typing import Iterable, Mapping, NamedTuple, Sequence
 
 from drone_mesh.drone.fleet import MAX_DRONES
 from drone_mesh.drone.geodesy import EarthPlace, Origin
@@ -13,6 +13,8 @@ from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError, GoalRefused
 
+STEP_M = 0.5  # our choice: a track has a place whenever the drone has moved so far
+MOST_PLACES = 20_000  # of all tracks
 _NAMED = re.compile(r"(?:(?:drone|node|router)\s*)?(\d{1,3})", re.IGNORECASE)
 
 
@@ -110,4 +112,28 @@ def on_earth(origin: Origin, place: Location) -> tuple[float, float, float]:
         round(earth.longitude_deg, 7),
         round(earth.latitude_deg, 7),
         round(earth.altitude_m, 3),
+    )
+
+
+def tracks_of(positions: Iterable[tuple[float, int, Sequence[float]]]) -> Placemarks:
+    """Where each node has been; a node that never moved has no track.
+
+    `positions`: seconds, the node, and x, y, z in metres, by rising time.
+    """
+    times: dict[int, list[float]] = {}
+    places: dict[int, list[Location]] = {}
+    for at_s, node, position in positions:
+        track = places.setdefault(node, [])
+        place = Location.from_vector(position)
+        if not track or place.distance_m(track[-1]) >= STEP_M:
+            track.append(place)
+            times.setdefault(node, []).append(round(at_s, 2))
+    total = sum(len(track) for track in places.values() if len(track) > 1)
+    step = max(1, math.ceil(total / MOST_PLACES))
+    return Placemarks(
+        paths=[
+            Path(node, [*track[:-1:step], track[-1]], [*times[node][:-1:step], times[node][-1]])
+            for node, track in sorted(places.items())
+            if len(track) > 1
+        ]
     )

@@ -12,8 +12,8 @@ import random
 from typing import Callable, Iterable
 
 from drone_mesh.channel.runtime import Task
+from drone_mesh.inprocess.clock import TaskClock
 from drone_mesh.inprocess.interfaces import Host, IInProcessAir, IInProcessAntenna
-from drone_mesh.inprocess.task_clock import TaskClock
 from drone_mesh.nrf24.emulator.air import Air
 from drone_mesh.nrf24.emulator.chip import EmulatedChip
 from drone_mesh.nrf24.emulator.links import LinkModel
@@ -103,10 +103,6 @@ class ChipAir(IInProcessAir):
     def airtime_s(self) -> float:
         """Of all frames together."""
         return self.air.airtime_s
-
-    def warnings(self) -> list[str]:
-        """Misuse of chips so far."""
-        return [text for antenna in self.antennas.values() for text in antenna.chip.warnings]
 
     def antenna(self, host: Host, rng: random.Random) -> ChipAntenna:
         """A new antenna for that node."""

@@ -1,4 +1,4 @@
-"""A virtual clock: processes events in order of time, as fast as possible."""
+"""Virtual clocks: they process events in order of time, as fast as possible."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ import itertools
 import math
 from collections import deque
 from typing import Any, Callable, Protocol, Tuple
+
+from drone_mesh.nrf24.airtime import NS_PER_S
 
 Event = Tuple[float, float, Callable[[Any], None], Any]
 """Time, sequence number among events of the same time, function, argument."""
@@ -77,3 +79,27 @@ class VirtualClock:
                 self.now_s = at_s
             function(argument)
         self.now_s = max(self.now_s, until_s)
+
+
+class TaskClock:
+    """The clock of an air whose drivers block: `tasks` is their runtime, in which they wait."""
+
+    def __init__(self) -> None:
+        from drone_mesh.nrf24.emulator.cooperative_clock import CooperativeClock  # needs greenlet
+
+        self.tasks = CooperativeClock()
+
+    @property
+    def now_s(self) -> float:
+        return self.tasks.now_s()
+
+    def call_at(self, at_s: float, function: Callable[[Any], None], argument: Any) -> None:
+        """Call `function(argument)` at `at_s`, or at once if that is past; it must not wait."""
+        at_ns = max(math.ceil(at_s * NS_PER_S), self.tasks.now_ns)
+        if at_ns / NS_PER_S < at_s:  # the product was rounded down: the time would not have come
+            at_ns += 1
+        self.tasks.call_at(at_ns, function, argument)
+
+    def run_until(self, until_s: float) -> None:
+        """Process all events up to and including `until_s`."""
+        self.tasks.sleep(max(0.0, until_s - self.now_s))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Callable, Optional, Protocol
+from typing import Callable, Optional
 
 from drone_mesh.air.obstacles import NO_PATH
 from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath, PlanFlight
@@ -11,16 +11,7 @@ from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused
-
-
-class Time(Protocol):
-    """The functions of a clock that a drone needs."""
-
-    @property
-    def now_s(self) -> float: ...
-
-    def call_at(self, at_s: float, function: Callable[[Any], None], argument: Any) -> None: ...
-
+from drone_mesh.inprocess.clock import Clock
 
 OnPath = Callable[[Optional[FlightPath], FlightPath], None]
 """Called with the path so far (None: at rest) and the new one."""
@@ -31,7 +22,7 @@ class InProcessDrone(IDroneEngine):
 
     def __init__(
         self,
-        clock: Time,
+        clock: Clock,
         start: Location,
         on_flight: Callable[[bool], None],
         why_not_fly: str = "",
@@ -41,18 +32,13 @@ class InProcessDrone(IDroneEngine):
         self._why_not_fly = why_not_fly
         self._clock = clock
         self._place = start
-        self._path: FlightPath | None = None
+        self.path: FlightPath | None = None  # of the current flight; None while at rest
         self._on_flight = on_flight
         self.under_pilot = False  # until an order ends the pilot's flight
         self._observers: list[OnPath] = []
         self.speed_m_s = SPEED_M_S  # of its next flight; experiments with wind change it
         # Returns None if there is no path; the drone then stays. Obstacles replace this planner.
         self.plan_flight: PlanFlight = FlightPath
-
-    @property
-    def path(self) -> FlightPath | None:
-        """The path of the current flight; None while at rest."""
-        return self._path
 
     def set_goal(self, latitude: float, longitude: float, height: float) -> None:
         """Fly there, if it can. Raises GoalRefused for a goal out of bounds or without a path."""
@@ -61,17 +47,17 @@ class InProcessDrone(IDroneEngine):
             return
         here = self.get_location()
         goal = Location(latitude, longitude, height).to_vector()
-        if goal == (self._path.goal if self._path else here.to_vector()):
+        if goal == (self.path.goal if self.path else here.to_vector()):
             return
         plan = self.plan_flight(here.to_vector(), goal, self._clock.now_s, self.speed_m_s)
         if plan is None:
             raise GoalRefused(NO_PATH)
         self.under_pilot = False
-        if self._path is None:
+        if self.path is None:
             self._on_flight(True)
         else:
-            self.flown_m += math.dist(self._path.start, here.to_vector())
-        before, self._path = self._path, plan
+            self.flown_m += math.dist(self.path.start, here.to_vector())
+        before, self.path = self.path, plan
         self._clock.call_at(self._clock.now_s + plan.duration_s, self._arrive, plan)
         for observer in self._observers:
             observer(before, plan)
@@ -90,13 +76,13 @@ class InProcessDrone(IDroneEngine):
 
     def get_location(self) -> Location:
         """Its position now. Never raises."""
-        if self._path is None:
+        if self.path is None:
             return self._place
-        return Location.from_vector(self._path.position_at(self._clock.now_s))
+        return Location.from_vector(self.path.position_at(self._clock.now_s))
 
     def _arrive(self, path: FlightPath) -> None:
-        if path is self._path:  # not replanned in flight
+        if path is self.path:  # not replanned in flight
             self._place = Location.from_vector(path.goal)
             self.flown_m += math.dist(path.start, path.goal)
-            self._path = None
+            self.path = None
             self._on_flight(False)

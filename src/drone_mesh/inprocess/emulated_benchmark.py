@@ -147,14 +147,14 @@ def main(argv: list[str] | None = None) -> int:
         bench.air.observe(trace.see)
     begin_s = mesh.now_s()
     connected_s = None
-    rest = _Rest(mesh, bench.air)
+    rest_s, frames_before = begin_s, bench.air.frames  # at rest from then on
     shown = started
     try:
         while mesh.now_s() - begin_s < arguments.seconds:
             mesh.run_for(0.1)
             if connected_s is None and mesh.all_connected():
-                connected_s = mesh.now_s() - begin_s
-                rest = _Rest(mesh, bench.air)
+                rest_s, frames_before = mesh.now_s(), bench.air.frames
+                connected_s = rest_s - begin_s
             if time.perf_counter() - shown > PROGRESS_S:
                 shown = time.perf_counter()
                 print(f"{mesh.now_s() - begin_s:.0f} of {arguments.seconds:g} s", file=sys.stderr)
@@ -163,7 +163,8 @@ def main(argv: list[str] | None = None) -> int:
     simulated_s = mesh.now_s() - begin_s
     wall_s, cpu_s = time.perf_counter() - started, time.process_time() - cpu_started
     _report(bench, simulated_s, wall_s, cpu_s, connected_s)
-    print(rest.in_words())
+    frames_s = (bench.air.frames - frames_before) / max(mesh.now_s() - rest_s, 1e-9)
+    print(f"frames once connected         {frames_s:.1f} per s")
     if isinstance(mesh, Network):
         if arguments.messages:
             print(_send_messages(mesh, arguments.messages, arguments.seed))
@@ -180,20 +181,6 @@ def main(argv: list[str] | None = None) -> int:
             return 1
         print(f"{written} frames written to {arguments.trace}")
     return 0
-
-
-class _Rest:
-    """The frames from a moment on, in which nothing happens."""
-
-    def __init__(self, mesh: Network | WallMesh, air: Air) -> None:
-        self._mesh, self._air = mesh, air
-        self._begun_s, self._frames = mesh.now_s(), air.frames
-
-    def in_words(self) -> str:
-        """Their number per second until now."""
-        passed_s = self._mesh.now_s() - self._begun_s
-        frames = self._air.frames - self._frames
-        return f"frames once connected         {frames / max(passed_s, 1e-9):.1f} per s"
 
 
 def _send_messages(network: Network, count: int, seed: int) -> str:

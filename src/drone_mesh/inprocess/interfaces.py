@@ -27,12 +27,6 @@ class Host(Protocol):
         """Run `work(now_s)` in the mesh software of the node now."""
 
 
-class Switched(Protocol):
-    """An antenna as far as whoever looks for links cares."""
-
-    powered: bool
-
-
 class IInProcessAntenna(IWirelessCommunication):
     """The antenna of one node of the network."""
 
@@ -66,7 +60,7 @@ class IInProcessAir(abc.ABC):
         """A new antenna for that node."""
 
     @abc.abstractmethod
-    def in_range(self, node: int) -> Mapping[int, Switched]:
+    def in_range(self, node: int) -> Mapping[int, IInProcessAntenna]:
         """By id: the antennas that `node` could reach if they were on."""
 
     @abc.abstractmethod

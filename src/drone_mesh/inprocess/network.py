@@ -36,13 +36,12 @@ from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
 from drone_mesh.inprocess.airs import create_air
+from drone_mesh.inprocess.bounds import SHORTEST_PATH, LinkMap, Oracle, ShortestPath
 from drone_mesh.inprocess.interfaces import IInProcessAir
 from drone_mesh.inprocess.node import InProcessNode, NoInternet
-from drone_mesh.inprocess.oracle import Oracle
 from drone_mesh.inprocess.pilots import Pilots
 from drone_mesh.inprocess.positions import PositionErrors, PositionReceiver
 from drone_mesh.inprocess.radio import HOP_DELAY_S
-from drone_mesh.inprocess.shortest_path import SHORTEST_PATH, LinkMap, ShortestPath
 from drone_mesh.inprocess.status import event_records, mesh_status
 from drone_mesh.mobility import Track
 from drone_mesh.nrf24.emulator.links import LinkModel

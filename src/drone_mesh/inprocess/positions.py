@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import LocationUnknown
-from drone_mesh.inprocess.drone import InProcessDrone, Time
+from drone_mesh.inprocess.clock import Clock
+from drone_mesh.inprocess.drone import InProcessDrone
 
 CORRELATED_S = 10.0  # our choice: the error of a receiver drifts; after this time it is another one
 
@@ -33,7 +34,7 @@ class PositionReceiver(IDroneEngine):
     """A drone whose position the mesh learns from a receiver with errors."""
 
     def __init__(
-        self, drone: InProcessDrone, clock: Time, errors: PositionErrors, rng: random.Random
+        self, drone: InProcessDrone, clock: Clock, errors: PositionErrors, rng: random.Random
     ) -> None:
         self._drone, self._clock, self._errors, self._rng = drone, clock, errors, rng
         self._error_m = (self._drawn(), self._drawn())

@@ -76,11 +76,8 @@ class InProcessAir(IInProcessAir):
 
     def antenna(self, host: Host, rng: random.Random) -> InProcessAntenna:
         """A new antenna for that node."""
+        self._ids.add(host.node_id)
         return InProcessAntenna(self, host)
-
-    def expect(self, node_id: int) -> None:
-        """A node with this id has an antenna, which may start later."""
-        self._ids.add(node_id)
 
     def add(self, antenna: InProcessAntenna) -> None:
         """Add an antenna."""
@@ -255,7 +252,6 @@ class InProcessAntenna(IInProcessAntenna):
         self._host = host
         self._mesh: IMeshNetwork | None = None
         self.take: Deliver = _ignore  # called with each packet that arrives
-        air.expect(host.node_id)
 
     def start_antenna(self, mesh: IMeshNetwork) -> None:
         """Become reachable."""

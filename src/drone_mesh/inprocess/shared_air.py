@@ -12,12 +12,13 @@ from __future__ import annotations
 
 import abc
 import math
+from dataclasses import dataclass
 from typing import Callable, Iterable
 
 from drone_mesh.channel.packet_queue import ALL_NODES, OutgoingPacket
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.inprocess.clock import VirtualClock
-from drone_mesh.inprocess.interfaces import IInProcessAir
+from drone_mesh.inprocess.interfaces import IInProcessAir, IInProcessAntenna
 from drone_mesh.nrf24.airtime import NS_PER_S
 from drone_mesh.nrf24.emulator.air import CAPTURE_DB, RPD_DBM, RPD_NS
 from drone_mesh.nrf24.emulator.links import Hop, LinkModel
@@ -27,33 +28,23 @@ from drone_mesh.nrf24.settings import RadioSettings
 MOST_GAIN_DB = 10.0  # our choice: Rayleigh fading exceeds it once in 22,000 blocks
 
 
+@dataclass(eq=False)
 class Transmission:
     """One frame on the air."""
 
-    __slots__ = ("answers", "end_s", "others", "packet", "sender", "start_s")
-
-    def __init__(
-        self,
-        sender: SharedRadio,
-        packet: OutgoingPacket,
-        answers: SharedRadio | None,
-        start_s: float,
-        end_s: float,
-    ) -> None:
-        self.sender = sender
-        self.packet = packet
-        self.answers = answers  # an acknowledgement for that radio; None: the packet itself
-        self.start_s = start_s
-        self.end_s = end_s
-        self.others: list[Transmission] = []  # that overlap with it
+    sender: SharedRadio
+    packet: OutgoingPacket
+    answers: SharedRadio | None  # an acknowledgement for that radio; None: the packet itself
+    start_s: float
+    end_s: float
+    others: list[Transmission]  # that overlap with it
 
 
-class SharedRadio(abc.ABC):
+class SharedRadio(IInProcessAntenna):
     """A radio as seen by the air."""
 
     node_id: int
     drone: IDroneEngine
-    powered: bool
     listening_since_s: float | None  # None: it sends, switches over or has no power
 
     @abc.abstractmethod
@@ -73,6 +64,7 @@ class SharedAir(IInProcessAir):
     """All radios on one channel, and the frames between them."""
 
     clock: VirtualClock
+    delivered = 0  # payloads so far that reached a mesh component
 
     def __init__(
         self,
@@ -88,7 +80,6 @@ class SharedAir(IInProcessAir):
         self.max_distance_m = max_distance_m
         self.frames = 0  # frames sent so far
         self.collisions = 0  # receptions that another frame destroyed
-        self.payloads = 0  # that reached a mesh component
         self.airtime_s = 0.0  # of all frames together
         # Called with the packet of each frame that begins; set by experiments.
         self.on_frame: Callable[[OutgoingPacket], object] = id
@@ -133,10 +124,6 @@ class SharedAir(IInProcessAir):
             return {}
         return {radio.node_id: radio for radio in self._in_reach(node, faded=False)}
 
-    @property
-    def delivered(self) -> int:
-        return self.payloads
-
     # Frames ----------------------------------------------------------------------------------
 
     def transmit(
@@ -146,10 +133,10 @@ class SharedAir(IInProcessAir):
         self.on_frame(packet)
         now_s = self.clock.now_s
         duration_s = self._packet_s if answers is None else self._answer_s
-        frame = Transmission(sender, packet, answers, now_s, now_s + duration_s)
-        for other in self._active:
+        others = list(self._active)
+        frame = Transmission(sender, packet, answers, now_s, now_s + duration_s, others)
+        for other in others:
             other.others.append(frame)
-            frame.others.append(other)
         self._active.append(frame)
         self.airtime_s += duration_s
         self.clock.call_at(frame.end_s, self._end, frame)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import random
-from dataclasses import replace
 
 from drone_mesh.channel.medium_access import Fate, MediumAccess
 from drone_mesh.channel.packet_queue import ALL_NODES, OutgoingPacket
@@ -20,10 +19,9 @@ from drone_mesh.communication.messages import (
     receiver,
 )
 from drone_mesh.inprocess.clock import VirtualClock
-from drone_mesh.inprocess.interfaces import Host, IInProcessAntenna
+from drone_mesh.inprocess.interfaces import Host
 from drone_mesh.inprocess.shared_air import SharedAir, SharedRadio, Transmission
 from drone_mesh.nrf24.airtime import NS_PER_S, SETTLING_NS, ard_s
-from drone_mesh.nrf24.pace import access_rules, medium_of
 from drone_mesh.nrf24.registers import FIFO_DEPTH
 from drone_mesh.nrf24.transceiver import CE_PULSE_S, TX_DELAY_S
 
@@ -35,20 +33,20 @@ LOAD_S = 50e-6  # from TX_DS to the rise of CE for the next packet of a train
 READ_S = 80e-6  # from the end of a frame until its payload is in the driver
 
 
-class SharedAntenna(IInProcessAntenna, SharedRadio):
+class SharedAntenna(SharedRadio):
     """One node's radio."""
 
     def __init__(self, air: SharedAir, host: Host, rng: random.Random) -> None:
         self.node_id = host.node_id
         self.drone = host.drone
         self.listening_since_s: float | None = None
-        self.access = MediumAccess(access_rules(air.settings), rng)
+        self.access = MediumAccess(air.settings.access_rules, rng)
         self._air = air
         self._clock: VirtualClock = air.clock
         self._submit = host.submit
         self._settings = air.settings
         self._tx_delay_s = TX_DELAY_S[air.settings.data_rate]
-        self._medium = medium_of(air.settings)
+        self._medium = air.settings.medium
         self._mesh: IMeshNetwork | None = None
         self.powered = True
         self._planned_s = math.inf
@@ -59,7 +57,7 @@ class SharedAntenna(IInProcessAntenna, SharedRadio):
         self._answered = False
         self._last_taken: OutgoingPacket | None = None  # the last packet to this node alone
         self._unread = 0  # payloads in the FIFO
-        self._radio = RadioStatistics()
+        self._counters = self.access.counters
         self._meter = ChannelMeter(self._clock.now_s)
 
     # IWirelessCommunication ------------------------------------------------------------------
@@ -120,7 +118,7 @@ class SharedAntenna(IInProcessAntenna, SharedRadio):
 
     def statistics(self) -> RadioStatistics:
         """The current counters."""
-        return replace(self._radio, **self.access.figures())
+        return self.access.statistics()
 
     def switch_power(self, on: bool) -> None:
         """Power on or off, and inform the mesh software; waiting packets are dropped."""
@@ -159,7 +157,7 @@ class SharedAntenna(IInProcessAntenna, SharedRadio):
     def _send_frame(self, packet: OutgoingPacket) -> None:
         if packet is self._trying:
             packet.frames += 1
-            self._radio.airtime_s += self._settings.frame_s
+            self._counters.airtime_s += self._settings.frame_s
             self._air.transmit(self, packet)
 
     def frame_left(self, frame: Transmission) -> None:
@@ -179,7 +177,7 @@ class SharedAntenna(IInProcessAntenna, SharedRadio):
         self.listening_since_s = None
         if self._retransmits > 0:
             self._retransmits -= 1
-            self._radio.retries += 1
+            self._counters.retries += 1
             self._clock.call_at(self._clock.now_s + SETTLING_S, self._send_frame, frame.packet)
         else:
             self._finish(False)
@@ -246,12 +244,12 @@ class SharedAntenna(IInProcessAntenna, SharedRadio):
             self._clock.call_at(now_s + SETTLING_S, self._answer, frame)
 
     def _answer(self, frame: Transmission) -> None:
-        self._radio.airtime_s += self._settings.answer_frame_s
+        self._counters.airtime_s += self._settings.answer_frame_s
         self._air.transmit(self, frame.packet, answers=frame.sender)
 
     def _read(self, arrived: tuple[int, OutgoingPacket]) -> None:
         self._unread -= 1
-        self._radio.received += 1
+        self._counters.received += 1
         sender_id, packet = arrived
         mesh = self._mesh
         if mesh is None or not self.powered:
@@ -261,7 +259,7 @@ class SharedAntenna(IInProcessAntenna, SharedRadio):
         answers = packet.priority if broadcast and is_answered(packet.payload) else None
         self.access.heard(sender_id, self._clock.now_s, broadcast=answers, train=train)
         payload = readdressed(packet.payload, self.node_id) if broadcast else packet.payload
-        self._air.payloads += 1
+        self._air.delivered += 1
         self._submit(lambda now_s: mesh.on_msg(payload, now_s))
 
 

@@ -2,34 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Iterable, Mapping, Protocol
+from typing import Iterable, Mapping
 
-from drone_mesh.communication.component import MeshnetworkComponent
-from drone_mesh.communication.interfaces import IWirelessCommunication
 from drone_mesh.communication.observer import MeshEvent
 from drone_mesh.drone.roles import Role
-from drone_mesh.inprocess.drone import InProcessDrone
+from drone_mesh.inprocess.node import InProcessNode
 from drone_mesh.state.events import EventBatcher
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
 from drone_mesh.state.observation import describe_component, path_ahead
 from drone_mesh.state.routes import route_to_gateway
 
 
-class ObservedNode(Protocol):
-    """The attributes of a network node that are read here."""
-
-    component: MeshnetworkComponent
-    drone: InProcessDrone
-
-    @property
-    def antenna(self) -> IWirelessCommunication: ...
-
-    @property
-    def is_gateway(self) -> bool: ...
-
-
 def mesh_status(
-    nodes: Mapping[int, ObservedNode], now_s: float, max_distance_m: float
+    nodes: Mapping[int, InProcessNode], now_s: float, max_distance_m: float
 ) -> MeshStatus:
     """The content of /mesh/state for these nodes now; it does not change afterwards."""
     known = {node_id: _node_status(node_id, nodes[node_id], now_s) for node_id in sorted(nodes)}
@@ -48,7 +33,7 @@ def event_records(events: Iterable[MeshEvent]) -> list[EventRecord]:
     return records
 
 
-def _node_status(node_id: int, node: ObservedNode, now_s: float) -> NodeStatus:
+def _node_status(node_id: int, node: InProcessNode, now_s: float) -> NodeStatus:
     status = NodeStatus(node_id, Role.GATEWAY if node.is_gateway else Role.ROUTER)
     describe_component(status, node.component, node.antenna.on(), now_s)
     status.position = node.drone.get_location().to_vector()

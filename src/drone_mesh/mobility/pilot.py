@@ -23,26 +23,21 @@ class TrackPilot:
         self._track_s = 0.0
         self._last_s: float | None = None
         self._on_track = False
-        self._paused = False
-
-    @property
-    def paused(self) -> bool:
-        """Whether the drone stays where it is. Any thread may read it."""
-        return self._paused
+        self.paused = False  # the drone stays where it is; any thread may read it
 
     def pause(self) -> None:
         """Stay, or leave the drone to an order."""
-        self._paused = True
+        self.paused = True
         self._last_s = None
 
     def resume(self) -> None:
         """Fly on, from wherever the drone is."""
-        self._paused, self._on_track = False, False
+        self.paused, self._on_track = False, False
 
     @property
     def heading(self) -> Vector | None:
         """Where it flies to in a straight line; None: it rests or is paused."""
-        if self._paused:
+        if self.paused:
             return None
         if not self._on_track:
             return self._track.position_at(self._track_s)

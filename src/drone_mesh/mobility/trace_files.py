@@ -6,6 +6,7 @@ import csv
 import gzip
 import math
 import re
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Dict, Iterable, Iterator, List, Tuple
 
@@ -119,21 +120,18 @@ def _knot(numbers: list[float]) -> Knot:
     return t, x, y, z[0] if z else 0.0
 
 
+@dataclass
 class _Ns2Node:
     """One node of an ns-2 movement file: a new destination replaces the one before."""
 
-    def __init__(self) -> None:
-        self.start = {"X": 0.0, "Y": 0.0, "Z": 0.0}
-        self._orders: list[tuple[float, float, float, float]] = []
-
-    def order(self, at_s: float, x: float, y: float, speed_m_s: float) -> None:
-        """From `at_s` on, fly to (x, y); at speed 0, stay."""
-        self._orders.append((at_s, x, y, speed_m_s))
+    start: dict[str, float] = field(default_factory=lambda: {"X": 0.0, "Y": 0.0, "Z": 0.0})
+    # When, where to (x, y), and how fast; at speed 0 it stays.
+    orders: list[tuple[float, float, float, float]] = field(default_factory=list)
 
     def knots(self) -> Iterator[Knot]:
         x, y, z = (self.start[axis] for axis in "XYZ")
         yield 0.0, x, y, z
-        orders = sorted(self._orders)
+        orders = sorted(self.orders)
         ends_s = [at_s for at_s, *_rest in orders[1:]] + [math.inf]
         for (at_s, to_x, to_y, speed_m_s), replaced_s in zip(orders, ends_s):
             yield at_s, x, y, z
@@ -156,9 +154,8 @@ def _ns2(lines: Iterable[str]) -> Knots:
                 nodes.setdefault(int(node), _Ns2Node()).start[axis] = _number(value)
             elif order:
                 at_s, node, x, y, speed = order.groups()
-                nodes.setdefault(int(node), _Ns2Node()).order(
-                    _number(at_s), _number(x), _number(y), _number(speed)
-                )
+                flight = (_number(at_s), _number(x), _number(y), _number(speed))
+                nodes.setdefault(int(node), _Ns2Node()).orders.append(flight)
         except ValueError as error:
             raise ValueError(f"line {number}: expected numbers") from error
     return {node: list(nodes[node].knots()) for node in sorted(nodes)}

@@ -18,17 +18,9 @@ PREAMBLE_BITS = 8
 PCF_BITS = 9  # packet control field: 6 bit length, 2 bit PID, 1 bit NO_ACK
 
 
-def frame_bits(
-    address_bytes: int, payload_bytes: int, crc_bytes: int, enhanced: bool = True
-) -> int:
-    """Bits on the air of one frame; `enhanced`: with packet control field [DS 7.3]."""
-    bits = PREAMBLE_BITS + 8 * (address_bytes + payload_bytes + crc_bytes)
-    return bits + PCF_BITS if enhanced else bits
-
-
-def bit_ns(bits_per_s: int) -> int:
-    """Duration of one bit in ns."""
-    return NS_PER_S // bits_per_s
+def frame_bits(address_bytes: int, payload_bytes: int, crc_bytes: int) -> int:
+    """Bits on the air of one frame with packet control field [DS 7.3]."""
+    return PREAMBLE_BITS + PCF_BITS + 8 * (address_bytes + payload_bytes + crc_bytes)
 
 
 def ard_s(delay: int) -> float:

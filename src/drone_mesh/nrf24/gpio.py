@@ -80,11 +80,12 @@ def find_header(devices: Path = Path("/dev")) -> str:
     )
 
 
-def _request(gpio: int, settings: Any) -> Any:
+def _request(gpio: int, **settings: Any) -> Any:
     gpiod = _gpiod()
     path = find_header()
     try:
-        return gpiod.request_lines(path, consumer=_CONSUMER, config={gpio: settings})
+        config = {gpio: gpiod.LineSettings(**settings)}
+        return gpiod.request_lines(path, consumer=_CONSUMER, config=config)
     except OSError as error:
         raise HardwareUnavailable(
             f"cannot use GPIO{gpio} of {path}: {error.strerror or error} "
@@ -99,10 +100,7 @@ class GpiodCe:
         line = _gpiod().line
         self._gpio, self._line = gpio, line
         self._lines = _request(
-            gpio,
-            _gpiod().LineSettings(
-                direction=line.Direction.OUTPUT, output_value=line.Value.INACTIVE
-            ),
+            gpio, direction=line.Direction.OUTPUT, output_value=line.Value.INACTIVE
         )
         self._value = False
 
@@ -131,11 +129,9 @@ class GpiodIrq:
         self._gpio, self._low = gpio, line.Value.INACTIVE
         self._lines = _request(
             gpio,
-            _gpiod().LineSettings(
-                direction=line.Direction.INPUT,
-                edge_detection=line.Edge.FALLING,
-                bias=line.Bias.PULL_UP,
-            ),
+            direction=line.Direction.INPUT,
+            edge_detection=line.Edge.FALLING,
+            bias=line.Bias.PULL_UP,
         )
 
     def wait_low(self, timeout_s: float) -> bool:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import random
-from dataclasses import replace
-from typing import Callable
+from typing import Callable, Iterator
 
-from drone_mesh.channel.access_rules import AccessRules
 from drone_mesh.channel.medium_access import Fate, MediumAccess
 from drone_mesh.channel.packet_queue import OutgoingPacket
 from drone_mesh.channel.radio import Try
@@ -17,8 +16,6 @@ from drone_mesh.communication.interfaces import PAYLOAD_BYTES
 from drone_mesh.communication.packet_types import Priority
 from drone_mesh.nrf24.errors import RadioError
 from drone_mesh.nrf24.gpio import CePin, IrqPin
-from drone_mesh.nrf24.irq_watch import IrqWatch
-from drone_mesh.nrf24.pace import access_rules, medium_of
 from drone_mesh.nrf24.settings import RadioSettings
 from drone_mesh.nrf24.spi import SpiDevice
 from drone_mesh.nrf24.transceiver import PipePayload, Transceiver
@@ -29,7 +26,37 @@ logger = logging.getLogger(__name__)
 
 POLL_S = 5e-3  # three payloads fit in the FIFO, and take 5.4 ms to arrive at 250 kbit/s
 VERIFY_PERIOD_S = 1.0  # our choice: how long a brown-out may stay unnoticed while listening
+IRQ_PATIENCE = 3  # contradictions between pin and chip; a single one may be a race
 RESTART_PERIOD_S = 1.0  # our choice: shortest time between two attempts to find a lost chip
+
+
+class IrqWatch:
+    """Decides whether the IRQ pin works, or the chip must be polled. For the receiving thread."""
+
+    def __init__(self) -> None:
+        self.trusted = True
+        self._said: bool | None = None  # whether the pin was low; None: not read
+        self._contradictions = 0
+
+    def woken(self, low: bool) -> None:
+        """The wait for the pin is over."""
+        self._said = low
+
+    def polled(self, found: bool, low_for_nothing: bool) -> bool:
+        """The chip was read after the wait; returns whether the pin is now considered broken.
+
+        `found`: there were payloads, so the pin should have been low. `low_for_nothing`: all flags
+        are clear, but the pin is low.
+        """
+        said, self._said = self._said, None
+        if low_for_nothing or (found and said is False):
+            self._contradictions += 1
+        elif found and said:
+            self._contradictions = 0
+        if self._contradictions < IRQ_PATIENCE or not self.trusted:
+            return False
+        self.trusted = False
+        return True
 
 
 class NRF24LowLevelInterface:
@@ -54,21 +81,18 @@ class NRF24LowLevelInterface:
         settings: RadioSettings = RadioSettings(),  # noqa: B008 (frozen)
         runtime: Runtime | None = None,
         rng: random.Random | None = None,
-        rules: AccessRules | None = None,
     ) -> None:
-        """`rules`: of access to the channel; by default those of `pace.access_rules`."""
         self.node_id = node_id
         self.settings = settings
-        self.medium = medium_of(settings)
+        self.medium = settings.medium
         self._spi, self._ce, self._irq = spi, ce, irq
         self._runtime = runtime or SystemRuntime()
-        self.access = MediumAccess(rules or access_rules(settings), rng or random.Random())
+        self.access = MediumAccess(settings.access_rules, rng or random.Random())
         self._lock = self._runtime.lock()  # guards the chip and all fields below
-        self._statistics = RadioStatistics()
-        self._chip = Transceiver(spi, ce, node_id, settings, self._runtime, self._statistics)
+        self._chip = Transceiver(spi, ce, node_id, settings, self._runtime, self.access.counters)
         self._irq_watch = IrqWatch()
         self._powered = False
-        self._working = False
+        self.working = False  # the chip answered and held its settings when it was last used
         self._next_restart_s = 0.0
         self._next_verify_s = 0.0
 
@@ -88,7 +112,7 @@ class NRF24LowLevelInterface:
     def power_down(self) -> None:
         """Neither send nor receive until `begin`. Ignores a missing chip."""
         with self._lock:
-            self._powered = self._working = False
+            self._powered = self.working = False
             try:
                 self._chip.power_down()
             except RadioError as error:
@@ -104,12 +128,7 @@ class NRF24LowLevelInterface:
 
     def statistics(self) -> RadioStatistics:
         """The current counters."""
-        return replace(self._statistics, **self.access.figures())
-
-    @property
-    def working(self) -> bool:
-        """Whether the chip answered and held its settings when it was last used."""
-        return self._working
+        return self.access.statistics()
 
     def send(self, node_id: int, payload: bytes) -> bool:
         """Send 32 bytes to a node, and wait; True once its chip has acknowledged them.
@@ -150,10 +169,8 @@ class NRF24LowLevelInterface:
         and acknowledged packets of that node. Therefore pipe 3 stays closed.
         """
         chip, address = self._chip, self.settings.node_address(node_id)
-        with self._lock:
-            if not self._ready():
-                return Try(False, 0)
-            try:
+        with self._noting_failure():
+            if self._ready():
                 chip.become_transmitter(address)
                 chip.load(address, payload, again=again)
                 chip.set_retries(delay, retransmits)
@@ -167,32 +184,23 @@ class NRF24LowLevelInterface:
                     chip.set_retries(delay, retransmits)
                     outcome = chip.transmit()
                 chip.listen()
-            except RadioError as error:
-                self._failed(error)
-                return Try(False, 0)
-            return outcome
+                return outcome
+        return Try(False, 0)
 
     def drop(self) -> None:
         """Give up the packet that was tried last: remove it from the chip."""
-        with self._lock:
-            try:
-                if self._working:
-                    self._chip.drop()
-            except RadioError as error:
-                self._failed(error)
+        with self._noting_failure():
+            if self.working:
+                self._chip.drop()
 
     def broadcast(self, payload: bytes) -> bool:
         """Send 32 bytes to every node in range; True if they were sent."""
         _check(payload)
-        with self._lock:
-            if not self._ready():
-                return False
-            try:
+        with self._noting_failure():
+            if self._ready():
                 self._chip.transmit_to_all(payload)
-            except RadioError as error:
-                self._failed(error)
-                return False
-            return True
+                return True
+        return False
 
     def receive(self, timeout_s: float) -> list[PipePayload]:
         """Received payloads, oldest first; waits up to `timeout_s` for one. For one thread."""
@@ -206,21 +214,17 @@ class NRF24LowLevelInterface:
             left_s = until_s - self._runtime.now_s()
             if left_s <= 0:
                 return []
-            if self._irq is None or not self._irq_watch.trusted or not self._working:
+            if self._irq is None or not self._irq_watch.trusted or not self.working:
                 self._runtime.sleep(min(left_s, POLL_S))
             else:
                 self._irq_watch.woken(self._irq.wait_low(left_s))
 
     def hears_power(self) -> bool | None:
         """Whether more than -64 dBm were in the channel for 40 us (RPD); None: it fails now."""
-        with self._lock:
-            if not self._ready():
-                return None
-            try:
+        with self._noting_failure():
+            if self._ready():
                 return self._chip.received_power()
-            except RadioError as error:
-                self._failed(error)
-                return None
+        return None
 
     def _pause(self, duration_s: float) -> None:
         """Wait, and keep receiving."""
@@ -235,7 +239,7 @@ class NRF24LowLevelInterface:
 
     def _poll(self) -> None:
         """Empty the FIFO, and periodically check that the chip still holds its settings."""
-        if not self._powered or (not self._working and not self._ready()):
+        if not self._powered or (not self.working and not self._ready()):
             return
         chip = self._chip
         try:
@@ -243,7 +247,7 @@ class NRF24LowLevelInterface:
             if self._irq is not None and self._irq_watch.trusted:
                 low_for_nothing = not chip.flags_seen and self._irq.wait_low(0.0)
                 if self._irq_watch.polled(found, low_for_nothing):
-                    self._statistics.irq_fallbacks += 1
+                    self.access.counters.irq_fallbacks += 1
                     logger.warning("node %d: the IRQ pin does not work; polling", self.node_id)
             now_s = self._runtime.now_s()
             if now_s >= self._next_verify_s:
@@ -254,16 +258,16 @@ class NRF24LowLevelInterface:
             self._ready()
 
     def _set_up(self) -> None:
-        self._working = False
+        self.working = False
         self._chip.set_up()
-        self._working = True
+        self.working = True
         self._next_verify_s = self._runtime.now_s() + VERIFY_PERIOD_S
 
     def _ready(self) -> bool:
         """Whether the chip can be used; sets it up again after it lost its settings."""
         if not self._powered:
             return False
-        if self._working:
+        if self.working:
             try:
                 self._chip.check_config()
                 return True
@@ -281,12 +285,21 @@ class NRF24LowLevelInterface:
         logger.warning("node %d: the radio works again", self.node_id)
         return True
 
+    @contextlib.contextmanager
+    def _noting_failure(self) -> Iterator[None]:
+        """Use the chip under the lock; if it fails, what follows this block runs."""
+        with self._lock:
+            try:
+                yield
+            except RadioError as error:
+                self._failed(error)
+
     def _failed(self, error: RadioError) -> None:
         """Note that the chip must be set up again before use."""
-        if self._working:
-            self._statistics.restarts += 1
+        if self.working:
+            self.access.counters.restarts += 1
             logger.warning("node %d: %s", self.node_id, error)
-        self._working = False
+        self.working = False
         self._chip.disable()
 
 

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass
+from typing import ClassVar
 
+from drone_mesh.channel.access_rules import AccessRules
 from drone_mesh.communication.interfaces import BROADCAST, MAX_NODE_ID, PAYLOAD_BYTES
+from drone_mesh.communication.medium import Medium
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.nrf24.airtime import NS_PER_S, SETTLING_NS, frame_bits
 from drone_mesh.nrf24.registers import (
@@ -27,7 +30,6 @@ from drone_mesh.nrf24.registers import (
 
 BROADCAST_PIPE = 1
 OWN_PIPE = 2
-_LISTENING_PIPES = 1 << BROADCAST_PIPE | 1 << OWN_PIPE
 _ALL_PIPES = (1 << PIPES) - 1
 
 
@@ -45,6 +47,7 @@ DATA_RATES = {
     "2M": DataRate.MBPS_2,
 }
 DEFAULT_RATE = "250k"  # the longest range
+CYCLE_S = {DataRate.KBPS_250: 2.6e-3, DataRate.MBPS_1: 1.1e-3, DataRate.MBPS_2: 0.9e-3}
 
 
 def data_rate(name: str) -> DataRate:
@@ -90,6 +93,7 @@ class RadioSettings:
     broadcast_mode: BroadcastMode = BroadcastMode.NO_ACK
     base_address: int = 0x544D526800  # the address of a node is this plus its id
     broadcast_id: int = BROADCAST
+    listening_pipes: ClassVar[int] = 1 << BROADCAST_PIPE | 1 << OWN_PIPE  # EN_RXADDR, at rest
 
     def __post_init__(self) -> None:
         for name, low, high in (
@@ -144,9 +148,14 @@ class RadioSettings:
         return _ALL_PIPES
 
     @property
-    def listening_pipes(self) -> int:
-        """EN_RXADDR while nothing is being sent."""
-        return _LISTENING_PIPES
+    def access_rules(self) -> AccessRules:
+        """The rules of access for radios with these settings."""
+        return AccessRules.for_cycle(CYCLE_S[self.data_rate])
+
+    @property
+    def medium(self) -> Medium:
+        """The properties of a channel with these settings, for the mesh."""
+        return Medium.for_hop(CYCLE_S[self.data_rate])
 
     def registers(self, node_id: int) -> dict[Register, bytes]:
         """Every register that the driver depends on, except CONFIG: the chip has no reset.

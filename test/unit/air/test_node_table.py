@@ -8,8 +8,7 @@ import random
 
 import pytest
 
-from drone_mesh.air.node import AirError, Node
-from drone_mesh.air.node_table import NodeTable
+from drone_mesh.air.node_table import AirError, Node, NodeTable
 
 NOWHERE = (0.0, 0.0, 0.0)  # what an antenna gives as its position
 

@@ -13,8 +13,8 @@ from drone_mesh.channel.medium_access import MediumAccess
 from drone_mesh.channel.radio import Try
 from drone_mesh.channel.statistics import RadioStatistics
 from drone_mesh.communication.medium import Medium
+from drone_mesh.inprocess.clock import TaskClock
 from drone_mesh.inprocess.interfaces import IInProcessAir, IInProcessAntenna
-from drone_mesh.inprocess.task_clock import TaskClock
 
 HOP_S = 0.1
 FRAME_S = {"packet": 0.06, "answer": 0.03}  # the rest of a hop is turning round

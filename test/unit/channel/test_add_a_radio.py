@@ -12,7 +12,6 @@ from drone_mesh.communication.medium import UNDISTURBED, Medium
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.inprocess import Network
-from drone_mesh.nrf24.pace import medium_of
 from drone_mesh.nrf24.settings import DataRate, RadioSettings
 
 TIMING = MeshTiming(check_period_s=60.0, connection_lost_after_s=180.0)
@@ -61,7 +60,7 @@ def test_behind_a_dead_relay_one_drone_flies_at_a_time_at_the_pace_of_the_slow_r
     [(DataRate.KBPS_250, 2.6e-3), (DataRate.MBPS_1, 1.1e-3), (DataRate.MBPS_2, 0.9e-3)],
 )
 def test_on_an_nrf24_no_time_of_the_mesh_is_stretched(rate, hop_s):
-    medium = medium_of(RadioSettings(data_rate=rate))
+    medium = RadioSettings(data_rate=rate).medium
     assert medium == Medium(
         hop_s,
         shared=True,

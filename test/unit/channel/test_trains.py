@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from drone_mesh.channel.trains import place_in_train
-from drone_mesh.channel.yielding import InTrain
+from drone_mesh.channel.trains import InTrain, place_in_train
 
 RELAY, GATEWAY = 3, 0
 

@@ -14,6 +14,7 @@ from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions
 from drone_mesh.drone.mavlink.pilot import MavlinkPilot
 from drone_mesh.drone.mavlink.pilot_status import Phase
 from drone_mesh.drone.mavlink.telemetry import Message
+from drone_mesh.drone.mavlink_vehicle.modes import Mode
 from drone_mesh.drone.mavlink_vehicle.vehicle import MavlinkVehicle
 
 STEP_S = 0.05
@@ -125,6 +126,13 @@ class Rig:
 
 
 TARGET = "SET_POSITION_TARGET_GLOBAL_INT"
+
+
+def lift(vehicle: MavlinkVehicle, height_m: float) -> None:
+    """Its human pilot has taken it to this height, where it hovers."""
+    vehicle.arm()
+    vehicle.body.place = vehicle.body.place._replace(height=height_m)
+    vehicle.choose_mode(Mode.HOLD)
 
 
 def target_location(message: Message) -> Location:

@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.autopilots import PX4, Autopilot
-from drone_mesh.drone.mavlink.pending_command import PendingCommand
+from drone_mesh.drone.mavlink.commander import PendingCommand
 from drone_mesh.drone.mavlink.pilot_status import Phase
 from drone_mesh.errors import GoalRefused
 

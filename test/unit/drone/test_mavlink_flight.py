@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from mavlink_rig import ALL, ARDUPILOT, Rig, is_inside
+from mavlink_rig import ALL, ARDUPILOT, Rig, is_inside, lift
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from drone_mesh.drone.location import Location
@@ -132,7 +132,7 @@ def test_no_target_of_a_flight_lies_outside_the_limits(autopilot: Autopilot) -> 
 
 def test_a_drone_that_its_pilot_flew_out_of_the_limits_is_not_led_further() -> None:
     rig = Rig(PX4, limits=FlightLimits(max_distance_m=50.0))
-    rig.vehicle.lift(10.0)
+    lift(rig.vehicle, 10.0)
     rig.vehicle.body.place = Location(80.0, 0.0, 10.0)
     rig.ready()
     assert rig.targets()

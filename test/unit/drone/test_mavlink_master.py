@@ -6,7 +6,7 @@ import re
 from typing import Callable
 
 import pytest
-from mavlink_rig import ALL, ARDUPILOT, NONE, TARGET, Rig
+from mavlink_rig import ALL, ARDUPILOT, NONE, TARGET, Rig, lift
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from drone_mesh.drone.location import Location
@@ -21,7 +21,7 @@ BOTH = pytest.mark.parametrize("autopilot", [ARDUPILOT, PX4], ids=lambda a: a.na
 
 def _in_the_air(autopilot: Autopilot, permissions: Permissions = ALL) -> Rig:
     rig = Rig(autopilot, permissions)
-    rig.vehicle.lift(8.0)
+    lift(rig.vehicle, 8.0)
     return rig.ready()
 
 
@@ -70,7 +70,7 @@ def test_without_a_permission_it_refuses_and_says_what_is_missing(
 @BOTH
 def test_it_never_takes_control_from_a_pilot_who_flies_by_hand(autopilot: Autopilot) -> None:
     rig = Rig(autopilot)
-    rig.vehicle.lift(8.0)
+    lift(rig.vehicle, 8.0)
     rig.vehicle.choose_mode(Mode.PILOT)
     rig.ready()
     assert "flown by its pilot" in rig.status().why_not_fly

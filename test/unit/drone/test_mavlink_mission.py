@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from mavlink_rig import ARDUPILOT, ORIGIN, Wire
+from mavlink_rig import ARDUPILOT, ORIGIN, Wire, lift
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from drone_mesh.drone.location import Location
@@ -23,7 +23,7 @@ class GroundStation:
         self._from = Wire(1, 1)
         self._to = Wire(255, 190)
         self.vehicle = MavlinkVehicle(autopilot, ORIGIN, self._from.send)
-        self.vehicle.lift(10.0)
+        lift(self.vehicle, 10.0)
         self.vehicle.faults.estimate_good = True
 
     def say(self, message: Message) -> list[Message]:

@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import Callable
 
 import pytest
-from mavlink_rig import ALL, ARDUPILOT, Rig
+from mavlink_rig import ALL, ARDUPILOT, Rig, lift
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from drone_mesh.drone.mavlink.autopilots import PX4, Autopilot, px4_mode
@@ -91,7 +91,7 @@ EVERY_MODE = pytest.mark.parametrize(
 def in_flight(autopilot: Autopilot, permissions: Permissions = ALL) -> Rig:
     """The pilot gave it to the mesh in the air, and it flies as ordered."""
     rig = Rig(autopilot, permissions)
-    rig.vehicle.lift(8.0)
+    lift(rig.vehicle, 8.0)
     rig.ready()
     rig.vehicle.choose_mode(Mode.FOLLOW)
     rig.run_until("it can fly", lambda: not rig.status().why_not_fly, within_s=3.0)
@@ -138,7 +138,7 @@ def test_a_mode_that_was_found_in_the_air_counts_as_chosen(
     autopilot: Autopilot, mode: int, who: str
 ) -> None:
     rig = Rig(autopilot)
-    rig.vehicle.lift(8.0)
+    lift(rig.vehicle, 8.0)
     rig.shown_mode = mode
     rig.ready()
     assert refuses(rig, rig.repair) is (who != ENGINE)
@@ -251,7 +251,7 @@ def test_whoever_chose_the_mode_the_aircraft_stays_his_until_it_is_given_back(
         assert refuses(rig, rig.repair)
         assert refuses(rig, rig.goal)
     assert rig.commands() == []
-    rig.vehicle.lift(8.0)
+    lift(rig.vehicle, 8.0)
     rig.run(3.0)  # PX4 accepts OFFBOARD only while targets arrive
     rig.vehicle.choose_mode(Mode.FOLLOW)  # the pilot gives it back
     rig.run_until("it can fly", lambda: not rig.status().why_not_repair, within_s=3.0)

@@ -9,8 +9,8 @@ from mavlink_rig import STEP_S, Rig
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from drone_mesh.drone.location import Location
+from drone_mesh.drone.mavlink.engine import ListeningClock
 from drone_mesh.drone.mavlink.link import MavlinkLink
-from drone_mesh.drone.mavlink.listening import ListeningClock
 from drone_mesh.drone.mavlink.pilot_status import Phase
 from drone_mesh.drone.mavlink_vehicle.modes import Mode
 

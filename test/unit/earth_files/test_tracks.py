@@ -14,7 +14,7 @@ def test_a_track_has_a_place_whenever_the_drone_has_moved_half_a_metre():
 
 
 def test_long_tracks_are_thinned_out_but_keep_both_ends(monkeypatch):
-    monkeypatch.setattr("drone_mesh.earth_files.tracks.MOST_PLACES", 4)
+    monkeypatch.setattr("drone_mesh.earth_files.placemarks.MOST_PLACES", 4)
     (path,) = tracks_of((float(t), 2, (float(t), 0.0, 0.0)) for t in range(10)).paths
     assert path.times_s == [0.0, 3.0, 6.0, 9.0]
     assert [place.longitude for place in path.places] == path.times_s

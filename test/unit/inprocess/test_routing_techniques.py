@@ -9,7 +9,7 @@ import scenarios
 
 from drone_mesh.communication.named_techniques import ROUTING_TECHNIQUES
 from drone_mesh.inprocess import Network
-from drone_mesh.inprocess.shortest_path import SHORTEST_PATH
+from drone_mesh.inprocess.bounds import SHORTEST_PATH
 
 ALL = [*ROUTING_TECHNIQUES, SHORTEST_PATH]
 FOR_CROWDS = [name for name in ALL if name != "flooding"]  # its packets grow with the square

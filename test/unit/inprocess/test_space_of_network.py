@@ -10,7 +10,7 @@ import pytest
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.inprocess import Network
 from drone_mesh.nrf24.emulator.links import LogDistance
-from drone_mesh.nrf24.emulator.noise import Noise
+from drone_mesh.nrf24.emulator.space import Noise
 from drone_mesh.nrf24.settings import RadioSettings
 
 MHZ = 2400 + RadioSettings().channel

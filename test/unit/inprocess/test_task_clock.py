@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from drone_mesh.inprocess.task_clock import TaskClock
+from drone_mesh.inprocess.clock import TaskClock
 
 
 def test_an_event_is_never_called_before_its_time_however_that_is_rounded():

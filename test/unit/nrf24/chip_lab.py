@@ -7,9 +7,9 @@ from functools import partial
 
 from drone_mesh.nrf24.emulator.air import Air
 from drone_mesh.nrf24.emulator.chip import EmulatedChip
+from drone_mesh.nrf24.emulator.chip_core import ChipVariant
 from drone_mesh.nrf24.emulator.cooperative_clock import CooperativeClock
 from drone_mesh.nrf24.emulator.links import IdealDisc, ScriptedLoss
-from drone_mesh.nrf24.emulator.quirks import ChipVariant
 from drone_mesh.nrf24.emulator.trace import FrameTrace
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
 from drone_mesh.nrf24.registers import Command, Register

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from chip_lab import ADDRESS, Lab, us
 
+from drone_mesh.nrf24.emulator.chip_core import State
 from drone_mesh.nrf24.emulator.links import IdealDisc
-from drone_mesh.nrf24.emulator.states import State
 from drone_mesh.nrf24.registers import Register
 
 # 5 address bytes, 32 bytes of payload, SETUP_RETR 5F: T_data, T_ack, CE -> TX_DS, the same for a

@@ -6,7 +6,7 @@ import pytest
 from chip_lab import ADDRESS, BROADCAST_ADDRESS, PAYLOAD, us
 from test_c_transmitter import lose_first
 
-from drone_mesh.nrf24.emulator.states import State
+from drone_mesh.nrf24.emulator.chip_core import State
 from drone_mesh.nrf24.registers import Register
 
 

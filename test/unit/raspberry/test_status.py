@@ -19,7 +19,7 @@ import pytest
 from drone_mesh.drone.ground import GroundEngine
 from drone_mesh.internet.http_settings import HttpSettings
 from drone_mesh.internet.on_demand import http_internet
-from drone_mesh.nrf24.emulator.states import State
+from drone_mesh.nrf24.emulator.chip_core import State
 from drone_mesh.raspberry.emulated_air import EmulatedAir
 from drone_mesh.raspberry.node import RadioNode
 from drone_mesh.raspberry.node_status import one_line, table

@@ -46,7 +46,7 @@ class Authority:
             return "the autopilot has not reported its home yet"
         if not self._area.is_in_frame(telemetry.home):
             return "its home is more than 5 km from --origin"
-        if telemetry.is_outside_fence():
+        if telemetry.is_outside_fence:
             return "outside the autopilot's fence"
         battery = telemetry.battery_percent(now_s)
         if battery is None and limits.min_battery_percent > 0.0:

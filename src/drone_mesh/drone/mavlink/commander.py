@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Callable
+from dataclasses import dataclass
+from typing import Any, Callable
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from drone_mesh.drone.geodesy import EarthPlace
-from drone_mesh.drone.mavlink.pending_command import PendingCommand
 from drone_mesh.drone.mavlink.telemetry import ESTIMATE_HZ, STREAMS_HZ, Message, Telemetry
 
 HEARTBEAT_PERIOD_S = 1.0  # required by MAVLink
@@ -26,6 +26,79 @@ POSITION_ONLY = (
     | mavlink.POSITION_TARGET_TYPEMASK_YAW_IGNORE
     | mavlink.POSITION_TARGET_TYPEMASK_YAW_RATE_IGNORE
 )
+
+
+PERIOD_S = 1.0  # our choice: an autopilot acknowledges within tens of milliseconds
+REFUSED_AFTER_S = 1.5  # our choice: the words, or the effect of a try before, may come later
+MOST_WORDS = 50  # of a STATUSTEXT
+
+TAKEN = (mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_IN_PROGRESS)
+LATER = mavlink.MAV_RESULT_TEMPORARILY_REJECTED
+
+
+@dataclass
+class PendingCommand:
+    """One command, from its first try to its effect or its refusal.
+
+    It knows what was sent and what came back; the caller sends, and sees the effect.
+    """
+
+    number: int  # of MAV_CMD
+    parameters: tuple[float, ...]
+    begun_s: float
+    within_s: float  # the time for its effect
+    once: bool  # see `is_due`
+    tries: int = 0
+    words: str = ""  # the autopilot's own
+    sent_s: float = -math.inf
+    result: int | None = None  # of the latest acknowledgement
+    refused_s: float = math.inf
+
+    @property
+    def _until_s(self) -> float:
+        return self.begun_s + self.within_s
+
+    def is_due(self, now_s: float) -> bool:
+        """Whether to send it now: at first, while no answer comes, and when it was put off.
+
+        With `once` silence is no reason: the autopilot may have carried it out.
+        """
+        if now_s < self.sent_s + PERIOD_S or self.tries and now_s >= self._until_s:
+            return False
+        if self.result is None:
+            return self.tries == 0 or not self.once
+        return bool(self.result == LATER)
+
+    def sent_at(self, now_s: float) -> None:
+        """It is being sent."""
+        self.tries += 1
+        self.sent_s = now_s
+
+    def acknowledged(self, result: int, now_s: float) -> None:
+        """COMMAND_ACK with this MAV_RESULT."""
+        if self.result in TAKEN:
+            return  # a repetition may be refused because the first try is being carried out
+        self.result = result
+        if result not in TAKEN and result != LATER and self.refused_s == math.inf:
+            self.refused_s = now_s + REFUSED_AFTER_S
+
+    def refusal(self, now_s: float) -> str:
+        """Why it is not carried out, if its time is over or it was refused; otherwise empty."""
+        if now_s < min(self._until_s, self.refused_s):
+            return ""
+        if self.words:
+            return self.words[:MOST_WORDS]
+        if self.result is None:
+            return f"the autopilot did not answer within {self.within_s:g} s"
+        if self.result in TAKEN:
+            return f"the autopilot accepted it, nothing happened for {self.within_s:g} s"
+        return f"the autopilot refused: {result_name(self.result)}"
+
+
+def result_name(result: int) -> str:
+    """The name of a MAV_RESULT."""
+    entry: Any = mavlink.enums["MAV_RESULT"].get(result)
+    return str(entry.name)[len("MAV_RESULT_") :].lower() if entry else f"result {result}"
 
 
 class Commander:
@@ -109,12 +182,10 @@ class Commander:
 
     def target(self, place: EarthPlace) -> None:
         """Send the position to fly to now."""
-        telemetry = self._telemetry
         self._send(
             mavlink.MAVLink_set_position_target_global_int_message(
                 0,
-                telemetry.system_id,
-                telemetry.component_id,
+                *self._telemetry.sender,
                 mavlink.MAV_FRAME_GLOBAL_INT,
                 POSITION_ONLY,
                 round(place.latitude_deg * 1e7),
@@ -126,20 +197,11 @@ class Commander:
 
     def read_parameter(self, name: str) -> None:
         """Request one parameter; the answer is a PARAM_VALUE."""
-        telemetry = self._telemetry
-        self._send(
-            mavlink.MAVLink_param_request_read_message(
-                telemetry.system_id, telemetry.component_id, name.encode(), -1
-            )
-        )
+        sender = self._telemetry.sender
+        self._send(mavlink.MAVLink_param_request_read_message(*sender, name.encode(), -1))
 
     def _send_command(
         self, command: int, parameters: tuple[float, ...], confirmation: int = 0
     ) -> None:
-        telemetry = self._telemetry
-        padded = (*parameters, *(0.0,) * (7 - len(parameters)))
-        self._send(
-            mavlink.MAVLink_command_long_message(
-                telemetry.system_id, telemetry.component_id, command, confirmation, *padded
-            )
-        )
+        sender, padded = self._telemetry.sender, (*parameters, *(0.0,) * (7 - len(parameters)))
+        self._send(mavlink.MAVLink_command_long_message(*sender, command, confirmation, *padded))

@@ -130,13 +130,12 @@ class MavlinkPilot:
         if self._telemetry.heartbeat_s <= self._slept_s and not self._telemetry.link_trouble(now_s):
             return
         if self._phase is not Phase.IDLE:
-            reason = self._why_let_go(now_s)
+            reason = self._authority.why_let_go(
+                now_s, self._phase, self._phase_since_s, self._for_repair
+            )
             if reason:
                 self._let_go(reason, now_s)
         self._act(passed_s, now_s)
-
-    def _why_let_go(self, now_s: float) -> str:
-        return self._authority.why_let_go(now_s, self._phase, self._phase_since_s, self._for_repair)
 
     def status(self, now_s: float) -> PilotStatus:
         """The current status."""

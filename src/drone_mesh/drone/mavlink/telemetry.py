@@ -56,19 +56,22 @@ STREAMS_HZ = {
 ESTIMATE_HZ = 4.0
 
 
+def sender_of(message: Message) -> tuple[int, int]:
+    """The system and the component that sent a message."""
+    return message.get_srcSystem(), message.get_srcComponent()
+
+
 class Telemetry:
     """The latest report of one autopilot on each subject. Times are of the caller's clock."""
 
     def __init__(self) -> None:
         self.autopilot: Autopilot | None = None  # None until one was heard
-        self.system_id = 0
-        self.component_id = 0
+        self.sender = (0, 0)  # its system and component
         self.heartbeat_s = -math.inf
         self.mode = -1  # custom_mode
         self.armed = False
         self.failsafe = False
         self.home: EarthPlace | None = None
-        self.foreign = 0  # messages of other systems
         self._other_vehicle = False  # an unsupported autopilot was heard
         self._place: EarthPlace | None = None
         self._place_s = -math.inf
@@ -80,7 +83,7 @@ class Telemetry:
         self._battery_s = -math.inf
         self._landed = mavlink.MAV_LANDED_STATE_UNDEFINED
         self._landed_s = -math.inf
-        self._fence_breached = False
+        self.is_outside_fence = False  # as the autopilot reports
         self._sticks_at_rest: tuple[int, ...] | None = None
         self._sticks_moved_s = -math.inf
         self._takes: dict[str, Callable[[Message, float], None]] = {
@@ -104,11 +107,8 @@ class Telemetry:
                 self.autopilot = autopilot_of(message.autopilot)
             if message.get_srcComponent() == mavlink.MAV_COMP_ID_AUTOPILOT1:
                 self._other_vehicle = self.autopilot is None
-            self.system_id = message.get_srcSystem()
-            self.component_id = message.get_srcComponent()
-        sender = (message.get_srcSystem(), message.get_srcComponent())
-        if self.autopilot is None or sender != (self.system_id, self.component_id):
-            self.foreign += 1
+            self.sender = sender_of(message)
+        if self.autopilot is None or sender_of(message) != self.sender:
             return False
         take = self._takes.get(message.get_type())
         if take is not None:
@@ -159,10 +159,6 @@ class Telemetry:
             return None
         return bool(self._landed == mavlink.MAV_LANDED_STATE_ON_GROUND)
 
-    def is_outside_fence(self) -> bool:
-        """Whether the autopilot reports a breach of its fence."""
-        return self._fence_breached
-
     def sticks_moved(self, now_s: float) -> bool:
         """Whether a stick of the pilot's transmitter has moved recently."""
         return now_s - self._sticks_moved_s <= STICKS_REST_S
@@ -211,7 +207,7 @@ class Telemetry:
         self._battery_s = now_s
         health = message.onboard_control_sensors_health
         if message.onboard_control_sensors_enabled & FENCE_SENSOR:
-            self._fence_breached = not health & FENCE_SENSOR
+            self.is_outside_fence = not health & FENCE_SENSOR
 
     def _take_landed(self, message: Message, now_s: float) -> None:
         self._landed = message.landed_state
@@ -221,7 +217,7 @@ class Telemetry:
         self.home = _on_earth(message.latitude, message.longitude, message.altitude)
 
     def _take_fence(self, message: Message, _now_s: float) -> None:
-        self._fence_breached = bool(message.breach_status)
+        self.is_outside_fence = bool(message.breach_status)
 
     def _take_sticks(self, message: Message, now_s: float) -> None:
         sticks = (message.chan1_raw, message.chan2_raw, message.chan3_raw, message.chan4_raw)

@@ -1,24 +1,40 @@
-"""The body of the simulated drone: position, movement, battery."""
+"""The body of the simulated drone: position, movement, battery; and the faults of a vehicle."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 from drone_mesh.drone.location import Location
 
 LANDING_SPEED_M_S = 1.0  # our choice
 ARRIVED_M = 0.05  # our choice
+DRAIN_PERCENT_S = 0.05  # our choice: discharge per second in the air
+
+
+@dataclass
+class VehicleFaults:
+    """Faults, which may be set at any time; none by default."""
+
+    silent: bool = False  # the link is broken in both directions
+    fix_type: int = 3  # GPS_FIX_TYPE
+    estimate_good: bool = True
+    positions_stop: bool = False
+    fence_breached: bool = False
+    refuses_to_arm: bool = False
+    spool_up_s: float = 0.0  # from the acknowledgement of a take-off to the first movement
+    battery_known: bool = True
+    stick_us: int = 1500  # of the roll stick
 
 
 class Body:
     """Moves in straight lines at one speed, as the in-process drone does, relative to home."""
 
-    def __init__(self, speed_m_s: float, drain_percent_s: float) -> None:
-        """`drain_percent_s` is the discharge per second in the air."""
+    def __init__(self) -> None:
         self.place = Location(0.0, 0.0, 0.0)
         self.armed = False
         self.battery_percent = 100.0
-        self.speed_m_s = speed_m_s
+        self.speed_m_s = 5.0  # unless targets are slower
         self.velocity = (0.0, 0.0, 0.0)  # north, east, up; m/s
-        self._drain_percent_s = drain_percent_s
 
     @property
     def on_ground(self) -> bool:
@@ -39,6 +55,6 @@ class Body:
                 (self.place.height - before.height) / passed_s,
             )
         if self.armed and not self.on_ground:
-            drained = self._drain_percent_s * passed_s
+            drained = DRAIN_PERCENT_S * passed_s
             self.battery_percent = max(0.0, self.battery_percent - drained)
         return target is not None and self.place.distance_m(target) <= ARRIVED_M

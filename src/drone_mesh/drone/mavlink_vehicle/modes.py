@@ -49,7 +49,5 @@ def mode_number(autopilot: Autopilot, mode: Mode) -> int:
 
 def mode_of(autopilot: Autopilot, number: int) -> Mode | None:
     """The mode with this `custom_mode`; None if the vehicle does not have it."""
-    for mode, its_number in _NUMBERS[autopilot.name].items():
-        if its_number == number:
-            return mode
-    return None
+    modes = _NUMBERS[autopilot.name].items()
+    return next((mode for mode, its_number in modes if its_number == number), None)

@@ -16,8 +16,7 @@ from drone_mesh.drone.mavlink.telemetry import (
     GOOD_ESTIMATE,
     Message,
 )
-from drone_mesh.drone.mavlink_vehicle.body import Body
-from drone_mesh.drone.mavlink_vehicle.faults import VehicleFaults
+from drone_mesh.drone.mavlink_vehicle.body import Body, VehicleFaults
 from drone_mesh.drone.mavlink_vehicle.modes import Mode, mode_number
 from drone_mesh.drone.mavlink_vehicle.uploaded_mission import UploadedMission
 

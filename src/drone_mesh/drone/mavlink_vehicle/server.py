@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import selectors
 import socket
@@ -69,10 +70,8 @@ class _Port:
         data = message.pack(self._codec)
         self._codec.seq = (self._codec.seq + 1) % 256
         for peer in {*self._ground_stations, *self._heard_s}:
-            try:
+            with contextlib.suppress(OSError):  # no listener there now; datagrams may get lost
                 self.socket.sendto(data, peer)
-            except OSError:
-                continue  # no listener there now; datagrams may get lost
 
 
 class VehicleServer:

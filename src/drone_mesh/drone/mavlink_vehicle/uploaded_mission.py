@@ -8,7 +8,7 @@ from typing import Callable
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from drone_mesh.drone.location import Location
-from drone_mesh.drone.mavlink.telemetry import Message
+from drone_mesh.drone.mavlink.telemetry import Message, sender_of
 
 MOST_ITEMS = 500  # our choice
 ASK_AGAIN_S = 1.0  # our choice; MAVLink recommends 0.25 to 1.5 s
@@ -30,11 +30,13 @@ class UploadedMission:
         self,
         send: Callable[[Message], None],
         place_of: Callable[[int, int, float, int], Location | None],
+        now_s: Callable[[], float],
         first: int,
     ) -> None:
         """`place_of` converts a place of an item; items before `first` are not flown."""
         self._send = send
         self._place_of = place_of
+        self._now_s = now_s
         self._first = first
         self._items: list[Message] = []
         self.current = 0  # the item that it flies to, or begins with
@@ -78,13 +80,13 @@ class UploadedMission:
             return here._replace(height=place.height)
         return place
 
-    def arrived(self, now_s: float) -> None:
+    def arrived(self) -> None:
         """It is at its way point: wait there as long as the item says, then go on."""
         if math.isnan(self._reached_s):
-            self._reached_s = now_s
+            self._reached_s = self._now_s()
         item = self._items[self.current]
         waits_s = item.param1 if item.command == mavlink.MAV_CMD_NAV_WAYPOINT else 0.0
-        if now_s - self._reached_s >= waits_s:
+        if self._now_s() - self._reached_s >= waits_s:
             self._advance()
 
     def _advance(self) -> None:
@@ -100,53 +102,50 @@ class UploadedMission:
 
     # Messages --------------------------------------------------------------------------------
 
-    def tick(self, now_s: float) -> None:
+    def tick(self) -> None:
         """Ask again for an item that did not come."""
-        if self._loading is None or now_s < self._asked_s + ASK_AGAIN_S:
+        if self._loading is None or self._now_s() < self._asked_s + ASK_AGAIN_S:
             return
         if self._tries >= MOST_TRIES:
             self._loading = None
         else:
-            self._ask(now_s)
+            self._ask()
 
-    def take_list_request(self, message: Message, _now_s: float) -> None:
+    def take_list_request(self, message: Message) -> None:
         """MISSION_REQUEST_LIST."""
         count = len(self._items) if _is_flight(message) else 0
-        sender = (message.get_srcSystem(), message.get_srcComponent())
-        self._send(mavlink.MAVLink_mission_count_message(*sender, count, message.mission_type))
+        kind = message.mission_type
+        self._send(mavlink.MAVLink_mission_count_message(*sender_of(message), count, kind))
 
-    def take_request(self, message: Message, _now_s: float) -> None:
+    def take_request(self, message: Message) -> None:
         """MISSION_REQUEST_INT and MISSION_REQUEST."""
         if not _is_flight(message) or message.seq >= len(self._items):
             self._acknowledge(message, mavlink.MAV_MISSION_INVALID_SEQUENCE)
             return
         item = self._items[message.seq]
-        item.target_system, item.target_component = (
-            message.get_srcSystem(),
-            message.get_srcComponent(),
-        )
+        item.target_system, item.target_component = sender_of(message)
         self._send(item)
 
-    def take_count(self, message: Message, now_s: float) -> None:
+    def take_count(self, message: Message) -> None:
         """MISSION_COUNT: a new mission begins to come."""
         if not _is_flight(message):
             self._acknowledge(message, mavlink.MAV_MISSION_UNSUPPORTED)
         elif message.count > MOST_ITEMS:
             self._acknowledge(message, mavlink.MAV_MISSION_NO_SPACE)
         elif message.count == 0:
-            self.take_clear(message, now_s)
+            self.take_clear(message)
         else:
-            self._from = (message.get_srcSystem(), message.get_srcComponent())
+            self._from = sender_of(message)
             self._loading, self._expected, self._tries = [], message.count, 0
-            self._ask(now_s)
+            self._ask()
 
-    def take_item(self, message: Message, now_s: float) -> None:
+    def take_item(self, message: Message) -> None:
         """MISSION_ITEM_INT."""
         loading = self._loading
-        if loading is None or (message.get_srcSystem(), message.get_srcComponent()) != self._from:
+        if loading is None or sender_of(message) != self._from:
             return
         if message.seq != len(loading):
-            self._ask(now_s)
+            self._ask()
             return
         place = self._place_of(message.x, message.y, message.z, message.frame)
         if message.command in _WAY_POINTS and (place is None or not math.isfinite(message.z)):
@@ -156,34 +155,33 @@ class UploadedMission:
         loading.append(_to_send(message))
         self._tries = 0
         if len(loading) < self._expected:
-            self._ask(now_s)
+            self._ask()
             return
         self._items, self._loading, self.current = loading, None, 0
         self._acknowledge(message, mavlink.MAV_MISSION_ACCEPTED)
 
-    def take_clear(self, message: Message, _now_s: float) -> None:
+    def take_clear(self, message: Message) -> None:
         """MISSION_CLEAR_ALL."""
         if _is_flight(message):
             self._items, self._loading, self.current = [], None, 0
         self._acknowledge(message, mavlink.MAV_MISSION_ACCEPTED)
 
-    def take_current(self, message: Message, _now_s: float) -> None:
+    def take_current(self, message: Message) -> None:
         """MISSION_SET_CURRENT."""
         if message.seq < len(self._items):
             self.current = message.seq
             self._reached_s = math.nan
         self._send(self.report())
 
-    def _ask(self, now_s: float) -> None:
+    def _ask(self) -> None:
         assert self._loading is not None
-        self._asked_s = now_s
+        self._asked_s = self._now_s()
         self._tries += 1
         self._send(mavlink.MAVLink_mission_request_int_message(*self._from, len(self._loading)))
 
     def _acknowledge(self, message: Message, result: int) -> None:
-        sender = (message.get_srcSystem(), message.get_srcComponent())
         kind = message.mission_type
-        self._send(mavlink.MAVLink_mission_ack_message(*sender, result, kind))
+        self._send(mavlink.MAVLink_mission_ack_message(*sender_of(message), result, kind))
 
 
 def _is_flight(message: Message) -> bool:

@@ -11,8 +11,7 @@ from drone_mesh.drone.geodesy import EarthPlace, Origin
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.autopilots import OUR_SYSTEM_ID, PX4, Autopilot
 from drone_mesh.drone.mavlink.telemetry import Message
-from drone_mesh.drone.mavlink_vehicle.body import LANDING_SPEED_M_S, Body
-from drone_mesh.drone.mavlink_vehicle.faults import VehicleFaults
+from drone_mesh.drone.mavlink_vehicle.body import LANDING_SPEED_M_S, Body, VehicleFaults
 from drone_mesh.drone.mavlink_vehicle.inquiries import Inquiries
 from drone_mesh.drone.mavlink_vehicle.modes import Mode, mode_of
 from drone_mesh.drone.mavlink_vehicle.parameters import Parameters
@@ -43,19 +42,13 @@ class MavlinkVehicle:
         home: Origin,
         send: Callable[[Message], None],
         system_id: int = 1,
-        speed_m_s: float = 5.0,
-        drain_percent_s: float = 0.05,
     ) -> None:
-        """At home, disarmed, in its holding mode.
-
-        `speed_m_s` is its speed unless targets are slower. `drain_percent_s` is the discharge per
-        second in the air.
-        """
+        """At home, disarmed, in its holding mode."""
         self.autopilot = autopilot
         self.system_id = system_id
         self.home = home
         self.faults = VehicleFaults()
-        self.body = Body(speed_m_s, drain_percent_s)
+        self.body = Body()
         self.parameters = Parameters(autopilot)
         self.mode = Mode.HOLD
         self.in_failsafe = False
@@ -67,8 +60,11 @@ class MavlinkVehicle:
         self._lifts_s = -math.inf  # when the motors have spooled up
         self._ground_station_s = math.nan  # when its heartbeat was heard; NaN: never
         # ArduPilot keeps home in item 0.
-        self.mission = UploadedMission(self._send, self._place, 0 if autopilot is PX4 else 1)
+        self.mission = UploadedMission(
+            self._send, self._place, lambda: self.now_s, 0 if autopilot is PX4 else 1
+        )
         self._reports = Reports(self)
+        mission = self.mission
         inquiries = Inquiries(self._reports, self.parameters, self._send, lambda: self.now_s)
         self._inquiries = inquiries
         self._takes: dict[str, Callable[[Message], None]] = {
@@ -81,9 +77,6 @@ class MavlinkVehicle:
             "PARAM_REQUEST_LIST": inquiries.take_parameter_list_request,
             "PARAM_SET": inquiries.take_parameter,
             "TIMESYNC": inquiries.take_timesync,
-        }
-        mission = self.mission
-        self._takes_of_mission: dict[str, Callable[[Message, float], None]] = {
             "MISSION_REQUEST_LIST": mission.take_list_request,
             "MISSION_REQUEST_INT": mission.take_request,
             "MISSION_REQUEST": mission.take_request,
@@ -105,12 +98,6 @@ class MavlinkVehicle:
         self.body.armed = True
         self._stands_since_s = self.now_s
 
-    def lift(self, height_m: float) -> None:
-        """The pilot has taken it to this height, where it hovers."""
-        self.arm()
-        self.body.place = self.body.place._replace(height=height_m)
-        self.choose_mode(Mode.HOLD)
-
     # From outside ----------------------------------------------------------------------------
 
     def on_message(self, message: Message, now_s: float) -> None:
@@ -122,16 +109,13 @@ class MavlinkVehicle:
         take = self._takes.get(message.get_type())
         if take is not None:
             take(message)
-        of_mission = self._takes_of_mission.get(message.get_type())
-        if of_mission is not None:
-            of_mission(message, now_s)
 
     def tick(self, now_s: float) -> None:
         """Fly on to this time and send what is due."""
         passed_s = min(1.0, max(0.0, now_s - self.now_s))
         self.now_s = now_s
         self._watch_for_failsafes()
-        self.mission.tick(now_s)
+        self.mission.tick()
         self._fly(passed_s)
         for message in self._reports.due(now_s):
             self._send(message)
@@ -160,7 +144,7 @@ class MavlinkVehicle:
         if self.mode is Mode.TAKE_OFF and arrived:
             self._enter(Mode.HOLD)
         elif self.mode is Mode.MISSION and arrived and self.mission.item() is not None:
-            self.mission.arrived(self.now_s)
+            self.mission.arrived()
         self._disarm_on_ground()
 
     def _next_way_point(self, here: Location) -> Location:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 import random
+from dataclasses import dataclass
 from typing import Callable, Protocol, Sequence
 
 from drone_mesh.nrf24.airtime import NS_PER_S
@@ -41,30 +42,21 @@ class Antenna(Protocol):
         """The chip's own frame has ended."""
 
 
+@dataclass(eq=False)
 class Transmission:
     """One frame on the air."""
 
-    __slots__ = (
-        "aborted", "bits_per_s", "channel", "end_ns", "frame",
-        "listeners", "others", "packet", "sender", "start_ns", "tx_dbm",
-    )  # fmt: skip
-
-    def __init__(
-        self,
-        sender: Antenna,
-        frame: Frame,
-        radio: tuple[int, int, float],
-        span_ns: tuple[int, int],
-        packet: object,
-    ) -> None:
-        self.sender = sender
-        self.frame = frame
-        self.channel, self.bits_per_s, self.tx_dbm = radio
-        self.start_ns, self.end_ns = span_ns
-        self.packet = packet  # see links.Hop
-        self.aborted = False
-        self.others: list[Transmission] = []  # overlapping frames on the channel
-        self.listeners: Sequence[Antenna] = ()
+    sender: Antenna
+    frame: Frame
+    channel: int
+    bits_per_s: int
+    tx_dbm: float
+    start_ns: int
+    end_ns: int
+    packet: object  # see links.Hop
+    listeners: Sequence[Antenna]
+    others: list[Transmission]  # overlapping frames on the channel
+    aborted: bool = False
 
 
 TransmissionObserver = Callable[[Transmission], None]
@@ -109,13 +101,14 @@ class Air:
         """Start sending a frame now; `radio`: channel, bits per second, dBm."""
         start_ns = self.clock.now_ns
         end_ns = start_ns + frame.bit_count * 1_000_000_000 // radio[1]
-        transmission = Transmission(sender, frame, radio, (start_ns, end_ns), packet)
-        active = self._on_channel.setdefault(transmission.channel, [])
+        listeners = tuple(self._listening.get(radio[:2], ()))
+        active = self._on_channel.setdefault(radio[0], [])
+        transmission = Transmission(
+            sender, frame, *radio, start_ns, end_ns, packet, listeners, others=list(active)
+        )
         for other in active:
             other.others.append(transmission)
-            transmission.others.append(other)
         active.append(transmission)
-        transmission.listeners = tuple(self._listening.get(radio[:2], ()))
         self.clock.call_at(end_ns, self._end, transmission)
         return transmission
 

@@ -1,4 +1,4 @@
-"""An nRF24L01+ in software: its power states and CE, and its engines combined.
+"""An nRF24L01+ in software: its power states, SPI and CE, and its engines combined.
 
 The transmitter (PTX), the receiver (PRX) and the SPI commands have their own modules and share
 `chip_core.py`. Only the holder of the clock's access may touch the chip. Misuse is never refused,
@@ -7,17 +7,26 @@ only recorded in `warnings`.
 
 from __future__ import annotations
 
+from typing import Sequence
+
 from drone_mesh.nrf24.airtime import CE_PULSE_MIN_NS, CE_TO_CSN_NS, SETTLING_NS
 from drone_mesh.nrf24.emulator.air import RPD_DBM, Air
-from drone_mesh.nrf24.emulator.chip_core import ChipCore
+from drone_mesh.nrf24.emulator.chip_core import (
+    ANSWERING,
+    IDLE,
+    SENDING,
+    ChipCore,
+    ChipVariant,
+    State,
+)
 from drone_mesh.nrf24.emulator.commands import CommandDecoder
 from drone_mesh.nrf24.emulator.fading import Position
 from drone_mesh.nrf24.emulator.frames import Frame
-from drone_mesh.nrf24.emulator.quirks import ChipVariant
 from drone_mesh.nrf24.emulator.receiver import Receiver
-from drone_mesh.nrf24.emulator.spi import EmulatedSpiDev
-from drone_mesh.nrf24.emulator.states import ANSWERING, IDLE, SENDING, State
 from drone_mesh.nrf24.emulator.transmitter import Transmitter
+
+_FASTEST_HZ = 10_000_000  # of SPI [DS 8.3.2]
+_BITS_PER_NS = 8 * 1_000_000_000
 
 
 class EmulatedChip(ChipCore):
@@ -34,7 +43,7 @@ class EmulatedChip(ChipCore):
         self.transmitter = Transmitter(self)
         self.receiver = Receiver(self)
         self.commands = CommandDecoder(self, self.transmitter)
-        self.spi = EmulatedSpiDev(self.clock, self)
+        self.spi = EmulatedSpiDev(self)
 
     def brown_out(self) -> None:
         """The supply fails briefly: everything is as after power-on."""
@@ -53,6 +62,7 @@ class EmulatedChip(ChipCore):
     # -- SPI ---------------------------------------------------------------------------------
 
     def chip_selected(self) -> int:
+        """CSN falls; returns STATUS, the first byte sent."""
         stuck = self.faults.miso_stuck_at
         if stuck is not None:
             return stuck
@@ -61,6 +71,7 @@ class EmulatedChip(ChipCore):
         return self.status()
 
     def chip_deselected(self, mosi: bytes) -> bytes:
+        """CSN rises and the command takes effect; returns the bytes after STATUS."""
         stuck = self.faults.miso_stuck_at
         if stuck is not None:
             return bytes((stuck,)) * (len(mosi) - 1)
@@ -75,7 +86,7 @@ class EmulatedChip(ChipCore):
         if self.registers.receiver:
             if self.ce.value:
                 self.state = State.RX_SETTLING
-                self.after(SETTLING_NS, self.receiver.listen)
+                self.after(SETTLING_NS, lambda: self.listen(State.RX))
             else:
                 self.state = State.STANDBY_I
         elif not self.ce.value:
@@ -137,7 +148,7 @@ class EmulatedChip(ChipCore):
         else:
             taken = self.receiver.frame_arrived(frame)
         if taken:
-            self.latch_rpd(power_dbm > RPD_DBM)
+            self.rpd_latched = power_dbm > RPD_DBM  # even if a stronger frame came before
 
     def frame_left(self) -> None:
         self.transmission = None
@@ -145,3 +156,40 @@ class EmulatedChip(ChipCore):
             self.settle()
         else:
             self.transmitter.frame_left()
+
+
+class EmulatedSpiDev:
+    """The SPI device in front of the chip, as spidev.SpiDev shows it.
+
+    One transfer is one period of CSN low; it takes as long as its bits.
+    """
+
+    def __init__(self, chip: EmulatedChip) -> None:
+        self._chip = chip
+        self._busy = False
+        self.max_speed_hz = 8_000_000
+        self.mode = 0
+        self.no_cs = False
+
+    def open(self, bus: int, device: int) -> None:
+        """Any bus and device select the one chip of this object."""
+
+    def close(self) -> None:
+        """Nothing to release."""
+
+    def xfer2(self, data: Sequence[int], speed_hz: int = 0) -> list[int]:
+        """Clock out `data` and return the bytes received: STATUS, then the answer."""
+        chip, clock = self._chip, self._chip.clock
+        speed_hz = speed_hz or self.max_speed_hz
+        with clock.access():
+            if self._busy:
+                chip.warn("two SPI transfers at once")
+            if speed_hz > _FASTEST_HZ or self.mode != 0:
+                chip.warn("SPI must be mode 0 with at most 10 MHz")
+            self._busy = True
+            status = chip.chip_selected()
+        clock.elapse(len(data) * _BITS_PER_NS // speed_hz)
+        with clock.access():
+            answer = chip.chip_deselected(bytes(data))
+            self._busy = False
+        return [status, *answer]

@@ -1,24 +1,73 @@
 """The common part of the engines and SPI commands of an emulated chip.
 
-Registers, FIFOs, flags, the state, timers and the antenna. `chip.py` decides on power states;
-receiver, transmitter and commands use this class and do not depend on the whole chip.
+Variants, faults and states of chips; `ChipCore` with registers, FIFOs, flags, timers and the
+antenna. `chip.py` decides on power states; receiver, transmitter and commands use ChipCore and do
+not depend on the whole chip.
 """
 
 from __future__ import annotations
 
 import abc
+import enum
+from dataclasses import dataclass
 from typing import Callable
 
-from drone_mesh.nrf24.airtime import PREAMBLE_BITS, SETTLING_NS
+from drone_mesh.nrf24.airtime import POWER_UP_NS, PREAMBLE_BITS, SETTLING_NS
 from drone_mesh.nrf24.emulator.air import RPD_DBM, Air, Transmission
 from drone_mesh.nrf24.emulator.fading import Position
 from drone_mesh.nrf24.emulator.fifos import RxFifo, TxFifo
 from drone_mesh.nrf24.emulator.frames import Frame
 from drone_mesh.nrf24.emulator.pins import EmulatedCe, EmulatedIrq
-from drone_mesh.nrf24.emulator.quirks import ChipFaults, ChipVariant
 from drone_mesh.nrf24.emulator.register_bank import RegisterBank
-from drone_mesh.nrf24.emulator.states import State
 from drone_mesh.nrf24.registers import RX_FIFO_IS_EMPTY, RX_P_NO
+
+
+@dataclass(frozen=True)
+class ChipVariant:
+    """Properties of a chip. The defaults are those of a genuine nRF24L01+.
+
+    There is a switch for each behaviour that no source settles.
+    """
+
+    plus: bool = True  # False: no 250 kbit/s; ACTIVATE 0x73 must unlock FEATURE and DYNPD
+    power_up_ns: int = POWER_UP_NS  # Tpd2stby, depends on the crystal
+    no_ack_bit: int = 1  # on the air, for "do not acknowledge": 1 by the datasheet, 0 in nRF5 chips
+    duplicates_by_pipe: bool = True  # False: one memory of the last PID and CRC for all pipes
+    partial_read_removes: bool = False  # True: a payload that was read in part leaves the FIFO
+
+
+@dataclass
+class ChipFaults:
+    """The current faults; may be changed at any time."""
+
+    miso_stuck_at: int | None = None  # 0x00 or 0xFF: nothing answers, or nothing is connected
+    irq_stuck_at: bool | None = None  # level of the pin
+    dead_transmitter: bool = False
+    dead_receiver: bool = False
+    next_width: int | None = None  # R_RX_PL_WID, once: as for a broken frame that passed the CRC
+
+
+class State(enum.Enum):
+    """The current activity of the chip [DS 6.1, Fig. 4] and its engine [DS 7.5, Fig. 10, 11]."""
+
+    POWER_DOWN = "power down"
+    STARTING = "starting"  # Tpd2stby
+    STANDBY_I = "standby-I"
+    STANDBY_II = "standby-II"
+    RX_SETTLING = "RX settling"
+    RX = "RX"
+    TX_SETTLING = "TX settling"
+    TX = "TX"
+    ACK_TURN = "turning to RX for the acknowledgement"
+    ACK_WAIT = "waiting for the acknowledgement"
+    RETRY_WAIT = "waiting to send again"
+    ANSWER_SETTLING = "turning to TX for the acknowledgement"
+    ANSWER = "sending the acknowledgement"
+
+
+IDLE = frozenset((State.STANDBY_I, State.STANDBY_II, State.RX_SETTLING, State.RX))
+SENDING = frozenset((State.TX_SETTLING, State.TX, State.ACK_TURN, State.ACK_WAIT, State.RETRY_WAIT))
+ANSWERING = frozenset((State.ANSWER_SETTLING, State.ANSWER))
 
 
 class ChipCore(abc.ABC):
@@ -43,7 +92,8 @@ class ChipCore(abc.ABC):
         self.transmission: Transmission | None = None  # its own frame on the air
         self.ce_rose_ns = -SETTLING_NS
         self._epoch = 0  # timers of an earlier epoch are void
-        self._rpd_latched: bool | None = False  # None: the current state of the channel
+        # RPD as a valid packet or the end of listening left it; None: the state of the channel.
+        self.rpd_latched: bool | None = False
         self.ce = EmulatedCe(self.clock, self._ce_changed)
         self.irq = EmulatedIrq(self.clock)
 
@@ -133,14 +183,14 @@ class ChipCore(abc.ABC):
     def listen(self, state: State) -> None:
         """The receiver has settled."""
         self.state = state
-        self._rpd_latched = None
+        self.rpd_latched = None
         self._listening_to = (self.registers.channel, self.registers.bits_per_s)
         self.air.listen(self, *self._listening_to)
 
     def stop_listening(self) -> None:
         """The receiver is switched off; RPD keeps its last value."""
         if self.listening_since_ns is not None:
-            self._rpd_latched = self.rpd()
+            self.rpd_latched = self.rpd()
             self.air.stop_listening(self, *self._listening_to)
 
     def retune(self) -> None:
@@ -151,8 +201,8 @@ class ChipCore(abc.ABC):
 
     def rpd(self) -> bool:
         """Received power detector: above -64 dBm now, when a packet arrived, or at the end."""
-        if self._rpd_latched is not None:
-            return self._rpd_latched
+        if self.rpd_latched is not None:
+            return self.rpd_latched
         if self.listening_since_ns is None:
             return False
         channel, bits_per_s = self._listening_to
@@ -183,10 +233,6 @@ class ChipCore(abc.ABC):
         if self.transmission is not None:
             self.air.abort(self.transmission)
             self.transmission = None
-
-    def latch_rpd(self, strong: bool) -> None:
-        """A valid packet arrived: RPD shows its power, even if a stronger one came before."""
-        self._rpd_latched = strong
 
     def recognised_until_ns(self) -> int | None:
         """End of the incoming recognised frame, or None."""

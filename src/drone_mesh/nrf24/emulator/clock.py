@@ -9,21 +9,19 @@ from __future__ import annotations
 import abc
 from typing import Callable, ContextManager
 
-from drone_mesh.channel.runtime import Runtime, Signal
+from drone_mesh.channel.runtime import Runtime
 
 
 class EmulatorClock(abc.ABC):
     """The time of one air, its event queue, and the exclusive access to its chips."""
 
-    @property
-    @abc.abstractmethod
-    def now_ns(self) -> int:
-        """Time of the air. Within an event: the time for which the event was scheduled."""
+    now_ns: int
+    """Time of the air. Within an event: the time for which the event was scheduled."""
 
     @property
     @abc.abstractmethod
     def runtime(self) -> Runtime:
-        """The source of time and threads for drivers on this air."""
+        """The time, signals and threads of whoever waits for a chip on this air."""
 
     @abc.abstractmethod
     def call_at(self, time_ns: int, event: Callable[..., None], *arguments: object) -> None:
@@ -36,7 +34,3 @@ class EmulatorClock(abc.ABC):
     @abc.abstractmethod
     def elapse(self, duration_ns: int) -> None:
         """An SPI transfer takes this long. Called without access."""
-
-    @abc.abstractmethod
-    def signal(self) -> Signal:
-        """A new signal for waiters on this clock."""

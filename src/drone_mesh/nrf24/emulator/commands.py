@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from drone_mesh.nrf24.emulator.chip_core import ChipCore
+from drone_mesh.nrf24.emulator.chip_core import ANSWERING, SENDING, ChipCore, State
 from drone_mesh.nrf24.emulator.fifos import TxPayload
-from drone_mesh.nrf24.emulator.states import ANSWERING, SENDING, State
 from drone_mesh.nrf24.emulator.transmitter import Transmitter
 from drone_mesh.nrf24.registers import (
     ARC_CNT,
@@ -68,7 +67,7 @@ class CommandDecoder:
             self._push(TxPayload(data[:MAX_PAYLOAD_BYTES], ack_pipe=command & 7))
         elif command == Command.FLUSH_TX:
             chip.tx_fifo.flush()
-            self._transmitter.flushed()
+            self._transmitter.reuse = False  # the current packet ends without TX_DS or MAX_RT
         elif command == Command.FLUSH_RX:
             if chip.state in ANSWERING:
                 chip.warn("FLUSH_RX while an acknowledgement is being sent")

@@ -45,7 +45,7 @@ class _Turn:
         self.parked = 0  # number of waits, to recognise wake-ups for earlier ones
 
 
-class _VirtualTask(Task):
+class _VirtualTask:
     def __init__(self, clock: CooperativeClock, run: Callable[[], None], name: str) -> None:
         self.turn = _Turn(greenlet.greenlet(self._live, clock.first_stack))
         self.name = name
@@ -82,28 +82,20 @@ class CooperativeClock(Runtime, EmulatorClock):
     """Both the clock of the air and the runtime of its drivers."""
 
     def __init__(self) -> None:
-        self._now_ns = 0
+        self.now_ns = 0
         self._events: list[tuple[int, int, Callable[..., None] | None, tuple[Any, ...]]] = []
         self._count = 0
-        self._first = self._running = _Turn(greenlet.getcurrent())
+        self.first_stack = greenlet.getcurrent()  # of the code that created the clock
+        self._first = self._running = _Turn(self.first_stack)
         self._stuck = False
         self._no_lock = contextlib.nullcontext()
-
-    @property
-    def first_stack(self) -> greenlet.greenlet:
-        """The stack of the code that created the clock."""
-        return self._first.stack
-
-    @property
-    def now_ns(self) -> int:
-        return self._now_ns
 
     @property
     def runtime(self) -> Runtime:
         return self
 
     def now_s(self) -> float:
-        return self._now_ns / NS_PER_S
+        return self.now_ns / NS_PER_S
 
     def call_at(self, time_ns: int, event: Callable[..., None], *arguments: object) -> None:
         self._count += 1
@@ -116,9 +108,9 @@ class CooperativeClock(Runtime, EmulatorClock):
         self.elapse(_nanoseconds(duration_s))
 
     def elapse(self, duration_ns: int) -> None:
-        until_ns = self._now_ns + duration_ns
+        until_ns = self.now_ns + duration_ns
         if not self._events or self._events[0][0] > until_ns:
-            self._now_ns = until_ns
+            self.now_ns = until_ns
             return
         self._running.parked += 1
         self._wake_at(until_ns, self._running)
@@ -132,7 +124,7 @@ class CooperativeClock(Runtime, EmulatorClock):
 
     def start(self, run: Callable[[], None], name: str) -> Task:
         task = _VirtualTask(self, run, name)
-        self._wake_at(self._now_ns, task.turn)
+        self._wake_at(self.now_ns, task.turn)
         return task
 
     def wait(self, waiting: list[tuple[_Turn, int]], until_ns: float) -> None:
@@ -151,7 +143,7 @@ class CooperativeClock(Runtime, EmulatorClock):
         """Wake all tasks on the list; they run at this same time, when the caller itself waits."""
         for turn, parked in waiting:
             if turn.parked == parked:
-                self._wake_at(self._now_ns, turn)
+                self._wake_at(self.now_ns, turn)
         waiting.clear()
 
     def _wake_at(self, time_ns: int, turn: _Turn) -> None:
@@ -170,7 +162,7 @@ class CooperativeClock(Runtime, EmulatorClock):
         """Process events until one wakes a task, which then has the turn."""
         events = self._events
         while events:
-            self._now_ns, _, event, arguments = heapq.heappop(events)
+            self.now_ns, _, event, arguments = heapq.heappop(events)
             if event is not None:
                 event(*arguments)
                 continue

@@ -115,9 +115,7 @@ class Frame:
         """The address, as a number, for a receiver with this address width."""
         address = self._addresses.get(address_bytes)
         if address is None:
-            width = 8 * address_bytes
-            address = self.bits >> (self.bit_count - PREAMBLE_BITS - width) & ((1 << width) - 1)
-            self._addresses[address_bytes] = address
+            address = self._addresses[address_bytes] = self._take(PREAMBLE_BITS, 8 * address_bytes)
         return address
 
     def decode(self, form: FrameFormat) -> Packet | None:

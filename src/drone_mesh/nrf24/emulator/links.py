@@ -184,11 +184,6 @@ class LossCurve(LinkModel):
         self._scale = metres_per_metre
         self._fates: dict[tuple[Hashable, Hashable], tuple[object, int, bool]] = {}
 
-    @property
-    def range_m(self) -> float:
-        """The range; no frame arrives beyond it."""
-        return self._points[-1][0] / self._scale
-
     def loss(self, distance_m: float) -> float | None:
         """Share of lost packets, linear between the points; None: out of range."""
         metres = distance_m * self._scale

@@ -40,23 +40,18 @@ class EmulatedIrq:
 
     def __init__(self, clock: EmulatorClock) -> None:
         self._clock = clock
-        self._signal = clock.signal()
-        self._value = True
+        self._signal = clock.runtime.signal()
+        self.value = True  # the level of the pin
         self.fell_ns: int | None = None  # when it last went low
-
-    @property
-    def value(self) -> bool:
-        """The level of the pin."""
-        return self._value
 
     def wait_low(self, timeout_s: float) -> bool:
         """Wait until the pin is low; returns False if it is still high after the time-out."""
-        return self._signal.wait_for(lambda: not self._value, timeout_s)
+        return self._signal.wait_for(lambda: not self.value, timeout_s)
 
     def set(self, high: bool) -> None:
         """Set the level, by the chip; called with access."""
-        if high != self._value:
-            self._value = high
+        if high != self.value:
+            self.value = high
             if not high:
                 self.fell_ns = self._clock.now_ns
                 self._signal.notify()

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from drone_mesh.nrf24.airtime import SETTLING_NS
-from drone_mesh.nrf24.emulator.chip_core import ChipCore
+from drone_mesh.nrf24.emulator.chip_core import ChipCore, State
 from drone_mesh.nrf24.emulator.fifos import Incoming, TxPayload
 from drone_mesh.nrf24.emulator.frames import Frame, Packet
-from drone_mesh.nrf24.emulator.states import State
 from drone_mesh.nrf24.registers import PIPES, RX_DR, TX_DS
 
 _NOTHING_YET = (-1, -1)
@@ -18,10 +17,6 @@ class Receiver:
     def __init__(self, chip: ChipCore) -> None:
         self._chip = chip
         self._last: list[tuple[int, int]] = [_NOTHING_YET] * PIPES  # PID and CRC
-
-    def listen(self) -> None:
-        """RX has settled."""
-        self._chip.listen(State.RX)
 
     def frame_arrived(self, frame: Frame) -> bool:
         """A frame with the address of an open pipe arrived; returns whether it was valid there."""

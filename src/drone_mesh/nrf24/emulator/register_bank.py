@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from drone_mesh.nrf24.airtime import ARD_STEP_NS, bit_ns
+from drone_mesh.nrf24.airtime import ARD_STEP_NS
 from drone_mesh.nrf24.emulator.frames import FrameFormat
 from drone_mesh.nrf24.registers import (
     ARC,
@@ -122,7 +122,6 @@ class RegisterBank:
         low, high = RF_DR_LOW.get(setup), RF_DR_HIGH.get(setup)
         self.rate_reserved = bool(low and high)
         self.bits_per_s = 250_000 if low else 2_000_000 if high else 1_000_000
-        self.bit_ns = bit_ns(self.bits_per_s)
         self.tx_dbm = _TX_POWERS_DBM[RF_PWR.get(setup)]
         retries = self._byte(Register.SETUP_RETR)
         self.ard_ns = (ARD.get(retries) + 1) * ARD_STEP_NS

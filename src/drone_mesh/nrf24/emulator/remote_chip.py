@@ -26,22 +26,66 @@ ANSWER_WITHIN_S = 5.0  # our choice: far above what a busy machine takes
 CONNECT_AGAIN_S = 1.0  # our choice
 
 
+class _Connection:
+    """One connection to the air, for one thread at a time; closed after each failure."""
+
+    def __init__(self, address: tuple[str, int]) -> None:
+        self._address = address
+        self._socket: socket.socket | None = None
+        self.closed_s = 0.0  # when it was closed, of the machine's clock
+
+    @property
+    def is_open(self) -> bool:
+        return self._socket is not None
+
+    def open(self, opcode: Opcode, data: bytes) -> bytes:
+        """Connect again; the answer to the first request. Raises OSError."""
+        self.close()
+        try:
+            self._socket = socket.create_connection(self._address, ANSWER_WITHIN_S)
+            self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        except OSError:
+            self.close()
+            raise
+        return self.ask(opcode, data)
+
+    def ask(self, opcode: Opcode, data: bytes) -> bytes:
+        """The answer to a request. Raises OSError."""
+        assert self._socket is not None
+        try:
+            send_request(self._socket, opcode, data)
+            return receive_answer(self._socket)
+        except OSError:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        self.closed_s = time.monotonic()
+        if self._socket is not None:
+            self._socket.close()
+            self._socket = None
+
+    def interrupt(self) -> None:
+        """End a request that is under way. Any thread."""
+        waiting = self._socket
+        if waiting is not None:
+            with contextlib.suppress(OSError):
+                waiting.shutdown(socket.SHUT_RDWR)
+
+
 class RemoteChip:
     """Any thread; `_lock` is held during a request, `_irq_lock` while one thread waits for IRQ."""
 
     def __init__(self, host: str, port: int, name: str, position: Position) -> None:
         """Connect. Raises OSError if the air is not served there."""
-        self._address = (host, port)
         self._name = name
         self._position = position
         self._lock = threading.Lock()
         self._irq_lock = threading.Lock()
-        self._number = -1
-        self._connection: socket.socket | None = None
-        self._irq_connection: socket.socket | None = None
-        self._irq_number = -1
+        self._requests = _Connection((host, port))
+        self._irq_waits = _Connection((host, port))
+        self._number = self._irq_number = -1  # of the chip, and of that whose IRQ is waited for
         self._closed = False
-        self._failed_s = 0.0
         with self._lock:
             self._connect()
         self.spi = RemoteSpi(self)
@@ -51,33 +95,21 @@ class RemoteChip:
     def request(self, opcode: Opcode, data: bytes) -> bytes:
         """The chip's answer. Raises OSError while the air cannot be reached."""
         with self._lock:
-            if self._connection is None:
-                if self._closed or time.monotonic() - self._failed_s < CONNECT_AGAIN_S:
+            if not self._requests.is_open:
+                if self._closed or time.monotonic() - self._requests.closed_s < CONNECT_AGAIN_S:
                     raise ConnectionError("the emulated air is gone")
                 self._connect()
-            assert self._connection is not None
-            try:
-                send_request(self._connection, opcode, data)
-                return receive_answer(self._connection)
-            except OSError:
-                self._lose()
-                raise
+            return self._requests.ask(opcode, data)
 
     def wait_irq(self, timeout_s: float) -> bool:
         """Wait until IRQ is low, at most this long or a second. Whether it is. Raises OSError."""
         with self._irq_lock:
             if self._closed:
                 raise ConnectionError("this chip was released")
-            if self._irq_connection is None or self._irq_number != self._number:
-                self._join()
-            assert self._irq_connection is not None
-            try:
-                send_request(self._irq_connection, Opcode.WAIT_IRQ, TIMEOUT_S.pack(timeout_s))
-                return receive_answer(self._irq_connection) == b"\1"
-            except OSError:
-                self._irq_connection.close()
-                self._irq_connection = None
-                raise
+            if not self._irq_waits.is_open or self._irq_number != self._number:
+                self._irq_number = self._number
+                self._irq_waits.open(Opcode.JOIN_CHIP, CHIP_NUMBER.pack(self._irq_number))
+            return self._irq_waits.ask(Opcode.WAIT_IRQ, TIMEOUT_S.pack(timeout_s)) == b"\1"
 
     def move(self, position: Position) -> None:
         """Move the chip to this position."""
@@ -90,51 +122,15 @@ class RemoteChip:
         """Release the chip; it loses its supply."""
         with self._lock:
             self._closed = True
-            self._lose()
-        waiting = self._irq_connection
-        if waiting is not None:
-            with contextlib.suppress(OSError):  # ends a wait that is under way
-                waiting.shutdown(socket.SHUT_RDWR)
+            self._requests.close()
+        self._irq_waits.interrupt()
         with self._irq_lock:
-            if self._irq_connection is not None:
-                self._irq_connection.close()
-                self._irq_connection = None
+            self._irq_waits.close()
 
     def _connect(self) -> None:
-        try:
-            connection = self._open()
-            place = MAKE_CHIP.pack(*self._position)
-            send_request(connection, Opcode.MAKE_CHIP, place + self._name.encode())
-            (self._number,) = CHIP_NUMBER.unpack(receive_answer(connection))
-        except OSError:
-            self._failed_s = time.monotonic()
-            raise
-        self._connection = connection
-
-    def _join(self) -> None:
-        if self._irq_connection is not None:
-            self._irq_connection.close()
-            self._irq_connection = None
-        number = self._number
-        connection = self._open()
-        try:
-            send_request(connection, Opcode.JOIN_CHIP, CHIP_NUMBER.pack(number))
-            receive_answer(connection)
-        except OSError:
-            connection.close()
-            raise
-        self._irq_connection, self._irq_number = connection, number
-
-    def _open(self) -> socket.socket:
-        connection = socket.create_connection(self._address, ANSWER_WITHIN_S)
-        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        return connection
-
-    def _lose(self) -> None:
-        self._failed_s = time.monotonic()
-        if self._connection is not None:
-            self._connection.close()
-            self._connection = None
+        place = MAKE_CHIP.pack(*self._position)
+        answer = self._requests.open(Opcode.MAKE_CHIP, place + self._name.encode())
+        (self._number,) = CHIP_NUMBER.unpack(answer)
 
 
 class RemoteSpi:

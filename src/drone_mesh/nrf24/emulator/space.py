@@ -6,11 +6,97 @@ Both airs, of the chips and of the fast model, get losses, fading and noise from
 from __future__ import annotations
 
 import math
+import random
+from collections import deque
 from typing import Callable
 
+from drone_mesh.errors import ConfigurationError
+from drone_mesh.nrf24.airtime import NS_PER_S
 from drone_mesh.nrf24.emulator.fading import Fading, Position
 from drone_mesh.nrf24.emulator.links import LinkModel
-from drone_mesh.nrf24.emulator.noise import CHANNEL_MHZ, Noise
+
+CHANNEL_MHZ = 1.0  # what a receiver takes in at 250 kbit/s and 1 Mbit/s; 2 at 2 Mbit/s [DS 5.4]
+BURST_S = 1.5e-3  # our choice: a full Wi-Fi frame at 8 Mbit/s
+_KEPT_NS = NS_PER_S // 10  # bursts that ended earlier than this are forgotten
+
+
+class Noise:
+    """A transmitter that is no radio of the mesh, such as a jammer or Wi-Fi.
+
+    It sends for ever, or in bursts with random pauses between them.
+    """
+
+    def __init__(
+        self,
+        position: Position,
+        power_dbm: float,
+        rng: random.Random,
+        *,
+        centre_mhz: float,
+        width_mhz: float = CHANNEL_MHZ,
+        duty: float = 1.0,
+        burst_s: float = BURST_S,
+        from_s: float = 0.0,
+        until_s: float = math.inf,
+    ) -> None:
+        """`power_dbm`: radiated, in total, spread evenly over `width_mhz` about `centre_mhz`.
+
+        `duty`: share of the time that it sends, from `from_s` to `until_s`. Raises
+        ConfigurationError.
+        """
+        if not 0.0 < duty <= 1.0:
+            raise ConfigurationError(f"invalid duty {duty}: must be above 0 and at most 1")
+        if not width_mhz > 0.0 or not burst_s > 0.0:
+            raise ConfigurationError("the width and the bursts of a noise must be above 0")
+        self.position = position
+        self._dbm_per_mhz = power_dbm - 10.0 * math.log10(max(width_mhz, CHANNEL_MHZ))
+        self._low_mhz, self._high_mhz = centre_mhz - width_mhz / 2, centre_mhz + width_mhz / 2
+        self._rng = rng
+        self._burst_ns = round(burst_s * NS_PER_S)
+        self._mean_pause_ns = self._burst_ns * (1.0 - duty) / duty
+        self._from_ns = round(from_s * NS_PER_S)
+        self._until_ns = math.inf if until_s == math.inf else round(until_s * NS_PER_S)
+        self._bursts: deque[tuple[float, float]] = deque()  # start, end; those of late
+        self._drawn_to_ns: float = self._from_ns
+
+    def stop(self, at_ns: int) -> None:
+        """It sends nothing more from now on."""
+        self._until_ns = min(self._until_ns, at_ns)
+
+    def power_dbm(self, carrier_mhz: int, width_mhz: float) -> float:
+        """What it radiates within a receiver's channel; -inf outside its own band."""
+        low_mhz = max(self._low_mhz, carrier_mhz - width_mhz / 2)
+        high_mhz = min(self._high_mhz, carrier_mhz + width_mhz / 2)
+        if high_mhz <= low_mhz:
+            return -math.inf
+        return self._dbm_per_mhz + 10.0 * math.log10(high_mhz - low_mhz)
+
+    def sends(self, start_ns: int, end_ns: int, throughout: bool = False) -> bool:
+        """Whether it sends at some time within this span, or `throughout`. Ask in order of time."""
+        if end_ns <= self._from_ns or start_ns >= self._until_ns:
+            return False
+        if not self._mean_pause_ns:
+            inside = start_ns >= self._from_ns and end_ns <= self._until_ns
+            return inside or not throughout
+        self._draw(end_ns)
+        if throughout:
+            return any(begin <= start_ns and end_ns <= end for begin, end in self._bursts)
+        return any(begin < end_ns and start_ns < end for begin, end in self._bursts)
+
+    def _draw(self, to_ns: int) -> None:
+        """Draw the bursts up to this time."""
+        bursts = self._bursts
+        while self._drawn_to_ns <= to_ns:
+            begin_ns = self._drawn_to_ns + self._rng.expovariate(1.0) * self._mean_pause_ns
+            self._drawn_to_ns = min(begin_ns + self._burst_ns, self._until_ns)
+            if begin_ns >= self._until_ns:
+                self._drawn_to_ns = math.inf
+                break
+            bursts.append((begin_ns, self._drawn_to_ns))
+            if self._drawn_to_ns >= self._until_ns:
+                self._drawn_to_ns = math.inf
+        while bursts and bursts[0][1] < to_ns - _KEPT_NS:
+            bursts.popleft()
 
 
 class Space:

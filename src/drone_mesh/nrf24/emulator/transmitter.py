@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from drone_mesh.nrf24.airtime import SETTLING_NS
-from drone_mesh.nrf24.emulator.chip_core import ChipCore
+from drone_mesh.nrf24.emulator.chip_core import ChipCore, State
 from drone_mesh.nrf24.emulator.fifos import Incoming, TxPayload
 from drone_mesh.nrf24.emulator.frames import Frame
-from drone_mesh.nrf24.emulator.states import State
 from drone_mesh.nrf24.registers import MAX_RT, RX_DR, TX_DS
 
 _COUNTER_MAX = 15  # PLOS_CNT saturates there
@@ -41,10 +40,6 @@ class Transmitter:
         self.reuse = False
         if self._chip.state is State.STANDBY_II and self.has_work():
             self.start(SETTLING_NS)
-
-    def flushed(self) -> None:
-        """FLUSH_TX: the current packet ends without TX_DS or MAX_RT."""
-        self.reuse = False
 
     def ce_rose(self) -> None:
         """CE rises in standby."""

@@ -16,7 +16,7 @@ import threading
 import time
 from typing import Any, Callable, Iterator
 
-from drone_mesh.channel.runtime import Runtime, Signal, SystemRuntime, ThreadSignal
+from drone_mesh.channel.runtime import Runtime, SystemRuntime
 from drone_mesh.nrf24.airtime import NS_PER_S
 from drone_mesh.nrf24.emulator.clock import EmulatorClock
 
@@ -28,7 +28,7 @@ class WallClock(EmulatorClock):
 
     def __init__(self) -> None:
         self._start_ns = time.monotonic_ns()
-        self._now_ns = 0
+        self.now_ns = 0
         self._events: list[tuple[int, int, Callable[..., None], tuple[Any, ...]]] = []
         self._count = 0
         self._lock = threading.RLock()
@@ -45,10 +45,6 @@ class WallClock(EmulatorClock):
             self._closed = True
             self._earlier.notify()
         self._thread.join()
-
-    @property
-    def now_ns(self) -> int:
-        return self._now_ns
 
     @property
     def runtime(self) -> Runtime:
@@ -70,17 +66,14 @@ class WallClock(EmulatorClock):
     def elapse(self, duration_ns: int) -> None:
         """Does nothing: the host is slower than SPI anyway."""
 
-    def signal(self) -> Signal:
-        return ThreadSignal()
-
     def _catch_up(self) -> None:
         while True:
             wall_ns = time.monotonic_ns() - self._start_ns
             if not self._events or self._events[0][0] > wall_ns:
-                self._now_ns = max(self._now_ns, wall_ns)
+                self.now_ns = max(self.now_ns, wall_ns)
                 return
             time_ns, _, event, arguments = heapq.heappop(self._events)
-            self._now_ns = max(self._now_ns, time_ns)
+            self.now_ns = max(self.now_ns, time_ns)
             self.latest_ns = max(self.latest_ns, wall_ns - time_ns)
             try:
                 event(*arguments)

@@ -12,8 +12,7 @@ import rospy
 from std_msgs.msg import Bool
 
 from drone_mesh import srv
-from drone_mesh.air.node import AirError
-from drone_mesh.air.node_table import NodeTable, Sees
+from drone_mesh.air.node_table import AirError, NodeTable, Sees
 from drone_mesh.communication.interfaces import PAYLOAD_BYTES
 from drone_mesh.communication.messages import readdressed, receiver
 from drone_mesh.msg import NRF24, DroneInfo

@@ -1,15 +1,19 @@
-"""ShortestPath: the bound for routing. It sees all links of a network, without any packet."""
+"""Bounds for routing and for repairs: what they do would need global knowledge of a network."""
 
 from __future__ import annotations
 
-from typing import Callable, Iterable
+from typing import Callable, Iterable, Mapping
 
 from drone_mesh.air.graph import hops_from
 from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.repair.actions import Step
+from drone_mesh.communication.repair.interfaces import IRepairStrategy
 from drone_mesh.communication.routing.child_table_tree import ChildTableTree
+from drone_mesh.drone.location import Location
 from drone_mesh.inprocess.clock import Clock
 
 SHORTEST_PATH = "shortest_path"
+JUST_IN_RANGE = 0.95  # of the range
 RECOMPUTE_EVERY_S = 0.1  # our choice: period for recomputing links, which change when drones fly
 
 
@@ -51,7 +55,7 @@ class LinkMap:
 
 
 class ShortestPath(ChildTableTree):
-    """Sends each packet to the next hop of a shortest path."""
+    """Sends each packet to the next hop of a shortest path. It sees all links, without a packet."""
 
     TAKES_SHORTCUTS = False
 
@@ -85,3 +89,22 @@ class ShortestPath(ChildTableTree):
     def gateway_lost(self, gateway: int) -> bool:
         """Nothing to forget, and nothing to report to neighbours."""
         return False
+
+
+class Oracle(IRepairStrategy):
+    """Flies into the range of the nearest connected node, wherever it is: no drone knows that."""
+
+    def __init__(self, connected: Callable[[], Mapping[int, Location]]) -> None:
+        """`connected` returns the positions of all connected nodes."""
+        self._connected = connected
+
+    def on_emergency(self) -> None:
+        """Fly, unless a drone in flight will become a relay."""
+        mesh, here = self.mesh, self.mesh.own_place()
+        self.reason = mesh.why_not_fly()
+        places = self._connected()
+        if self.reason or here is None or not places:
+            return
+        nearest = min(places, key=lambda node: (here.distance_m(places[node]), node))
+        goal = places[nearest].towards(here, JUST_IN_RANGE * mesh.range_m)
+        mesh.fly(Step(goal, nearest), until_connected=True)
