@@ -29,6 +29,9 @@ _log = logging.getLogger(__name__)
 Work = Callable[[float], None]
 """A function of the time at which it runs."""
 
+Submit = Callable[[Work], None]
+"""Runs a function on the thread that owns a node. Any thread may call it."""
+
 
 class PacketInbox:
     """Packets that wait for one node. When too many do, new ones are dropped, as on the air.
@@ -36,7 +39,7 @@ class PacketInbox:
     Any thread may call `put`; the function runs where `submit` runs it.
     """
 
-    def __init__(self, submit: Callable[[Work], None], most: int = MOST_WAITING) -> None:
+    def __init__(self, submit: Submit, most: int = MOST_WAITING) -> None:
         self._submit = submit
         self._free = threading.BoundedSemaphore(most)
         self._counting = threading.Lock()
