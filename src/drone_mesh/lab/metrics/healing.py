@@ -7,7 +7,7 @@ import statistics
 from typing import Iterable
 
 from drone_mesh.communication.observer import MeshEventKind
-from drone_mesh.lab.metrics.registry import NAN, metric
+from drone_mesh.lab.metrics.registry import NAN, metric, metrics
 from drone_mesh.lab.record import RunRecord
 from drone_mesh.state.model import EventRecord
 
@@ -55,24 +55,35 @@ def t_capped_s(run: RunRecord) -> float:
     return observed_s(run) if math.isnan(total_s) else total_s
 
 
-@metric("s", "of t_total_s: until the first router notices that it has lost its gateway")
-def t_detect_s(run: RunRecord) -> float:
-    return _phases(run)[0]
-
-
-@metric("s", "of t_total_s: from there until the first drone decides to fly; 0 without flight")
-def t_decide_s(run: RunRecord) -> float:
-    return _phases(run)[1]
-
-
-@metric("s", "of t_total_s: from there until the last landing; 0 without flight")
-def t_fly_s(run: RunRecord) -> float:
-    return _phases(run)[2]
-
-
-@metric("s", "of t_total_s: the rest")
-def t_reroute_s(run: RunRecord) -> float:
-    return _phases(run)[3]
+@metrics(
+    "s",
+    t_detect_s="of t_total_s: until the first router notices that it has lost its gateway",
+    t_decide_s="of t_total_s: from there until the first drone decides to fly; 0 without flight",
+    t_fly_s="of t_total_s: from there until the last landing; 0 without flight",
+    t_reroute_s="of t_total_s: the rest",
+)
+def phases(run: RunRecord) -> tuple[float, float, float, float]:
+    """They add up to t_total_s."""
+    start_s, end_s = run.fault_s, run.healed_at_s
+    if start_s is None or end_s is None:
+        return (NAN, NAN, NAN, NAN)
+    between = [event for event in run.events if start_s <= event.stamp_s <= end_s]
+    if start_s == end_s:
+        return (0.0, 0.0, 0.0, 0.0)
+    died = {(item.at_s, node) for item in run.happened for node in item.nodes}
+    # A drone that is switched off loses its own connection at that moment.
+    noticed = _first(
+        (event for event in between if (event.stamp_s, event.node) not in died),
+        MeshEventKind.DISCONNECTED,
+    )
+    decided = _first(between, MeshEventKind.FLIGHT_DECIDED)
+    landings = [event.stamp_s for event in between if event.kind == MeshEventKind.LANDED.value]
+    decided_s = end_s if decided is None else decided
+    noticed_s = min(decided_s, end_s if noticed is None else noticed)
+    if decided is None:
+        return (noticed_s - start_s, 0.0, 0.0, end_s - noticed_s)
+    landed_s = max([decided_s, *landings])
+    return (noticed_s - start_s, decided_s - noticed_s, landed_s - decided_s, end_s - landed_s)
 
 
 @metric("s", "from the fault to the end of the run: where an unhealed run is censored")
@@ -112,30 +123,6 @@ def uptime(run: RunRecord) -> float:
     return area / seconds if seconds else samples[-1].share
 
 
-def _phases(run: RunRecord) -> tuple[float, float, float, float]:
-    """(detect, decide, fly, re-route) in seconds; they add up to t_total_s."""
-    start_s, end_s = run.fault_s, run.healed_at_s
-    if start_s is None or end_s is None:
-        return (NAN, NAN, NAN, NAN)
-    between = [event for event in run.events if start_s <= event.stamp_s <= end_s]
-    if start_s == end_s:
-        return (0.0, 0.0, 0.0, 0.0)
-    died = {(item.at_s, node) for item in run.happened for node in item.nodes}
-    # A drone that is switched off loses its own connection at that moment.
-    noticed = _first(
-        (event for event in between if (event.stamp_s, event.node) not in died),
-        MeshEventKind.DISCONNECTED,
-    )
-    decided = _first(between, MeshEventKind.FLIGHT_DECIDED)
-    landings = [event.stamp_s for event in between if event.kind == MeshEventKind.LANDED.value]
-    decided_s = end_s if decided is None else decided
-    noticed_s = min(decided_s, end_s if noticed is None else noticed)
-    if decided is None:
-        return (noticed_s - start_s, 0.0, 0.0, end_s - noticed_s)
-    landed_s = max([decided_s, *landings])
-    return (noticed_s - start_s, decided_s - noticed_s, landed_s - decided_s, end_s - landed_s)
-
-
 def _first(events: Iterable[EventRecord], kind: MeshEventKind) -> float | None:
     return next((event.stamp_s for event in events if event.kind == kind.value), None)
 
@@ -148,22 +135,13 @@ def outages(run: RunRecord) -> float:
     return len(run.gaps())
 
 
-@metric("s", "median length of these outages; one without end counts up to the end", better="less")
-def outage_median_s(run: RunRecord) -> float:
-    lengths = _outage_lengths(run)
-    return statistics.median(lengths) if lengths else 0.0
-
-
-@metric("s", "95th percentile of their lengths", better="less")
-def outage_p95_s(run: RunRecord) -> float:
-    lengths = _outage_lengths(run)
-    return lengths[math.ceil(0.95 * len(lengths)) - 1] if lengths else 0.0
-
-
-@metric("s", "length of the longest of these outages", better="less")
-def outage_max_s(run: RunRecord) -> float:
-    return max(_outage_lengths(run), default=0.0)
-
-
-def _outage_lengths(run: RunRecord) -> list[float]:
-    return sorted(gap.seconds(run.end_s) for gap in run.gaps())
+@metrics(
+    "s",
+    better="less",
+    outage_median_s="median length of these outages; one without end counts up to the end",
+    outage_p95_s="95th percentile of their lengths",
+    outage_max_s="length of the longest of these outages",
+)
+def outage_lengths(run: RunRecord) -> tuple[float, float, float]:
+    lengths = sorted(gap.seconds(run.end_s) for gap in run.gaps()) or [0.0]
+    return statistics.median(lengths), lengths[math.ceil(0.95 * len(lengths)) - 1], lengths[-1]

@@ -6,7 +6,8 @@ import math
 import statistics
 from typing import Sequence
 
-from drone_mesh.lab.metrics.registry import NAN, mean, metric, per_drone_and_s, ratio
+from drone_mesh.lab.metrics.registry import NAN, mean, metric, metrics, per_drone_and_s, ratio
+from drone_mesh.lab.probes import KINDS
 from drone_mesh.lab.record import RunRecord
 
 
@@ -30,74 +31,71 @@ def served(run: RunRecord) -> float:
     return ratio(run.links.served_s, run.links.reachable_s)
 
 
-@metric("share", "the same share at the worst of 20 moments (5th percentile)", better="more")
-def served_p5(run: RunRecord) -> float:
-    return _percentile(run.links.service.shares, 0.05)
-
-
-@metric("share", "the same share, median over time", better="more")
-def served_p50(run: RunRecord) -> float:
-    return _percentile(run.links.service.shares, 0.5)
-
-
-@metric("s", "median time that a router has a path and is not served", better="less")
-def lapse_p50_s(run: RunRecord) -> float:
-    return _percentile(run.links.service.lapses_s, 0.5)
-
-
-@metric("s", "99th percentile of these times", better="less")
-def lapse_p99_s(run: RunRecord) -> float:
-    return _percentile(run.links.service.lapses_s, 0.99)
-
-
-@metric("share", "connected routers of those with a path at the worst of 20 moments", better="more")
-def connected_p5(run: RunRecord) -> float:
-    return _percentile(run.links.connection.shares, 0.05)
-
-
-@metric("share", "the same share, median over time", better="more")
-def connected_p50(run: RunRecord) -> float:
-    return _percentile(run.links.connection.shares, 0.5)
-
-
-@metric("s", "median time that a router has a path and is not connected", better="less")
-def unconnected_p50_s(run: RunRecord) -> float:
-    return _percentile(run.links.connection.lapses_s, 0.5)
-
-
-@metric("s", "99th percentile of these times", better="less")
-def unconnected_p99_s(run: RunRecord) -> float:
-    return _percentile(run.links.connection.lapses_s, 0.99)
-
-
-@metric(
+@metrics(
     "share",
-    "best-effort messages to the gateway that arrived in time, of drones with a path",
     better="more",
+    served_p5="the same share at the worst of 20 moments (5th percentile)",
+    served_p50="the same share, median over time",
 )
-def pdr_up(run: RunRecord) -> float:
-    return _arrived(run, "up")
+def service(run: RunRecord) -> list[float]:
+    return _percentiles(run.links.service.shares, 0.05, 0.5)
 
 
-@metric("share", "the same from the gateway", better="more")
-def pdr_down(run: RunRecord) -> float:
-    return _arrived(run, "down")
+@metrics(
+    "s",
+    better="less",
+    lapse_p50_s="median time that a router has a path and is not served",
+    lapse_p99_s="99th percentile of these times",
+)
+def lapses(run: RunRecord) -> list[float]:
+    return _percentiles(run.links.service.lapses_s, 0.5, 0.99)
 
 
-@metric("share", "echoes of a gateway that a drone with a path answered in time", better="more")
-def pdr_echo(run: RunRecord) -> float:
-    return _arrived(run, "echo")
+@metrics(
+    "share",
+    better="more",
+    connected_p5="connected routers of those with a path at the worst of 20 moments",
+    connected_p50="the same share, median over time",
+)
+def connection(run: RunRecord) -> list[float]:
+    return _percentiles(run.links.connection.shares, 0.05, 0.5)
 
 
-@metric("ms", "median time of these messages that arrived, up and down", better="less")
-def delay_ms(run: RunRecord) -> float:
-    delays = _delays_ms(run)
-    return statistics.median(delays) if delays else NAN
+@metrics(
+    "s",
+    better="less",
+    unconnected_p50_s="median time that a router has a path and is not connected",
+    unconnected_p99_s="99th percentile of these times",
+)
+def unconnected(run: RunRecord) -> list[float]:
+    return _percentiles(run.links.connection.lapses_s, 0.5, 0.99)
 
 
-@metric("ms", "the time within which 95 % of them arrived", better="less")
-def delay_p95_ms(run: RunRecord) -> float:
-    return _percentile(_delays_ms(run), 0.95)
+@metrics(
+    "share",
+    better="more",
+    pdr_up="best-effort messages to the gateway that arrived in time, of drones with a path",
+    pdr_down="the same from the gateway",
+    pdr_echo="echoes of a gateway that a drone with a path answered in time",
+)
+def delivered(run: RunRecord) -> list[float]:
+    return [
+        mean(probe.delay_s is not None for probe in run.probes if probe.kind == kind)
+        for kind in KINDS
+    ]
+
+
+@metrics(
+    "ms",
+    better="less",
+    delay_ms="median time of these messages that arrived, up and down",
+    delay_p95_ms="the time within which 95 % of them arrived",
+)
+def delays(run: RunRecord) -> tuple[float, float]:
+    messages = (probe.delay_s for probe in run.probes if probe.kind != "echo")
+    found = [1000.0 * delay_s for delay_s in messages if delay_s is not None]
+    (p95_ms,) = _percentiles(found, 0.95)
+    return statistics.median(found) if found else NAN, p95_ms
 
 
 @metric("hops", "mean hops of an echo beyond the shortest path at its time", better="less")
@@ -115,15 +113,7 @@ def control_frame_rate(run: RunRecord) -> float:
     return NAN if run.frames is None else per_drone_and_s(run, run.frames["control"])
 
 
-def _percentile(values: Sequence[float], share: float) -> float:
-    """The least value that so large a share of the values does not exceed; NaN: no values."""
-    return sorted(values)[max(0, math.ceil(share * len(values)) - 1)] if values else NAN
-
-
-def _delays_ms(run: RunRecord) -> list[float]:
-    fates = [probe for probe in run.probes if probe.kind != "echo"]
-    return [1000.0 * fate.delay_s for fate in fates if fate.delay_s is not None]
-
-
-def _arrived(run: RunRecord, kind: str) -> float:
-    return mean(probe.delay_s is not None for probe in run.probes if probe.kind == kind)
+def _percentiles(values: Sequence[float], *shares: float) -> list[float]:
+    """The least value that each share of the values does not exceed; NaN: no values."""
+    ordered = sorted(values) or [NAN]
+    return [ordered[max(0, math.ceil(share * len(ordered)) - 1)] for share in shares]

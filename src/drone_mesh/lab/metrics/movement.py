@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from drone_mesh.air.graph import Graph
-from drone_mesh.lab.metrics.registry import NAN, metric
+from drone_mesh.lab.metrics.registry import NAN, metric, metrics
 from drone_mesh.lab.record import RunRecord, Topology
 
 DISPLACED_M = 1.0  # our choice: the clearance
@@ -21,20 +21,17 @@ def _flown(run: RunRecord) -> dict[int, float]:
     return metres
 
 
-@metric("m", "distance over ground flown by all drones", better="less")
-def distance_total_m(run: RunRecord) -> float:
-    return sum(_flown(run).values())
-
-
-@metric("m", "the longest distance that one drone flew", better="less")
-def distance_max_m(run: RunRecord) -> float:
-    return max(_flown(run).values(), default=0.0)
-
-
-@metric("m", "mean distance of the drones that moved; 0 when none did", better="less")
-def distance_mean_m(run: RunRecord) -> float:
-    flown = _flown(run)
-    return sum(flown.values()) / len(flown) if flown else 0.0
+@metrics(
+    "m",
+    better="less",
+    distance_total_m="distance over ground flown by all drones",
+    distance_max_m="the longest distance that one drone flew",
+    distance_mean_m="mean distance of the drones that moved; 0 when none did",
+)
+def distances(run: RunRecord) -> tuple[float, float, float]:
+    flown = _flown(run).values()
+    total_m = sum(flown)
+    return total_m, max(flown, default=0.0), total_m / len(flown) if flown else 0.0
 
 
 @metric("drones", "drones that flew", better="less")
@@ -57,15 +54,15 @@ def flight_time_s(run: RunRecord) -> float:
     return sum(min(leg.end_s, run.end_s) - leg.path.start_s for leg in run.legs)
 
 
-@metric("m", "mean distance of a live drone from where it started", better="less")
-def displacement_mean_m(run: RunRecord) -> float:
-    moved_m = _displacements(run)
-    return sum(moved_m) / len(moved_m) if moved_m else 0.0
-
-
-@metric("m", "the largest of these", better="less")
-def displacement_max_m(run: RunRecord) -> float:
-    return max(_displacements(run), default=0.0)
+@metrics(
+    "m",
+    better="less",
+    displacement_mean_m="mean distance of a live drone from where it started",
+    displacement_max_m="the largest of these",
+)
+def displacements(run: RunRecord) -> tuple[float, float]:
+    moved_m = _displacements(run) or [0.0]
+    return sum(moved_m) / len(moved_m), max(moved_m)
 
 
 @metric("drones", "live drones more than 1 m from where they started", better="less")

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import functools
 import math
-from typing import Callable, Iterable, NamedTuple
+from typing import Callable, Iterable, NamedTuple, Sequence
 
 from drone_mesh.lab.record import RunRecord
 
 NAN = math.nan
 Measure = Callable[[RunRecord], float]
+Several = Callable[[RunRecord], Sequence[float]]
 
 
 class Metric(NamedTuple):
@@ -71,3 +73,19 @@ def metric(unit: str, definition: str, **about: object) -> Callable[[Measure], M
         return measure
 
     return note
+
+
+def metrics(unit: str, better: str = "", **definitions: str) -> Callable[[Several], Several]:
+    """Register several metrics, by name: the decorated function measures them, in this order."""
+
+    def note(measure: Several) -> Several:
+        for place, (name, definition) in enumerate(definitions.items()):
+            one = functools.partial(_nth, measure, place)
+            METRICS[name] = Metric(unit, definition, one, better)
+        return measure
+
+    return note
+
+
+def _nth(measure: Several, place: int, record: RunRecord) -> float:
+    return measure(record)[place]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import statistics
 
 from drone_mesh.communication.data.ticket import TicketState
@@ -14,6 +15,7 @@ from drone_mesh.lab.metrics.registry import (
     Metric,
     mean,
     metric,
+    metrics,
     per_drone_and_s,
     ratio,
 )
@@ -69,14 +71,15 @@ def orders(run: RunRecord) -> float:
     return len(run.orders)
 
 
-@metric("share", "orders whose drone set out within 10 s; empty: no orders", better="more")
-def order_delivery(run: RunRecord) -> float:
-    return mean(d is not None for d in _order_delays(run))
-
-
-@metric("share", "orders whose drone set out within 2 s; empty: no orders", better="more")
-def order_prompt(run: RunRecord) -> float:
-    return mean(d is not None and d <= 2.0 for d in _order_delays(run))
+@metrics(
+    "share",
+    better="more",
+    order_delivery="orders whose drone set out within 10 s; empty: no orders",
+    order_prompt="orders whose drone set out within 2 s; empty: no orders",
+)
+def orders_in_time(run: RunRecord) -> list[float]:
+    delays = [math.inf if delay is None else delay for delay in _order_delays(run)]
+    return [mean(delay <= most_s for delay in delays) for most_s in (DELIVERED_WITHIN_S, 2.0)]
 
 
 @metric("", "orders that neither arrived nor were reported as lost by the gateway", better="less")
