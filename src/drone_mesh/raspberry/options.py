@@ -334,16 +334,11 @@ def _options(
             http=http_options(parsed, environment) if parsed.http else None,
             keys=_keys(parsed),
             mqtt=mqtt_options(parsed, environment) if parsed.gateway else None,
-            silence_s=_silence_s(parsed) if parsed.gateway else None,
+            silence_s=parsed.silence if parsed.gateway and parsed.internet == "http" else None,
             record=parsed.record if parsed.gateway else None,
         )
     except MeshError as error:
         parser.exit(2, f"{parser.prog}: {error}\n")
-
-
-def _silence_s(parsed: argparse.Namespace) -> float | None:
-    silence_s: float = parsed.silence
-    return silence_s if parsed.internet == "http" else None
 
 
 def _keys(parsed: argparse.Namespace) -> MeshKey | NodeKeys | None:
