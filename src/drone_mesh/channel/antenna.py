@@ -57,8 +57,10 @@ class PacketAntenna(IWirelessCommunication):
         *,
         runtime: Runtime | None = None,
         on_payload: Callable[[bytes], None] | None = None,
+        debug_period_s: float = DEBUG_PERIOD_S,
     ) -> None:
         """`on_payload` is called with each payload as the mesh gets it, in the receiving thread."""
+        self._debug_period_s = debug_period_s
         self._radio = radio
         self._submit = submit
         self._inbox = PacketInbox(submit)
@@ -166,7 +168,7 @@ class PacketAntenna(IWirelessCommunication):
         return self._sender.data_room()
 
     def debugging_mode(self, info: IMeshDebugInfo, on: bool) -> None:
-        """Log one line about the node and the channel every DEBUG_PERIOD_S, or stop."""
+        """Log one line about the node and the channel every `debug_period_s`, or stop."""
         self._info = info if on else None
 
     def on(self) -> bool:
@@ -214,11 +216,11 @@ class PacketAntenna(IWirelessCommunication):
         )
 
     def _receive(self) -> None:
-        show_s = self._runtime.now_s() + DEBUG_PERIOD_S
+        show_s = self._runtime.now_s() + self._debug_period_s
         while not self._ending:
             info, late_s = self._info, self._runtime.now_s() - show_s
             if late_s >= 0.0:
-                show_s += DEBUG_PERIOD_S * (late_s // DEBUG_PERIOD_S + 1.0)
+                show_s += self._debug_period_s * (late_s // self._debug_period_s + 1.0)
                 if info is not None:
                     self._show(info)
             for received in self._radio.receive(RECEIVE_TIMEOUT_S):
