@@ -54,7 +54,7 @@ class SleepyRig(Rig):
 def in_flight() -> SleepyRig:
     rig = SleepyRig()
     rig.ready()
-    rig.vehicle.parameters.take("FS_GCS_ENABLE", 0.0)  # it shall not act by itself
+    rig.vehicle.parameters["FS_GCS_ENABLE"] = 0.0  # it shall not act by itself
     rig.goal(*GOAL)
     rig.run_until("it is on its way", lambda: rig.place.latitude > 10.0)
     return rig

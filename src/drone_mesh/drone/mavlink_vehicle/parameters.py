@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Dict
+import math
+from typing import Callable, Dict
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from drone_mesh.drone.mavlink.autopilots import OUR_SYSTEM_ID, PX4, Autopilot
+from drone_mesh.drone.mavlink.telemetry import Message
 
 _ARDUPILOT = {
     "BATT_FS_LOW_ACT": 1.0,
@@ -31,30 +33,45 @@ _REAL = ("COM_OF_LOSS_T", "GF_MAX_HOR_DIST", "GF_MAX_VER_DIST", "MIS_TAKEOFF_ALT
 
 
 class Parameters(Dict[str, float]):
-    """Values by name; those that are not real are integers."""
+    """Values by name; those that are not real are integers. Answers requests through `send`."""
 
-    def __init__(self, autopilot: Autopilot) -> None:
+    def __init__(self, autopilot: Autopilot, send: Callable[[Message], None]) -> None:
         super().__init__(_PX4 if autopilot is PX4 else _ARDUPILOT)
         self._autopilot = autopilot
+        self._send = send
 
     def names(self) -> list[str]:
         """All names, in the order of their indices."""
         return sorted(self)
 
-    def message(self, name: str) -> mavlink.MAVLink_param_value_message:
-        """The PARAM_VALUE of a parameter."""
-        kind, names = _kind(name), self.names()
-        return mavlink.MAVLink_param_value_message(
-            name.encode(),
-            self._autopilot.parameter_bytes(self[name], kind),
-            kind,
-            len(names),
-            names.index(name),
-        )
+    def take_read_request(self, message: Message) -> None:
+        """PARAM_REQUEST_READ."""
+        names = self.names()
+        if 0 <= message.param_index < len(names):
+            self._report(names[message.param_index])
+        elif message.param_id in self:
+            self._report(message.param_id)
 
-    def take(self, name: str, raw: float) -> None:
-        """Apply a PARAM_SET for an existing parameter."""
-        self[name] = self._autopilot.parameter_value(raw, _kind(name))
+    def take_list_request(self, _message: Message) -> None:
+        """PARAM_REQUEST_LIST."""
+        for name in self.names():
+            self._report(name)
+
+    def take(self, message: Message) -> None:
+        """PARAM_SET."""
+        name, raw = message.param_id, message.param_value
+        if name in self and math.isfinite(raw):
+            self[name] = self._autopilot.parameter_value(raw, _kind(name))
+            self._report(name)
+
+    def _report(self, name: str) -> None:
+        kind, names = _kind(name), self.names()
+        value = self._autopilot.parameter_bytes(self[name], kind)
+        self._send(
+            mavlink.MAVLink_param_value_message(
+                name.encode(), value, kind, len(names), names.index(name)
+            )
+        )
 
 
 def _kind(name: str) -> int:

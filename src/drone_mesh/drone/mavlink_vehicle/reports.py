@@ -1,4 +1,4 @@
-"""The periodic messages of the simulated vehicle, each at its own rate."""
+"""The messages of the simulated vehicle about itself: each at its own rate, or on request."""
 
 from __future__ import annotations
 
@@ -28,6 +28,12 @@ SENSORS = (
     | mavlink.MAV_SYS_STATUS_SENSOR_GPS
     | mavlink.MAV_SYS_STATUS_PREARM_CHECK
 )
+CAPABILITIES = (
+    mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
+)
 FULL_CELL_MV, EMPTY_CELL_MV, CELLS = 4200, 3300, 4
 
 
@@ -45,10 +51,12 @@ class Reported(Protocol):
 
 
 class Reports:
-    """Schedules the messages. An interval of 0 or less: not sent."""
+    """Schedules the messages, and sends others on request. An interval of 0 or less: not sent."""
 
-    def __init__(self, vehicle: Reported) -> None:
+    def __init__(self, vehicle: Reported, send: Callable[[Message], None]) -> None:
+        """`send`: what was requested."""
         self._vehicle = vehicle
+        self._send = send
         is_px4 = vehicle.autopilot is PX4
         estimate = self._estimator if is_px4 else self._ekf
         self._makers: dict[int, Callable[[], Message]] = {
@@ -71,17 +79,39 @@ class Reports:
         self._due_s = {message_id: -math.inf for message_id in self._makers}
         self._boot_s = math.nan
 
-    def set_interval(self, message_id: int, interval_us: float) -> bool:
-        """SET_MESSAGE_INTERVAL: 0: default, below 0: never. False: message not supported."""
-        if message_id not in self._makers or not math.isfinite(interval_us):
-            return False
-        self._interval_s[message_id] = 1.0 if interval_us == 0 else interval_us / 1e6
-        return True
+    def set_interval(self, message: Message) -> int:
+        """MAV_CMD_SET_MESSAGE_INTERVAL: 0: default, below 0: never.
 
-    def make(self, message_id: int) -> Message | None:
-        """One message now; None: not supported."""
-        maker = self._makers.get(message_id)
-        return maker() if maker is not None else None
+        Returns a MAV_RESULT, as all commands do.
+        """
+        if not math.isfinite(message.param1):
+            return int(mavlink.MAV_RESULT_DENIED)
+        message_id, interval_us = int(message.param1), message.param2
+        if message_id not in self._makers or not math.isfinite(interval_us):
+            return int(mavlink.MAV_RESULT_UNSUPPORTED)
+        self._interval_s[message_id] = 1.0 if interval_us == 0 else interval_us / 1e6
+        return int(mavlink.MAV_RESULT_ACCEPTED)
+
+    def request_message(self, message: Message) -> int:
+        """MAV_CMD_REQUEST_MESSAGE."""
+        if not math.isfinite(message.param1):
+            return int(mavlink.MAV_RESULT_DENIED)
+        if message.param1 == mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION:
+            return self.request_capabilities(message)
+        maker = self._makers.get(int(message.param1))
+        if maker is None:
+            return int(mavlink.MAV_RESULT_UNSUPPORTED)
+        self._send(maker())
+        return int(mavlink.MAV_RESULT_ACCEPTED)
+
+    def request_capabilities(self, _message: Message) -> int:
+        """MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES."""
+        self._send(
+            mavlink.MAVLink_autopilot_version_message(
+                CAPABILITIES, 0x01000000, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, 0
+            )
+        )
+        return int(mavlink.MAV_RESULT_ACCEPTED)
 
     def due(self, now_s: float) -> list[Message]:
         """The messages due now."""

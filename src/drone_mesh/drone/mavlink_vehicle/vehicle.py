@@ -12,7 +12,6 @@ from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.autopilots import OUR_SYSTEM_ID, PX4, Autopilot
 from drone_mesh.drone.mavlink.telemetry import Message
 from drone_mesh.drone.mavlink_vehicle.body import LANDING_SPEED_M_S, Body, VehicleFaults
-from drone_mesh.drone.mavlink_vehicle.inquiries import Inquiries
 from drone_mesh.drone.mavlink_vehicle.modes import Mode, mode_of
 from drone_mesh.drone.mavlink_vehicle.parameters import Parameters
 from drone_mesh.drone.mavlink_vehicle.reports import Reports
@@ -49,7 +48,7 @@ class MavlinkVehicle:
         self.home = home
         self.faults = VehicleFaults()
         self.body = Body()
-        self.parameters = Parameters(autopilot)
+        self.parameters = parameters = Parameters(autopilot, self._send)
         self.mode = Mode.HOLD
         self.in_failsafe = False
         self.now_s = 0.0
@@ -63,20 +62,18 @@ class MavlinkVehicle:
         self.mission = UploadedMission(
             self._send, self._place, lambda: self.now_s, 0 if autopilot is PX4 else 1
         )
-        self._reports = Reports(self)
+        self._reports = Reports(self, self._send)
         mission = self.mission
-        inquiries = Inquiries(self._reports, self.parameters, self._send, lambda: self.now_s)
-        self._inquiries = inquiries
         self._takes: dict[str, Callable[[Message], None]] = {
             "HEARTBEAT": self._take_heartbeat,
             "COMMAND_LONG": self._take_command,
             "COMMAND_INT": self._take_command,
             "SET_MODE": self._take_set_mode,
             "SET_POSITION_TARGET_GLOBAL_INT": self._take_target,
-            "PARAM_REQUEST_READ": inquiries.take_parameter_request,
-            "PARAM_REQUEST_LIST": inquiries.take_parameter_list_request,
-            "PARAM_SET": inquiries.take_parameter,
-            "TIMESYNC": inquiries.take_timesync,
+            "PARAM_REQUEST_READ": parameters.take_read_request,
+            "PARAM_REQUEST_LIST": parameters.take_list_request,
+            "PARAM_SET": parameters.take,
+            "TIMESYNC": self._take_timesync,
             "MISSION_REQUEST_LIST": mission.take_list_request,
             "MISSION_REQUEST_INT": mission.take_request,
             "MISSION_REQUEST": mission.take_request,
@@ -225,6 +222,10 @@ class MavlinkVehicle:
     def _take_set_mode(self, message: Message) -> None:
         self._set_mode(mode_of(self.autopilot, message.custom_mode))
 
+    def _take_timesync(self, message: Message) -> None:
+        if message.tc1 == 0:
+            self._send(mavlink.MAVLink_timesync_message(int(self.now_s * 1e9), message.ts1))
+
     def _take_target(self, message: Message) -> None:
         ignored = mavlink.POSITION_TARGET_TYPEMASK_X_IGNORE
         if message.type_mask & ignored or not math.isfinite(message.alt):
@@ -263,7 +264,7 @@ class MavlinkVehicle:
         self._send(mavlink.MAVLink_command_ack_message(message.command, result))
 
     def _obey(self, message: Message) -> int:
-        inquiries = self._inquiries
+        reports = self._reports
         orders: dict[int, Callable[[Message], int]] = {
             mavlink.MAV_CMD_COMPONENT_ARM_DISARM: self._obey_arm,
             mavlink.MAV_CMD_DO_SET_MODE: self._obey_mode,
@@ -272,9 +273,9 @@ class MavlinkVehicle:
             mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: lambda _message: self._set_mode(Mode.RETURN),
             mavlink.MAV_CMD_DO_REPOSITION: self._obey_reposition,
             mavlink.MAV_CMD_DO_CHANGE_SPEED: lambda _message: ACCEPTED,
-            mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: inquiries.set_interval,
-            mavlink.MAV_CMD_REQUEST_MESSAGE: inquiries.request_message,
-            mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: inquiries.report_capabilities,
+            mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: reports.set_interval,
+            mavlink.MAV_CMD_REQUEST_MESSAGE: reports.request_message,
+            mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: reports.request_capabilities,
         }
         obey = orders.get(message.command)
         return obey(message) if obey is not None else UNSUPPORTED
