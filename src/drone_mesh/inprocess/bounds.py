@@ -41,10 +41,6 @@ class LinkMap:
             self._next_hops[destination] = self._paths_to(destination)
         return self._next_hops[destination].get(node, NO_ROUTE)
 
-    def hops_from(self, starts: Iterable[int]) -> dict[int, int]:
-        """Hops of the shortest path from one of `starts`, by node; only nodes with a path."""
-        return hops_from(starts, self._links)
-
     def _paths_to(self, destination: int) -> dict[int, int]:
         hops = hops_from([destination], self._links)
         return {

@@ -7,6 +7,7 @@ import random
 from dataclasses import replace
 from typing import Callable, Iterable, Mapping
 
+from drone_mesh.air.graph import hops_from
 from drone_mesh.air.reach import MAX_DISTANCE_M
 from drone_mesh.communication.assembly import assemble_component
 from drone_mesh.communication.data.echo import OnEchoAnswer
@@ -364,7 +365,7 @@ class Network:
     def shortest_hops(self) -> dict[int, int]:
         """By id: hops on the shortest path to a gateway, for all nodes with a path."""
         gateways = [n for n, node in self.nodes.items() if node.is_gateway and node.antenna.powered]
-        return self._link_map.hops_from(gateways)
+        return hops_from(gateways, self.links)
 
     def path_to_gateway(self, node_id: int) -> list[int] | None:
         """The path of a packet to the node's gateway; None: it would not arrive."""

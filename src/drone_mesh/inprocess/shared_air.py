@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from typing import Callable, Iterable
 
 from drone_mesh.channel.packet_queue import ALL_NODES, OutgoingPacket
+from drone_mesh.drone.flight_path import Vector
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.inprocess.clock import VirtualClock
 from drone_mesh.inprocess.interfaces import IInProcessAir, IInProcessAntenna
@@ -194,6 +195,9 @@ class SharedAir(IInProcessAir):
         self._reached.clear()
         self._power_dbm = {pair: dbm for pair, dbm in self._power_dbm.items() if node not in pair}
 
+    def _place(self, node: int) -> Vector:
+        return self._radios[node].drone.get_location().to_vector()
+
     def _distance_m(self, one: int, other: int) -> float:
         radios = self._radios
         if one not in radios or other not in radios:
@@ -206,11 +210,7 @@ class SharedAir(IInProcessAir):
         fading = self.space.fading
         if fading is None or power_dbm == -math.inf:
             return power_dbm
-        radios = (self._radios[sender], self._radios[receiver])
-        places = (
-            radios[0].drone.get_location().to_vector(),
-            radios[1].drone.get_location().to_vector(),
-        )
+        places = (self._place(sender), self._place(receiver))
         now_ns = round(self.clock.now_s * NS_PER_S)
         return power_dbm + fading.gain_db((sender, receiver), places, self._carrier_mhz, now_ns)
 
@@ -227,10 +227,7 @@ class SharedAir(IInProcessAir):
             distance_m, float(self.settings.power.value), self._carrier_mhz
         )
         if self.space.obstacles is not None:
-            places = (
-                self._radios[node].drone.get_location().to_vector() for node in (sender, receiver)
-            )
-            power_dbm -= self.space.lost_db(*places)
+            power_dbm -= self.space.lost_db(self._place(sender), self._place(receiver))
         if not self._flying.intersection((sender, receiver)):
             self._power_dbm[sender, receiver] = power_dbm
         return power_dbm
