@@ -6,6 +6,7 @@ import argparse
 import random
 import sys
 import time
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,7 +14,6 @@ from drone_mesh.air.reach import MAX_DISTANCE_M
 from drone_mesh.arguments import MOST, whole
 from drone_mesh.drone.fleet import MAX_DRONES, plan_fleet
 from drone_mesh.inprocess.chip_air import ChipAir
-from drone_mesh.inprocess.load_benchmark import MESSAGE_BYTES, busiest_relay
 from drone_mesh.inprocess.network import Network
 from drone_mesh.inprocess.wall_mesh import WallMesh
 from drone_mesh.nrf24.emulator.air import Air
@@ -24,6 +24,7 @@ from drone_mesh.nrf24.emulator.trace import FrameTrace
 from drone_mesh.nrf24.high_level import NRF24HighLevelInterface
 from drone_mesh.nrf24.settings import DATA_RATES, DEFAULT_RATE, RadioSettings
 
+MESSAGE_BYTES = 16
 PROGRESS_S = 5.0  # of wall time
 MESSAGE_PERIOD_S = 1.0
 ANSWER_WITHIN_S = 30.0  # after the last message
@@ -205,7 +206,8 @@ def _send_messages(network: Network, count: int, seed: int) -> str:
 def _switch_off_a_relay(network: Network) -> str:
     if all(hops < 2 for hops in network.shortest_hops().values()):
         return "no router is a relay: none is switched off"
-    dead = busiest_relay(network)
+    paths = [network.path_to_gateway(node) or [] for node in network.nodes]
+    dead = Counter(relay for path in paths for relay in path[1:-1]).most_common(1)[0][0]
     begun_s = network.now_s()
     cut = [node for node in network.nodes if dead in (network.path_to_gateway(node) or ())]
     network.power(dead, False)

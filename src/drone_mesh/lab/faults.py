@@ -154,6 +154,14 @@ class Messages(Part):
     reliable: bool = True
 
 
+class Load(Part):
+    """Reliable messages of users to the first gateway, from random routers at random times."""
+
+    per_s: AtLeast0  # of all routers together, on the mean
+    size: Annotated[int, Field(ge=0, le=MAX_MESSAGE_BYTES)] = 16
+    counted_after_s: AtLeast0 = 0.0  # messages before count for no metric
+
+
 class Wind(Part):
     """Wind, which slows flights."""
 
@@ -166,7 +174,7 @@ class Fault(Part):
 
     ACTIONS: ClassVar[Tuple[str, ...]] = (
         "kill", "revive", "cut_link", "jam", "gateway_off", "loss", "battery", "churn", "order",
-        "layouts", "send", "wind",
+        "layouts", "send", "load", "wind",
     )  # fmt: skip
 
     at_s: Optional[AtLeast0] = None
@@ -182,6 +190,7 @@ class Fault(Part):
     order: Optional[FlightOrders] = None
     layouts: Optional[FlownLayouts] = None
     send: Optional[Messages] = None
+    load: Optional[Load] = None
     wind: Optional[Wind] = None
 
     @field_validator("when")

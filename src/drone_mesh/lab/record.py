@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Mapping, NamedTuple, Sequence, Tuple
 
 from drone_mesh.air.graph import Graph
-from drone_mesh.communication.data.ticket import Ticket
 from drone_mesh.communication.data.transport import ReceivedMessage
 from drone_mesh.lab.flights import Leg
 from drone_mesh.lab.formations import Formations
@@ -15,7 +14,7 @@ from drone_mesh.lab.link_watch import LinkWatch
 from drone_mesh.lab.network_sample import NetworkSample
 from drone_mesh.lab.probes import ProbeFate
 from drone_mesh.lab.scenario import Scenario
-from drone_mesh.lab.timeline import Happened, OrderAttempt
+from drone_mesh.lab.timeline import HandedIn, Happened, OrderAttempt
 from drone_mesh.state.model import EventRecord
 
 Place = Tuple[float, float, float]  # x, y, z in metres
@@ -70,9 +69,9 @@ class RunRecord:
     legs: Sequence[Leg]
     traffic: Mapping[int, Traffic]  # by message type
     orders: Sequence[OrderAttempt]
-    tickets: Sequence[Ticket]  # users' messages
-    received: Sequence[ReceivedMessage]  # of these, at the gateways
-    messages_since_s: float  # when they were handed in
+    messages: Sequence[HandedIn]  # of users
+    received: Sequence[ReceivedMessage]  # at the gateways
+    messages_since_s: float  # from when on both count
     collisions: int
     min_distance_m: float  # of two drones that were not as close at the start; inf: not measured
     end_s: float

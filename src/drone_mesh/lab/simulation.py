@@ -120,8 +120,13 @@ class Simulation:
             legs=self.flights.legs,
             traffic=self.impairments.traffic,
             orders=self.timeline.orders,
-            tickets=self.timeline.tickets,
-            received=[m for g in gateways_of(network) for m in network.received.get(g, ())],
+            messages=self.timeline.messages,
+            received=[
+                message
+                for gateway in gateways_of(network)
+                for message in network.received.get(gateway, ())
+                if message.received_s >= self.timeline.messages_since_s
+            ],
             messages_since_s=self.timeline.messages_since_s,
             collisions=len(self._pairs),
             min_distance_m=self._min_distance_m,

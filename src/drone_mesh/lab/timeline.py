@@ -10,6 +10,7 @@ from typing import Callable, ContextManager, Iterable, Iterator, NamedTuple, Seq
 
 from drone_mesh.communication.data.ticket import Ticket
 from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.errors import QueueFull
 from drone_mesh.inprocess import Network
 from drone_mesh.lab.faults import Fault, StartCondition, parse_condition
 from drone_mesh.lab.flights import Flights
@@ -46,6 +47,13 @@ Observing = Callable[[], ContextManager[None]]
 """Observes the network before and after each fault that must be healed."""
 
 
+class HandedIn(NamedTuple):
+    """A user's message that a router took."""
+
+    sender: int
+    ticket: Ticket
+
+
 class Timeline:
     """The faults of one run, on the network's clock."""
 
@@ -61,8 +69,8 @@ class Timeline:
         """Schedule the faults on the network's clock."""
         self.happened: list[Happened] = []
         self.orders: list[OrderAttempt] = []
-        self.tickets: list[Ticket] = []
-        self.messages_since_s = 0.0
+        self.messages: list[HandedIn] = []
+        self.messages_since_s = 0.0  # those that count
         self.first_disruption_s: float | None = None
         self._network, self._impairments, self._flights = network, impairments, flights
         self._scenario, self._streams = scenario, streams
@@ -294,9 +302,31 @@ class Timeline:
         senders = [what.ids[number % len(what.ids)] for number in range(what.number)]
         self.messages_since_s = self._network.clock.now_s
         for node in senders:
-            payload = bytes(what.size)
-            self.tickets.append(self._network.send(node, gateway, payload, reliable=what.reliable))
+            ticket = self._network.send(node, gateway, bytes(what.size), reliable=what.reliable)
+            self.messages.append(HandedIn(node, ticket))
         return sorted(set(senders))
+
+    def _load(self, fault: Fault, rng: random.Random) -> list[int]:
+        what, clock = fault.what, self._network.clock
+        self.messages_since_s = clock.now_s + what.counted_after_s
+        at_s = clock.now_s
+        while what.per_s:
+            at_s += rng.expovariate(what.per_s)
+            if at_s >= self._scenario.duration_s:
+                break
+            clock.call_at(at_s, self._send_one, (rng.random(), bytes(what.size)))
+        return []
+
+    def _send_one(self, what: tuple[float, bytes]) -> None:
+        draw, payload = what
+        fit = self._routers(alive=True)
+        node, gateway = fit[int(draw * len(fit))], gateways_of(self._network)[0]
+        try:
+            ticket = self._network.send(node, gateway, payload)
+        except QueueFull:
+            return  # the mesh was not offered it
+        if self._network.clock.now_s >= self.messages_since_s:
+            self.messages.append(HandedIn(node, ticket))
 
     def _wind(self, fault: Fault, _rng: random.Random) -> list[int]:
         drones = [node.drone for node in self._network.nodes.values()]

@@ -10,6 +10,7 @@ import pytest
 from drone_mesh.air.graph import Graph
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.lab.metrics import METRICS, measure_all
+from drone_mesh.lab.metrics.traffic import jain_index
 from drone_mesh.lab.places import draw_places
 from drone_mesh.lab.propagation import success
 from drone_mesh.lab.record import RunRecord
@@ -149,6 +150,43 @@ def test_a_cut_vertex_is_found_where_there_is_one() -> None:
 
 def test_the_busiest_relay_is_the_one_next_to_the_gateway_of_a_line() -> None:
     assert run(faults=[kill(number=1, pick="busiest")]).happened[0].nodes == (1,)
+
+
+# Users' messages
+
+
+def test_messages_of_a_load_count_from_its_time_on() -> None:
+    record = run(faults=[{"at_s": 5, "load": {"per_s": 4, "counted_after_s": 10}}])
+    values = measure_all(record)
+    assert record.messages_since_s == 15.0
+    assert {one.sender for one in record.messages} == {1, 2, 3, 4}
+    assert values["taken_rate"] == pytest.approx(4.0, rel=0.2)
+    assert values["arrival_rate"] == pytest.approx(values["taken_rate"], rel=0.05)
+    assert min(values["data_delivered"], values["data_fairness"]) >= 0.95
+
+
+def test_the_index_of_fairness_is_1_for_equal_shares_and_half_if_one_of_two_starves() -> None:
+    assert jain_index([0.7, 0.7, 0.7]) == pytest.approx(1.0)
+    assert jain_index([0.9, 0.0]) == pytest.approx(0.5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("per_s", "least"), [(5.0, 0.9), (20.0, 0.6)])
+def test_users_messages_do_not_keep_a_broken_mesh_broken(per_s: float, least: float) -> None:
+    record = run(
+        layout={"kind": "grid", "drones": 26, "columns": 5, "spacing_m": 6},
+        radio={"kind": "shared"},
+        faults=[
+            {"when": "10 s after all connected", "load": {"per_s": per_s, "counted_after_s": 50}},
+            {"when": "30 s after all connected", "kill": {"number": 1, "pick": "busiest"}},
+        ],
+        duration_s=140,
+    )
+    values = measure_all(record)
+    shares = [one.share for one in record.samples if one.now_s >= record.messages_since_s]
+    assert len(shares) > 40
+    assert sum(shares) / len(shares) >= 0.98
+    assert values["arrival_rate"] >= least * values["taken_rate"]
 
 
 def test_a_circle_takes_all_nodes_within_it() -> None:

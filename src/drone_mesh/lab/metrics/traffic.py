@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import statistics
+from collections import Counter, defaultdict
+from typing import Sequence
 
 from drone_mesh.communication.data.ticket import TicketState
 from drone_mesh.communication.observer import MeshEventKind
@@ -110,7 +112,7 @@ def order_delay_ms(run: RunRecord) -> float:
 )
 def data_rate(run: RunRecord) -> float:
     if not run.received:
-        return 0.0 if run.tickets else NAN
+        return 0.0 if run.messages else NAN
     seconds = max(message.received_s for message in run.received) - run.messages_since_s
     return sum(len(message.payload) for message in run.received) * 8 / seconds / 1000
 
@@ -119,9 +121,39 @@ def data_rate(run: RunRecord) -> float:
     "share", "users' messages that arrived; reliable ones: as their sender knows", better="more"
 )
 def data_delivered(run: RunRecord) -> float:
-    if run.tickets and run.tickets[0].reliable:
-        return mean(ticket.state is TicketState.DELIVERED for ticket in run.tickets)
-    return ratio(len(run.received), len(run.tickets))
+    if run.messages and run.messages[0].ticket.reliable:
+        return mean(one.ticket.state is TicketState.DELIVERED for one in run.messages)
+    return ratio(len(run.received), len(run.messages))
+
+
+@metric("1/s", "users' messages that the queues of the drones took")
+def taken_rate(run: RunRecord) -> float:
+    return len(run.messages) / (run.end_s - run.messages_since_s)
+
+
+@metric("1/s", "users' messages that arrived", better="more")
+def arrival_rate(run: RunRecord) -> float:
+    return len(run.received) / (run.end_s - run.messages_since_s)
+
+
+@metric(
+    "",
+    "Jain's index of the share that arrived, over senders at equal hops; least of all hops",
+    better="more",
+)
+def data_fairness(run: RunRecord) -> float:
+    taken = Counter(one.sender for one in run.messages)
+    arrived = Counter(message.sender for message in run.received)
+    hops = run.end.graph.hops_from(run.gateways)
+    shares: dict[int, list[float]] = defaultdict(list)
+    for node in hops.keys() & taken.keys():
+        shares[hops[node]].append(arrived[node] / taken[node])
+    return min((jain_index(some) for some in shares.values() if any(some)), default=NAN)
+
+
+def jain_index(values: Sequence[float]) -> float:
+    """1: all are equal; 1/n: all but one are 0 (Jain, Chiu, Hawe 1984)."""
+    return sum(values) ** 2 / (len(values) * sum(value * value for value in values))
 
 
 def _order_delays(run: RunRecord) -> list[float | None]:
