@@ -47,10 +47,10 @@ class PacketSamples(Periodic):
         rospy.on_shutdown(self.stop)
 
     def _work(self) -> None:
+        with self._lock:  # always: a later subscriber must not get what is left from before
+            carried, packets = self._sampler.take()
         if not self.watched:
             return
-        with self._lock:
-            carried, packets = self._sampler.take()
         now_s = time.monotonic()
         self._publisher.publish(
             PacketSample(
