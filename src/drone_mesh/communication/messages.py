@@ -41,6 +41,33 @@ MOST_RECORDED = 16
 MAX_HOPS = 254  # of a heartbeat; docs/protocol.md, "Forwarding"
 
 
+@dataclass(frozen=True)
+class Message:
+    """A header without a body: REQUESTLOCATION, NOTDEFINED and unknown types.
+
+    Only this class takes the type as an argument, in third place, as the original did.
+    """
+
+    creator: int  # the node that made it
+    from_: int  # the node that sends this hop
+    type: int
+    to: int  # receiver of this hop
+    forward: int  # final addressee, 254 = every node in range
+
+    def to_payload(self) -> bytes:
+        """The 32 bytes. Raises PacketError for a value outside 0..255."""
+        try:
+            return packet(self.type, self.creator, self.from_, self.to, self.forward)
+        except ValueError as error:
+            raise PacketError(f"{self} does not fit a packet: {error}") from error
+
+    @classmethod
+    def from_payload(cls, payload: bytes) -> Message:
+        """Decode a header; the body is ignored. Raises PacketError unless there are 32 bytes."""
+        _check_length(payload)
+        return cls(*payload[:HEADER_BYTES])
+
+
 _M = TypeVar("_M", bound="_TypedMessage")
 
 
@@ -70,8 +97,7 @@ class _TypedMessage:
     @classmethod
     def from_payload(cls: type[_M], payload: bytes) -> _M:
         """Decode. Raises PacketError for another length or type."""
-        if len(payload) != PAYLOAD_BYTES:
-            raise PacketError(f"expected {PAYLOAD_BYTES} bytes, got {len(payload)}")
+        _check_length(payload)
         creator, from_, kind, to, forward = payload[:HEADER_BYTES]
         if kind != cls.TYPE:
             raise PacketError(f"type {kind} is not {cls.TYPE.name} ({int(cls.TYPE)})")
@@ -427,3 +453,8 @@ def is_finite(payload: bytes) -> bool:
     """Whether all floats of a packet are finite; its type is one of TYPES_WITH_FLOATS."""
     numbers = _FLOATS[payload[TYPE_AT]].unpack_from(payload, HEADER_BYTES)
     return math.isfinite(sum(numbers))
+
+
+def _check_length(payload: bytes) -> None:
+    if len(payload) != PAYLOAD_BYTES:
+        raise PacketError(f"expected {PAYLOAD_BYTES} bytes, got {len(payload)}")

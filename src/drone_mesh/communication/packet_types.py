@@ -54,7 +54,7 @@ class PacketType(NamedTuple):
     kind: PacketKind
     handler: Handler
     body: str = ""  # its fields in their order, as "uint8 name" or "bytes[10] name"
-    made_of: str = ""  # the class that encodes it; empty: a header is all of it
+    made_of: str = "Message"  # the class that encodes it
     priority: Priority = Priority.CONTROL
     answered: bool = True  # whether a broadcast of it makes several nodes send
     jittered: bool = True  # whether many nodes would broadcast it at the same moment
