@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import shlex
-import statistics
 from pathlib import Path
 from typing import Sequence
 
@@ -114,8 +113,10 @@ def _is_narrow(
     """Whether the normal 95 % interval of the mean is narrow enough."""
     if len(values) < 2:
         return False
-    half = 1.96 * statistics.stdev(values) / math.sqrt(len(values))
+    mean = sum(values) / len(values)  # of metrics that may be infinite: statistics raises for these
+    variance = sum((value - mean) ** 2 for value in values) / (len(values) - 1)
+    half = 1.96 * math.sqrt(variance / len(values))
     if half_width is not None:
         return half <= half_width
     assert relative_half_width is not None
-    return half <= relative_half_width * abs(statistics.mean(values))
+    return half <= relative_half_width * abs(mean)

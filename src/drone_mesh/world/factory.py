@@ -1,10 +1,10 @@
-"""VirtualDrone, and DroneFactory, which creates and removes them (docs/ros.md, "Fleet")."""
+"""VirtualDrone, its two kinds, and DroneFactory, which makes them (docs/ros.md, "Fleet")."""
 
 from __future__ import annotations
 
 import functools
 import math
-from typing import Iterable, Sequence
+from typing import ClassVar, Iterable, Sequence
 
 from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.drone.fleet import MAX_DRONES, StartPlace
@@ -24,6 +24,8 @@ HALF_WIDTH_M = 0.15  # from the centre of a drone's box to its corner, plus a ma
 class VirtualDrone:
     """A box in a world, flown by its engine. Only DroneFactory, which assigns ids, creates them."""
 
+    role: ClassVar[Role]
+
     def __init__(
         self,
         world: World,
@@ -36,7 +38,7 @@ class VirtualDrone:
         With a `wind` (m/s) physics moves it, in a BulletWorld; without, it follows its path.
         `plan_flight` plans its flights.
         """
-        self.node_id, self.role = place.node_id, place.role
+        self.node_id = place.node_id
         size_m = self.role.size_m
         half_height_m = size_m[2] / 2
         centre = (place.longitude, place.latitude, half_height_m)
@@ -49,6 +51,21 @@ class VirtualDrone:
         else:
             self.box = world.add_box(size_m, centre)
             self.engine = DroneEngine(world, self.box, centre, half_height_m, plan_flight)
+
+
+class GatewayDrone(VirtualDrone):
+    """Carries a gateway."""
+
+    role = Role.GATEWAY
+
+
+class RouterDrone(VirtualDrone):
+    """Carries a router."""
+
+    role = Role.ROUTER
+
+
+_KINDS = {kind.role: kind for kind in (GatewayDrone, RouterDrone)}
 
 
 class DroneFactory:
@@ -138,7 +155,7 @@ class DroneFactory:
         drone.engine.leave()
 
     def _make(self, place: StartPlace) -> VirtualDrone:
-        return VirtualDrone(self._world, place, self._wind, self._plan_flight)
+        return _KINDS[place.role](self._world, place, self._wind, self._plan_flight)
 
     def _check_place(self, place: StartPlace) -> None:
         try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 import os
 import resource
 import shutil
@@ -16,7 +17,7 @@ from typing import Any, Callable, Iterator
 import pytest
 
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.lab.campaign import Campaign
+from drone_mesh.lab.campaign import Campaign, _is_narrow
 from drone_mesh.lab.command import main
 from drone_mesh.lab.experiment import load_experiment
 from drone_mesh.lab.plan import Plan
@@ -541,6 +542,12 @@ def test_ctrl_c_keeps_everything_and_prints_how_to_continue(
     assert "Traceback" not in output
     assert run(slow, out) == 0
     assert measured(out) == slow_rows
+
+
+def test_a_metric_that_is_infinite_in_one_run_asks_for_more_runs_and_ends_nothing() -> None:
+    assert not _is_narrow([math.inf, 1.0], None, 0.1)
+    assert not _is_narrow([math.inf, 1.0], 0.5, None)
+    assert _is_narrow([1.0, 1.0], None, 0.1)
 
 
 def test_a_campaign_counts_what_it_did(experiment: Callable[..., Path], tmp_path: Path) -> None:

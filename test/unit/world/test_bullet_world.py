@@ -9,7 +9,7 @@ from still_world import StillWorld
 from drone_mesh.drone.fleet import StartPlace
 from drone_mesh.drone.roles import Role
 from drone_mesh.world.bullet_world import BulletWorld
-from drone_mesh.world.factory import VirtualDrone
+from drone_mesh.world.factory import RouterDrone
 
 
 @pytest.fixture
@@ -108,7 +108,7 @@ def test_a_loose_body_falls_and_comes_to_rest_on_the_ground(bullet):
 
 
 def test_a_flying_drone_moves_its_body(bullet):
-    drone = VirtualDrone(bullet, StartPlace(1, Role.ROUTER, 0.0, 0.0))
+    drone = RouterDrone(bullet, StartPlace(1, Role.ROUTER, 0.0, 0.0))
     drone.engine.set_goal(latitude=4.0, longitude=3.0, height=0.0)
     for _ in range(300):
         bullet.step()

@@ -13,7 +13,7 @@ from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
 from drone_mesh.errors import GoalRefused, MeshError
 from drone_mesh.world.engine import DroneState
-from drone_mesh.world.factory import VirtualDrone
+from drone_mesh.world.factory import RouterDrone
 
 
 @pytest.fixture
@@ -24,7 +24,7 @@ def world():
 @pytest.fixture
 def engine(world):
     """A router that stands at (0, 0, 0); its centre is 0.05 m up."""
-    return VirtualDrone(world, StartPlace(3, Role.ROUTER, 0.0, 0.0)).engine
+    return RouterDrone(world, StartPlace(3, Role.ROUTER, 0.0, 0.0)).engine
 
 
 def step_until(world, now_s):
@@ -194,7 +194,7 @@ def test_a_snapshot_stays_as_it_was_while_the_drone_flies_on(world, engine):
 
 def test_goals_from_many_threads_all_reach_the_world(world):
     engines = [
-        VirtualDrone(world, StartPlace(i, Role.ROUTER, float(i), 0.0)).engine for i in range(20)
+        RouterDrone(world, StartPlace(i, Role.ROUTER, float(i), 0.0)).engine for i in range(20)
     ]
 
     def order(engine, x):

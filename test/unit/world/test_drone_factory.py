@@ -13,7 +13,7 @@ from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.world.bullet_world import BulletWorld
-from drone_mesh.world.factory import DroneFactory
+from drone_mesh.world.factory import DroneFactory, GatewayDrone, RouterDrone
 
 
 def make(**changes):
@@ -24,6 +24,7 @@ def make(**changes):
 def test_ids_count_gateways_first_and_then_routers():
     drones = make(gateways=2, routers=3).drones
     assert [drone.node_id for drone in drones] == [0, 1, 2, 3, 4]
+    assert [type(drone) for drone in drones] == [GatewayDrone] * 2 + [RouterDrone] * 3
     assert [drone.role for drone in drones] == [Role.GATEWAY] * 2 + [Role.ROUTER] * 3
 
 

@@ -14,7 +14,7 @@ from drone_mesh.mobility.pilot import TrackPilot, along
 from drone_mesh.world.body import BodyLimits
 from drone_mesh.world.bullet_world import BulletWorld
 from drone_mesh.world.dynamic_engine import DynamicEngine
-from drone_mesh.world.factory import VirtualDrone
+from drone_mesh.world.factory import RouterDrone
 
 SQUARE = [(4.0, 0.0, 2.0), (4.0, 4.0, 2.0), (0.0, 4.0, 2.0), (0.0, 0.0, 2.0)]
 
@@ -24,7 +24,7 @@ def pilot(speed_m_s=1.0, loop=True):
 
 
 def drone(world):
-    return VirtualDrone(world, StartPlace(3, Role.ROUTER, 0.0, 0.0), (0.0, 0.0, 0.0)).engine
+    return RouterDrone(world, StartPlace(3, Role.ROUTER, 0.0, 0.0), (0.0, 0.0, 0.0)).engine
 
 
 def run(world, seconds, engine=None):

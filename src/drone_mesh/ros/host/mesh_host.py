@@ -18,7 +18,7 @@ from drone_mesh.ros.host.host_reports import HostReports
 from drone_mesh.ros.host.mesh_settings import MeshSettings
 from drone_mesh.ros.host.radios import Radios
 from drone_mesh.ros.host.virtual_nrf24 import VirtualRadios
-from drone_mesh.ros.host.virtual_raspberry_pi import VirtualRaspberryPi
+from drone_mesh.ros.host.virtual_raspberry_pi import VIRTUAL_RASPBERRY_PIS, VirtualRaspberryPi
 from drone_mesh.state.figures import LOST_IN_RANGE, WORST_LAG
 
 RADIOS_TIMEOUT_S = 10.0  # our choice: wall seconds to wait for a simulator before starting nodes
@@ -151,8 +151,8 @@ class MeshHost:
             antenna = self._radios.antenna(node_id, slot)
             why_not_fly = functools.partial(self._grounded.reason, node_id)
             observer = self._reports.observe
-            node = VirtualRaspberryPi(
-                node_id, role, self._settings, observer, antenna, slot, why_not_fly
+            node = VIRTUAL_RASPBERRY_PIS[role](
+                node_id, self._settings, observer, antenna, slot, why_not_fly
             )
             self._reports.add(role, node.component, slot, antenna.on)
             node.start(now_s)

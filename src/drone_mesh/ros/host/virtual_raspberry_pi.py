@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import abc
 import random
-from typing import Callable
+from typing import Callable, ClassVar
 
 from drone_mesh.communication.assembly import assemble_component
 from drone_mesh.communication.interfaces import IInternetConnection, IWirelessCommunication
@@ -22,16 +23,17 @@ from drone_mesh.ros.host.users_of_node import UsersOfNode
 from drone_mesh.users.desk import UsersDesk
 
 
-class VirtualRaspberryPi:
+class VirtualRaspberryPi(abc.ABC):
     """Routing technique, engine connector, antenna, and the mesh component built from them.
 
     For the executor's worker only: create, start and stop it there.
     """
 
+    role: ClassVar[Role]
+
     def __init__(
         self,
         node_id: int,
-        role: Role,
         settings: MeshSettings,
         observer: MeshObserver,
         antenna: IWirelessCommunication,
@@ -43,7 +45,6 @@ class VirtualRaspberryPi:
         Raises ConfigurationError for a routing technique that does not exist."""
         configuration = settings.configuration
         self.node_id = node_id
-        self.role = role
         self.engine = RosDroneEngineConnector(node_id, why_not_fly, settings.obstacles)
         self.slot = slot
         self.users = UsersDesk(node_id, slot.submit)
@@ -63,7 +64,7 @@ class VirtualRaspberryPi:
             antenna,
             self.engine,
             random.Random(f"{configuration.seed}/{node_id}"),
-            internet=self._make_internet(settings) if role is Role.GATEWAY else None,
+            internet=self._make_internet(settings),
             routing=configuration.routing,
             repair=configuration.repair,
             options=settings.repair_options,
@@ -86,8 +87,26 @@ class VirtualRaspberryPi:
         self.component.stop()
         self.engine.disconnect()
 
+    @abc.abstractmethod
+    def _make_internet(self, settings: MeshSettings) -> IInternetConnection | None:
+        """A gateway's internet side; None for a router."""
+
+
+class VirtualRaspberryPiRouter(VirtualRaspberryPi):
+    """Runs a router."""
+
+    role = Role.ROUTER
+
+    def _make_internet(self, _settings: MeshSettings) -> None:
+        return None
+
+
+class VirtualRaspberryPiGateway(VirtualRaspberryPi):
+    """Runs a gateway."""
+
+    role = Role.GATEWAY
+
     def _make_internet(self, settings: MeshSettings) -> IInternetConnection:
-        """A gateway's internet side."""
         mock = RosInternetMock(self.node_id, self.slot)
         internet = settings.configuration.internet
         if internet == "mock":
@@ -102,3 +121,8 @@ class VirtualRaspberryPi:
             self.slot.request, HttpSettings(port=DEFAULT_PORT + self.node_id), users=self.users
         )
         return SeveralInternets(mock, http)
+
+
+VIRTUAL_RASPBERRY_PIS = {
+    kind.role: kind for kind in (VirtualRaspberryPiGateway, VirtualRaspberryPiRouter)
+}
