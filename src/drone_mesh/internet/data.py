@@ -73,7 +73,7 @@ def data_requests(users: UsersDesk) -> APIRouter:
         try:
             sending = users.send(id, await request.body(), port, reliable)
             await _over(sending, wait)
-            ticket = sending.ticket()
+            ticket = sending.ticket(0.0)  # a longer wait would stop the server's event loop
         except QueueFull as error:
             raise HTTPException(503, str(error)) from error
         except MessageRefused as error:

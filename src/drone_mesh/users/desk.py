@@ -40,10 +40,13 @@ class Sending:
         self.taken: futures.Future[Ticket] = futures.Future()  # or MessageRefused
         self.over: futures.Future[Ticket] = futures.Future()  # in its final state, or refused
 
-    def ticket(self) -> Ticket:
-        """The ticket; raises MessageRefused with the reason if there is none."""
+    def ticket(self, within_s: float | None = None) -> Ticket:
+        """The ticket; raises MessageRefused with the reason if there is none.
+
+        Blocks for up to `within_s` (HANDOVER_S).
+        """
         try:
-            return self.taken.result(HANDOVER_S)
+            return self.taken.result(HANDOVER_S if within_s is None else within_s)
         except futures.TimeoutError:
             reason = "the node is too busy to take a message, or it has stopped"
             raise MessageRefused(reason) from None

@@ -8,6 +8,8 @@ import json
 import pytest
 from conftest import TOKEN, MeshWithHttp
 
+from drone_mesh.internet import data
+from drone_mesh.users import desk
 from drone_mesh.users.desk import UsersDesk
 
 
@@ -69,6 +71,15 @@ def test_without_waiting_the_state_is_that_of_the_moment(users_mesh):
 def test_what_cannot_be_sent_is_refused_with_the_reason(users_mesh, path, payload, status, reason):
     answer = users_mesh.client.post(path, content=payload)
     assert (answer.status_code, reason in answer.json()["detail"]) == (status, True)
+
+
+def test_a_node_that_takes_no_message_in_time_does_not_stop_the_server(users_mesh, monkeypatch):
+    monkeypatch.setattr(data, "HANDOVER_S", 0.1)
+    monkeypatch.setattr(desk, "HANDOVER_S", 3600.0)  # what a wait in the event loop would take
+    monkeypatch.setattr(users_mesh.desk, "_submit", lambda _work: None)
+    answer = users_mesh.client.post("/nodes/3/data", content=b"lost", timeout=30.0)
+    assert answer.status_code == 422
+    assert "the node is too busy to take a message" in answer.text
 
 
 def test_messages_for_the_gateway_come_as_events(users_mesh):
