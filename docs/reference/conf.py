@@ -12,7 +12,7 @@ project = "drone_mesh"
 author = "drone_mesh"
 release = ElementTree.parse(str(ROOT / "package.xml")).findtext("version") or ""
 
-extensions = ["sphinx.ext.autodoc", "sphinx.ext.autosummary", "sphinx.ext.viewcode"]
+extensions = ["sphinx.ext.autodoc", "sphinx.ext.autosummary"]
 autosummary_generate = True
 # What a package re-exports is described where it is defined.
 autodoc_default_options = {"members": True, "show-inheritance": True, "ignore-module-all": True}

@@ -96,6 +96,7 @@ class MotionSettings(Part):
     gateways: bool = Mobility.gateways
     steady: bool = Mobility.steady
     climbs: bool = Mobility.climbs
+    cruise_height_m: Annotated[float, Field(gt=0, le=MAX_HEIGHT_M)] = Mobility.cruise_height_m
     alpha: Share = Mobility.alpha
     update_s: Above0 = Mobility.update_s
     groups: Annotated[int, Field(ge=1, le=MAX_DRONES)] = Mobility.groups

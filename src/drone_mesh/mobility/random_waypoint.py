@@ -22,7 +22,7 @@ def random_waypoint(
     """
     legs = _legs(mobility, area, rng, start)
     if mobility.climbs:
-        return Legs(part for leg in legs for part in climbing(leg))
+        return Legs(part for leg in legs for part in climbing(leg, mobility.cruise_height_m))
     return Legs(legs)
 
 

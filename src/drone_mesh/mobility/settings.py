@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Mapping, Sequence, Tuple
 
 from drone_mesh.drone.flight_path import Point, Vector
+from drone_mesh.drone.goal import MAX_HEIGHT_M
 
 Knot = Tuple[float, float, float, float]  # t (s), x, y, z (m)
 
@@ -22,6 +23,7 @@ class Mobility:
     gateways: bool = False  # move as well
     steady: bool = True  # random_waypoint: from its steady state on; False: from where drones stand
     climbs: bool = False  # random_waypoint: each leg by the document's profile
+    cruise_height_m: float = MAX_HEIGHT_M  # ceiling of legs that climb
     alpha: float = 0.85  # gauss_markov: memory, 0 (none) to 1 (straight ahead)
     update_s: float = 1.0  # gauss_markov: between two draws
     groups: int = 4

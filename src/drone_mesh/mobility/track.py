@@ -147,9 +147,12 @@ class Together(Track):
         return Segment(start_s, min(one.end_s, other.end_s), (x, y, z), (u, v, w))
 
 
-def climbing(leg: Segment) -> Iterator[Segment]:
-    """The same leg by the document's profile: half its length up, across, down again."""
-    up_m = math.dist(leg.start, leg.end) / 2
+def climbing(leg: Segment, ceiling_m: float) -> Iterator[Segment]:
+    """The same leg by the document's profile: half its length up, across, down again.
+
+    Under a ceiling it climbs less, in the same time, or not at all.
+    """
+    up_m = min(math.dist(leg.start, leg.end) / 2, max(0.0, ceiling_m - leg.start[2]))
     if not up_m:
         yield leg
         return

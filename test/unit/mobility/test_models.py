@@ -75,10 +75,19 @@ def test_the_share_of_drones_that_pause_is_that_of_the_steady_state(t_s):
 
 
 def test_a_climbing_leg_follows_the_profile_of_the_document():
-    up, across, down = climbing(leg_to(10.0, 20.0, (0.0, 0.0, 0.0), (8.0, 0.0, 0.0)))
+    up, across, down = climbing(leg_to(10.0, 20.0, (0.0, 0.0, 0.0), (8.0, 0.0, 0.0)), 500.0)
     assert (up.start_s, up.end_s, up.end) == (10.0, 11.0, (0.0, 0.0, 4.0))
     assert (across.end_s, across.end) == (19.0, pytest.approx((8.0, 0.0, 4.0)))
     assert (down.end_s, down.end) == (20.0, pytest.approx((8.0, 0.0, 0.0)))
+
+
+def test_under_a_ceiling_a_leg_climbs_less_in_the_same_time():
+    up, across, down = climbing(leg_to(10.0, 20.0, (0.0, 0.0, 1.0), (8.0, 0.0, 1.0)), 3.0)
+    assert (up.end_s, up.end) == (11.0, (0.0, 0.0, 3.0))
+    assert (across.end_s, across.end) == (19.0, pytest.approx((8.0, 0.0, 3.0)))
+    assert (down.end_s, down.end) == (20.0, pytest.approx((8.0, 0.0, 1.0)))
+    level = leg_to(10.0, 20.0, (0.0, 0.0, 4.0), (8.0, 0.0, 4.0))
+    assert list(climbing(level, 3.0)) == [level]
 
 
 def test_level_flights_stay_at_their_height_and_climbing_ones_do_not():
@@ -86,6 +95,8 @@ def test_level_flights_stay_at_their_height_and_climbing_ones_do_not():
     climbs = tracks("random_waypoint", climbs=True).values()
     assert {track.position_at(50.0)[2] for track in level} == {3.0}
     assert max(track.position_at(50.0)[2] for track in climbs) > 10.0
+    under = tracks("random_waypoint", climbs=True, cruise_height_m=3.0).values()
+    assert max(track.position_at(50.0)[2] for track in under) == pytest.approx(3.0)
 
 
 # Gauss-Markov --------------------------------------------------------------------------------
