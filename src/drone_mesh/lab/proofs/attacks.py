@@ -196,6 +196,7 @@ ATTACKS: Mapping[str, Attack] = {
     "nonces in drones' names": claims.claimed_nonces,
     "beacons of a black hole": claims.beacon_black_hole,
     "beacons with numbers ahead": claims.beacons_ahead,
+    "beacons that list all drones": claims.beacons_of_all,
     "beacons in neighbours' names": claims.beacons_in_names,
 }
 RECORDING = (replayed_order, replay_after_restart, replay_on_another_path)

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import itertools
 import random
-from typing import Callable
+from typing import Callable, Sequence
 
 from drone_mesh.communication import messages
-from drone_mesh.communication.beacon.packets import NO_ANCESTORS, Beacon
+from drone_mesh.communication.beacon.packets import NO_ANCESTORS, NONE_BELOW, Beacon, Below
 from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE
 from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.lab.proofs.stranger import Stranger
@@ -78,6 +78,15 @@ def beacons_ahead(stranger: Stranger) -> None:
     _beacons(stranger, AHEAD)
 
 
+def beacons_of_all(stranger: Stranger) -> None:
+    """Claim in beacons to lead to every drone, anew each time, and forward nothing.
+
+    The newest announcement of a drone counts.
+    """
+    drones = tuple(node for node in stranger.network.nodes if node)
+    _beacons(stranger, ahead=0, lists=(NONE_BELOW, Below(0, drones)))
+
+
 def beacons_in_names(stranger: Stranger) -> None:
     """Say in beacons of each neighbour that it has no gateway and will be silent for long."""
     lost = Beacon(NO_ROUTE, 0, NO_ROUTE, NO_ROUTE, NO_ANCESTORS, 12.0).to_body(BEACON_ROOM)
@@ -86,8 +95,11 @@ def beacons_in_names(stranger: Stranger) -> None:
             stranger.say(MessageType.BEACON, name, node, BROADCAST, lost)
 
 
-def _beacons(stranger: Stranger, ahead: int) -> None:
-    """Send beacons of a node beside the gateway, so many numbers ahead of its newest one."""
+def _beacons(stranger: Stranger, ahead: int, lists: Sequence[Below] = (NONE_BELOW,)) -> None:
+    """Send beacons of a node beside the gateway, so many numbers ahead of its newest one.
+
+    They take turns with the `lists` of the nodes below.
+    """
     newest = 0
 
     def note(payload: bytes) -> None:
@@ -98,16 +110,19 @@ def _beacons(stranger: Stranger, ahead: int) -> None:
             newest = newest if beacon is None else beacon.number
 
     stranger.on_packet = note
-    for _ in stranger.every(0.5, CLAIMING_S):
-        body = Beacon(0, (newest + ahead) % 256, 1, 0, NO_ANCESTORS, 0.5).to_body(BEACON_ROOM)
+    for _, below in zip(stranger.every(0.5, CLAIMING_S), itertools.cycle(lists)):
+        beacon = Beacon(0, (newest + ahead) % 256, 1, 0, NO_ANCESTORS, 0.5, below=below)
         for node in stranger.in_range():
-            if node:
-                stranger.say(MessageType.BEACON, stranger.node_id, node, BROADCAST, body)
+            body = beacon.to_body(BEACON_ROOM)
+            stranger.say(MessageType.BEACON, stranger.node_id, node, BROADCAST, body)
 
 
 BY_BEACONS: tuple[Callable[[Stranger], None], ...] = (
     beacon_black_hole,
     beacons_ahead,
+    beacons_of_all,
     beacons_in_names,
 )
 """Those on meshes with the technique `beacon`."""
+FOR_PACKETS_DOWN = (beacons_of_all,)
+"""Those on the packets of the gateway; the others are on those for it."""

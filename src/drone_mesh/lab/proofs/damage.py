@@ -21,7 +21,7 @@ from drone_mesh.lab.proofs.attacks import (
     invented_ids,
     plausible_bid,
 )
-from drone_mesh.lab.proofs.claims import BY_BEACONS
+from drone_mesh.lab.proofs.claims import BY_BEACONS, FOR_PACKETS_DOWN
 from drone_mesh.lab.proofs.stranger import BESIDE, Stranger
 
 NODES, SHARED_NODES = 25, 9
@@ -47,7 +47,7 @@ class Threat(enum.Enum):
 class Damage(NamedTuple):
     """The damage of one attack on one mesh."""
 
-    cut_off: float  # share of routers without a working path to a gateway, mean during the attack
+    cut_off: float  # share of routers without a working path, mean during the attack
     later: float  # the same, one minute after the attack
     lured: int  # drones more than LURED_M from their proper positions
     metres: float  # distance of the farthest of them
@@ -85,9 +85,10 @@ def trial(name: str, threat: Threat, seed: int) -> Damage:
     if threat is Threat.CAPTURED:
         _join_neighbours(stranger)
     shares: list[float] = []
+    is_down = attack in FOR_PACKETS_DOWN
 
     def sample(_: object) -> None:
-        shares.append(share_cut_off(network, stranger.swallows))
+        shares.append(share_cut_off(network, stranger.swallows, is_down))
         network.clock.call_at(network.now_s() + SAMPLE_PERIOD_S, sample, None)
 
     sample(None)
@@ -96,19 +97,20 @@ def trial(name: str, threat: Threat, seed: int) -> Damage:
     lured = _away(network, places, stranger.ordered)
     stranger.antenna.stop_antenna()
     network.run_for(RECOVERY_S)
-    return Damage(
-        cut_off, share_cut_off(network, stranger.swallows), len(lured), max(lured, default=0.0)
-    )
+    later = share_cut_off(network, stranger.swallows, is_down)
+    return Damage(cut_off, later, len(lured), max(lured, default=0.0))
 
 
-def share_cut_off(network: Network, swallow: AbstractSet[int]) -> float:
+def share_cut_off(network: Network, swallow: AbstractSet[int], down: bool = False) -> float:
     """The share of powered routers whose packets would not arrive at a gateway.
 
-    `swallow`: nodes that drop packets for other nodes; they do not count.
+    `down`: to which the gateway's would not arrive. `swallow`: nodes that drop packets for other
+    nodes; they do not count.
     """
     routers = [n for n, node in network.nodes.items() if not node.is_gateway and n not in swallow]
     powered = [n for n in routers if network.nodes[n].antenna.powered]
-    return sum(not _arrives(network, n, swallow) for n in powered) / len(powered)
+    arrives = _arrives_down if down else _arrives
+    return sum(not arrives(network, n, swallow) for n in powered) / len(powered)
 
 
 TABLE_HEAD = (
@@ -170,9 +172,20 @@ def _arrives(network: Network, node: int, swallow: AbstractSet[int]) -> bool:
     gateway = component.get_preferred_gateway()
     if not component.get_connected_to_gateway() or gateway not in network.nodes:
         return False
-    path = [node]
-    while path[-1] != gateway:
-        step = network.nodes[path[-1]].component.get_direction_to(gateway)
+    return _leads(network, node, gateway, swallow)
+
+
+def _arrives_down(network: Network, node: int, swallow: AbstractSet[int]) -> bool:
+    """The same for a packet of the node's gateway for it."""
+    gateway = network.nodes[node].component.get_preferred_gateway()
+    return gateway in network.nodes and _leads(network, gateway, node, swallow)
+
+
+def _leads(network: Network, from_: int, to: int, swallow: AbstractSet[int]) -> bool:
+    """Whether the next hops lead there over live links."""
+    path = [from_]
+    while path[-1] != to:
+        step = network.nodes[path[-1]].component.get_direction_to(to)
         if step == NO_ROUTE or step in path or step not in network.links(path[-1]):
             return False
         if step not in network.nodes or step in swallow:
