@@ -43,7 +43,7 @@ NOT_HELD = (MessageType.MOVEMENT_NEGOTIATION, MessageType.FOUND)  # soon sent ag
 SEALED_ROOM = 20  # bytes of a beacon with a seal
 MOVED = 0.05  # of the range: a drone that is further from where it stood flies; from where the
 # others expect it, it has turned
-DRIVER_TRIES = 5  # per hop: nearly all that fail five are out of reach; more delay the others
+DRIVER_TRIES = 4  # per hop: more delay the packet, which another neighbour may take at once
 
 
 class BeaconPlane(IControlPlane):
@@ -57,7 +57,11 @@ class BeaconPlane(IControlPlane):
         room = self._room = messages.BODY_BYTES - basics.seals.reserved_bytes(MessageType.BEACON)
         self._body = slice(messages.HEADER_BYTES, messages.HEADER_BYTES + room)
         self._routes = self.routes = BeaconRoutes(
-            self._me, states is None, basics.range_m, basics.neighbours.place_of
+            self._me,
+            states is None,
+            basics.range_m,
+            basics.neighbours.place_of,
+            self._antenna.medium.shared,
         )
         self._step_m = MOVED * basics.range_m
         self._motion = OwnMotion(basics.pilot.place, self._step_m)

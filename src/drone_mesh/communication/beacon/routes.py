@@ -31,6 +31,7 @@ _WAY_UP = itemgetter(
 _UNTIL_S = attrgetter("until_s")
 
 FRESH = 2.5  # intervals: a neighbour that was silent for longer is none
+DUE = 1.2  # intervals, with their jitter: until then a neighbour's next beacon is not late
 BACK = 2  # sequence numbers: a new neighbour that is further behind the others may lead nowhere
 STALE = 5.0  # intervals: a neighbour whose number was not a new one for longer leads nowhere
 REACH = 0.97  # of the range: two nodes further apart are expected to lose each other
@@ -57,14 +58,15 @@ class Neighbour:
     """What is known of one neighbour."""
 
     __slots__ = (
-        "alive_s", "announced_s", "apart_m", "beacon", "failed_s", "heard_s", "listed_s", "loss",
-        "motion", "near_s", "node", "reported_s", "until_s",
+        "alive_s", "announced_s", "apart_m", "beacon", "doubted_s", "failed_s", "heard_s",
+        "listed_s", "loss", "motion", "near_s", "node", "reported_s", "until_s",
     )  # fmt: skip
 
     def __init__(self, node: int) -> None:
         self.node = node
         self.beacon: Beacon
         self.heard_s = self.alive_s = self.failed_s = -math.inf
+        self.doubted_s = -math.inf  # when it did not take a packet
         self.until_s = -math.inf  # it counts as a neighbour without a further sign of life
         self.motion: Motion | None = None  # the last one that it reported
         self.reported_s = -math.inf
@@ -76,7 +78,7 @@ class Neighbour:
 
     @property
     def usable(self) -> bool:
-        """Whether it was alive since a packet to it failed."""
+        """Whether it was alive since it failed."""
         return self.alive_s > self.failed_s
 
     def heard(self, beacon: Beacon, own: Motion | None, now_s: float) -> None:
@@ -116,8 +118,9 @@ class BeaconRoutes(IRoutes):
         is_gateway: bool,
         range_m: float,
         place_of: Callable[[int], HeardPlace | None],
+        shared: bool,
     ) -> None:
-        """`place_of`: where a node was seen last."""
+        """`place_of`: where a node was seen last; `shared`: whether the channel is."""
         self._node_id = node_id
         self._is_gateway = is_gateway
         self._has_internet = is_gateway
@@ -142,6 +145,7 @@ class BeaconRoutes(IRoutes):
         self._new: set[int] = set()  # below, since this node has announced it last
         self._announced_last = self._shown_last = 0
         self._place_of = place_of
+        self._shared = shared
         self._losses = Losses(range_m)
         self._below_s: dict[int, float] = {}  # the nodes below, and when they were last
 
@@ -205,10 +209,14 @@ class BeaconRoutes(IRoutes):
             neighbour.alive(self.now_s)
 
     def failed(self, node: int) -> None:
-        """A neighbour did not take a packet."""
-        neighbour = self.neighbours.get(node)
-        if neighbour is not None:
-            neighbour.failed_s = self.now_s
+        """A neighbour did not take a packet. On a shared channel that says little, once."""
+        neighbour, now_s = self.neighbours.get(node), self.now_s
+        if neighbour is None:
+            return
+        is_due = now_s - neighbour.alive_s <= DUE * neighbour.beacon.interval_s
+        if not self._shared or not is_due or neighbour.doubted_s > neighbour.alive_s:
+            neighbour.failed_s = now_s
+        neighbour.doubted_s = now_s
 
     def leads_not_to(self, node: int, neighbour: int) -> None:
         """A neighbour returned a packet for `node`."""

@@ -20,7 +20,12 @@ STILL = (0.0, 0.0, 0.0)
 
 @pytest.fixture
 def routes():
-    return BeaconRoutes(9, False, 10.0, lambda _node: None)
+    return BeaconRoutes(9, False, 10.0, lambda _node: None, shared=False)
+
+
+@pytest.fixture
+def shared_routes():
+    return BeaconRoutes(9, False, 10.0, lambda _node: None, shared=True)
 
 
 def beacon(
@@ -97,6 +102,33 @@ def test_a_gateway_without_a_new_number_for_five_intervals_is_lost(routes):
     routes.heard(1, beacon())
     routes.choose()
     assert routes.parent == 255
+
+
+def test_on_a_shared_channel_a_neighbour_may_fail_once_until_it_is_heard_again(shared_routes):
+    routes = shared_routes
+    routes.heard(1, beacon())
+    routes.heard(2, beacon(hops=2, parent=3))
+    routes.choose()
+    routes.now_s = 0.5
+    routes.failed(1)
+    assert ways(routes, 0) == [1, 2]
+    routes.heard(1, beacon())
+    routes.now_s = 0.6
+    routes.failed(1)
+    assert ways(routes, 0) == [1, 2]
+    routes.now_s = 0.7
+    routes.failed(1)
+    assert ways(routes, 0) == [2]
+
+
+def test_on_a_shared_channel_a_neighbour_whose_beacon_is_late_may_not_fail(shared_routes):
+    routes = shared_routes
+    routes.heard(1, beacon())
+    routes.heard(2, beacon(hops=2, parent=3))
+    routes.choose()
+    routes.now_s = 1.3
+    routes.failed(1)
+    assert ways(routes, 0) == [2]
 
 
 def test_a_failed_hop_is_replaced_at_once_and_back_when_it_is_heard_again(routes):
@@ -257,7 +289,7 @@ def test_a_node_is_looked_for_where_it_was_seen():
     class Heard:
         place, heard_s = seen[50]
 
-    routes = BeaconRoutes(9, True, 10.0, lambda _node: Heard)
+    routes = BeaconRoutes(9, True, 10.0, lambda _node: Heard, shared=False)
     routes.motion = Motion(Location(0.0, 0.0, 0.0), STILL)
     routes.heard(1, beacon(hops=1, x=5.0, parent=9))
     routes.heard(2, beacon(hops=1, x=-5.0, parent=9))

@@ -13,7 +13,7 @@ FOR_21 = b"\x15\x07\x00\x02"  # node 21, number 7, two hops left
 
 @pytest.fixture
 def routes():
-    return BeaconRoutes(1, False, 9.0, lambda node: None)
+    return BeaconRoutes(1, False, 9.0, lambda node: None, shared=True)
 
 
 @pytest.fixture
