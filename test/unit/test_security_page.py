@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from drone_mesh.communication import complaints, limits
+from drone_mesh.communication.beacon import plane, trickle
 from drone_mesh.communication.data import packets as data
 from drone_mesh.communication.heartbeats import detours, relay_check
 from drone_mesh.communication.interfaces import BROADCAST, MAX_NODE_ID, PAYLOAD_BYTES
@@ -64,6 +65,9 @@ SENTENCES = [
     f"*Nonces in drones' names*: {claims.CLAIMS_PER_S} a second at the gateway, while the owner "
     f"orders {len(claims.ORDERED)} drones away by {claims.ORDERED_M:g} m",
     f"*with numbers ahead* are {claims.AHEAD} ahead",
+    f"Meanwhile the owner orders {len(claims.ORDERED)} drones away by {claims.ORDERED_M:g} m;",
+    f"again after {plane.PROVES_AGAIN_S:g} to {2 * plane.PROVES_AGAIN_S:g} s until the gateway",
+    f"every {plane.PROVES_S * (1 - trickle.JITTER):g} to {plane.PROVES_S:g} s. It draws",
     f"more than {damage.LURED_M:g} m from their place, or more than {damage.OFF_ORDER_M:g} m from",
     f"| {limits.STRANGERS} losses in {limits.LIMIT_PERIOD_S:g} s; until the "
     f"{limits.LIMIT_PERIOD_S:g} s are over",
@@ -107,7 +111,7 @@ it costs only 2 bytes per message more
 
 256 messages earlier
 
-figures of 2026-11-23
+figures of 2026-11-24
 
 *A counter far ahead*: once in 2 s
 

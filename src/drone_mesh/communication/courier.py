@@ -14,6 +14,7 @@ from drone_mesh.communication import messages
 from drone_mesh.communication.deadlines import Deadlines
 from drone_mesh.communication.interfaces import NO_ROUTE, IWirelessCommunication
 from drone_mesh.communication.messages import ROUTE_RECORD, ROUTE_RECORD_AT
+from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.ways import IDelivery
 
 HOLD, DROP = -1, -2  # verdicts; any other one is the next hop
@@ -183,5 +184,7 @@ class Courier(IDelivery):
 def _identity(payload: bytes) -> Hashable:
     """What does not change on the way of a packet."""
     creator, _from, kind, _to, forward = messages.header(payload)
+    if kind == MessageType.HEARTBEAT:  # counts its hops
+        return messages.identity(payload)
     end = ROUTE_RECORD_AT if kind == ROUTE_RECORD else None
     return creator, kind, forward, payload[messages.HEADER_BYTES : end]

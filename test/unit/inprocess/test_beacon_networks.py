@@ -172,6 +172,21 @@ def test_with_a_key_beacons_are_sealed_and_everything_arrives():
     assert served >= 0.97
 
 
+def test_with_a_key_orders_are_carried_out_soon_and_much_later_and_after_the_gateway_restarts():
+    network = grid(side=4, key=MeshKey(bytes(range(16))))
+    assert network.run_until(network.all_connected, within_s=10.0)
+    network.run_for(12.0)
+    for drone, wait_s in ((15, 0.0), (7, 200.0), (12, 0.0)):
+        network.run_for(wait_s)
+        if drone == 12:
+            network.restart(0)
+            network.run_for(45.0)
+        here = network.location(drone)
+        goal = here._replace(longitude=here.longitude + 1.0)
+        network.order(drone, goal.longitude, goal.latitude)
+        assert network.run_until(lambda: network.location(drone) == goal, within_s=20.0), drone  # noqa: B023
+
+
 def test_with_a_key_no_link_seems_to_lose_beacons_although_only_some_carry_a_place():
     network = grid(side=4, radio="disc", rate=None, key=MeshKey(bytes(range(16))))
     network.run_for(60.0)

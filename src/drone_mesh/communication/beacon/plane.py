@@ -16,7 +16,7 @@ from drone_mesh.communication.beacon.packets import (
 )
 from drone_mesh.communication.beacon.routes import BeaconRoutes, Neighbour
 from drone_mesh.communication.beacon.search import HOPS_AROUND, MOST_HOPS, Searches
-from drone_mesh.communication.beacon.trickle import Trickle
+from drone_mesh.communication.beacon.trickle import JITTER, Trickle
 from drone_mesh.communication.control_plane import IControlHost, IControlPlane, IControlTechnique
 from drone_mesh.communication.courier import DROP, HOLD, Courier, Transit
 from drone_mesh.communication.deadlines import Due
@@ -40,6 +40,8 @@ DIGEST_EVERY = 4  # beacons: one of so many carries the digest of the origin
 MOST_WAYS = 3  # our choice: to which one node sends a packet down; after that it searches
 SEARCHES_S = 0.6  # our choice: a relay without a way searches for so long, then returns a packet
 NOT_HELD = (MessageType.MOVEMENT_NEGOTIATION, MessageType.FOUND)  # soon sent again
+PROVES_S = 30.0  # our choice: a router and its gateway tell each other the nonces of their seals
+PROVES_AGAIN_S = 5.0  # our choice: until the gateway has answered twice
 SEALED_ROOM = 20  # bytes of a beacon with a seal
 MOVED = 0.05  # of the range: a drone that is further from where it stood flies; from where the
 # others expect it, it has turned
@@ -88,6 +90,9 @@ class BeaconPlane(IControlPlane):
         self._was_connected = self._told = False
         self._told_place: Location | None = None  # of the gateway
         self._unproven: int | None = None  # the gateway's newest number when the parent was chosen
+        self._sealed = basics.seals.reserved_bytes(MessageType.HEARTBEAT) > 0
+        self._prove_s = math.inf  # when this router sends its next heartbeat
+        self._proven: int | None = None  # the gateway that answered the last one
         self.learn = self._learn
         self.forward = self._courier.forward
 
@@ -110,6 +115,8 @@ class BeaconPlane(IControlPlane):
             self._retry(now_s)
         if now_s >= self._trickle.due_s:
             self._send_beacon()
+        if now_s >= self._prove_s:
+            self._prove(now_s)
         self._plan()
 
     def check(self, due_s: float) -> None:
@@ -206,6 +213,8 @@ class BeaconPlane(IControlPlane):
         if before[0] not in (gateway, NO_ROUTE):
             self._basics.report(MeshEventKind.GATEWAY_CHANGED, gateway)
             self._basics.places.forget_gateway()
+            if self._sealed and self._states is not None:
+                self._prove_s = now_s
         self._show()
 
     def _show(self) -> None:
@@ -234,6 +243,8 @@ class BeaconPlane(IControlPlane):
             )
             self._told = False
             self._tell()
+            if self._sealed and self._prove_s == math.inf:
+                self._prove_s = self._routes.now_s
         else:
             states.happened(RouterEvent.ROUTE_LOST)
             self._basics.report(MeshEventKind.DISCONNECTED, self._routes.gateway)
@@ -270,6 +281,7 @@ class BeaconPlane(IControlPlane):
             due_s = min(due_s, self._retry_s)
         if self._states is not None and not self._states.connected:
             due_s = min(due_s, self._check_s)
+        due_s = min(due_s, self._prove_s)
         self._deadlines.set(Due.ROUTING, max(due_s, routes.now_s))
 
     # Beacons ---------------------------------------------------------------------------------
@@ -383,6 +395,32 @@ class BeaconPlane(IControlPlane):
         """The radio has acknowledged it; a beacon spares the other children the same question."""
         self._set_time()
         self._trickle.answer(self._routes.now_s, alone=True)
+        self._plan()
+
+    # With a key ------------------------------------------------------------------------------
+
+    def _prove(self, now_s: float) -> None:
+        """Tell the gateway the nonce of this node's seals; orders and reports need one."""
+        me, gateway = self._me, self._routes.gateway
+        if self._routes.parent == NO_ROUTE:
+            self._prove_s = math.inf
+            return
+        self._prove_s = now_s + PROVES_AGAIN_S * (1.0 + self._basics.rng.random())
+        self._courier.send_own(messages.heartbeat(me, me, gateway, gateway, True, gateway))
+
+    def receive_heartbeat(self, payload: bytes, creator: int, from_: int) -> None:
+        """A router tells this gateway its nonce, or the gateway answers."""
+        self._set_time()
+        now_s = self._routes.now_s
+        if not self._sealed:
+            self._basics.complaints.dropped("a heartbeat of another technique", payload, now_s)
+        elif self._states is None:
+            me = self._me
+            self._courier.send_own(messages.heartbeat(me, me, creator, creator, True, me))
+        elif creator == self._routes.gateway:
+            if self._proven == creator:  # its second answer: by now it has a proof of this node
+                self._prove_s = now_s + PROVES_S * (1.0 - JITTER * self._basics.rng.random())
+            self._proven = creator
         self._plan()
 
     # Packets ---------------------------------------------------------------------------------

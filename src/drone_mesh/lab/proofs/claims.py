@@ -5,6 +5,7 @@ Like those in `attacks`.
 
 from __future__ import annotations
 
+import functools
 import itertools
 import random
 from typing import Callable, Sequence
@@ -60,9 +61,7 @@ def claimed_nonces(stranger: Stranger) -> None:
     kinds = (MessageType.PRESENT, MessageType.HEARTBEAT)
     claims = itertools.cycle(itertools.product(kinds, names))
     for drone in ORDERED:
-        here = network.location(drone)
-        goal = stranger.ordered[drone] = here._replace(longitude=here.longitude - ORDERED_M)
-        network.order(drone, goal.longitude, goal.latitude, allow_shared_place=True)
+        _order_away(stranger, drone)
         periods = stranger.every(1.0 / CLAIMS_PER_S, ORDER_PERIOD_S)
         for _, (kind, name) in zip(periods, claims):
             stranger.say(kind, name, 0, 0, b"\1\0\1")
@@ -79,11 +78,15 @@ def beacons_ahead(stranger: Stranger) -> None:
 
 
 def beacons_of_all(stranger: Stranger) -> None:
-    """Claim in beacons to lead to every drone, anew each time, and forward nothing.
+    """Claim in beacons to lead to every drone, anew each time, while the owner sends eight away.
 
-    The newest announcement of a drone counts.
+    The newest announcement of a drone counts. The stranger forwards nothing.
     """
-    drones = tuple(node for node in stranger.network.nodes if node)
+    network = stranger.network
+    for turn, drone in enumerate(ORDERED, 1):
+        at_s = network.now_s() + turn * CLAIMING_S / 10
+        network.clock.call_at(at_s, functools.partial(_order_away, stranger), drone)
+    drones = tuple(node for node in network.nodes if node)
     _beacons(stranger, ahead=0, lists=(NONE_BELOW, Below(0, drones)))
 
 
@@ -93,6 +96,14 @@ def beacons_in_names(stranger: Stranger) -> None:
     for _ in stranger.every(0.5, CLAIMING_S):
         for node, name in itertools.permutations(stranger.in_range(), 2):
             stranger.say(MessageType.BEACON, name, node, BROADCAST, lost)
+
+
+def _order_away(stranger: Stranger, drone: int) -> None:
+    """The owner sends a drone away."""
+    network = stranger.network
+    here = network.location(drone)
+    goal = stranger.ordered[drone] = here._replace(longitude=here.longitude - ORDERED_M)
+    network.order(drone, goal.longitude, goal.latitude, allow_shared_place=True)
 
 
 def _beacons(stranger: Stranger, ahead: int, lists: Sequence[Below] = (NONE_BELOW,)) -> None:
@@ -112,8 +123,8 @@ def _beacons(stranger: Stranger, ahead: int, lists: Sequence[Below] = (NONE_BELO
     stranger.on_packet = note
     for _, below in zip(stranger.every(0.5, CLAIMING_S), itertools.cycle(lists)):
         beacon = Beacon(0, (newest + ahead) % 256, 1, 0, NO_ANCESTORS, 0.5, below=below)
+        body = beacon.to_body(BEACON_ROOM)
         for node in stranger.in_range():
-            body = beacon.to_body(BEACON_ROOM)
             stranger.say(MessageType.BEACON, stranger.node_id, node, BROADCAST, body)
 
 
