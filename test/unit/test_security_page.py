@@ -67,7 +67,7 @@ SENTENCES = [
     f"*with numbers ahead* are {claims.AHEAD} ahead",
     f"Meanwhile the owner orders {len(claims.ORDERED)} drones away by {claims.ORDERED_M:g} m;",
     f"again after {plane.PROVES_AGAIN_S:g} to {2 * plane.PROVES_AGAIN_S:g} s until the gateway",
-    f"every {plane.PROVES_S * (1 - trickle.JITTER):g} to {plane.PROVES_S:g} s. It draws",
+    f"every {plane.PROVES_S * (1 - trickle.JITTER):g} to {plane.PROVES_S:g} s. After a restart",
     f"more than {damage.LURED_M:g} m from their place, or more than {damage.OFF_ORDER_M:g} m from",
     f"| {limits.STRANGERS} losses in {limits.LIMIT_PERIOD_S:g} s; until the "
     f"{limits.LIMIT_PERIOD_S:g} s are over",

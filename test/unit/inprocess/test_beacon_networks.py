@@ -180,7 +180,7 @@ def test_with_a_key_orders_are_carried_out_soon_and_much_later_and_after_the_gat
         network.run_for(wait_s)
         if drone == 12:
             network.restart(0)
-            network.run_for(45.0)
+            network.run_for(75.0)
         here = network.location(drone)
         goal = here._replace(longitude=here.longitude + 1.0)
         network.order(drone, goal.longitude, goal.latitude)
