@@ -28,9 +28,7 @@ def test_the_later_of_two_radios_with_one_id_gives_way_and_both_name_it(routing,
     mesh.run_for(11.0)
     twin.add_router(2, 6.0, 5.0, start_s=mesh.now_s())
     earlier, later = mesh.nodes[2].component, twin.nodes[2].component
-    # The later one is back for a second or two in 30 to 60 s. With a key, that is when the earlier
-    # one has to challenge it, and some of these frames collide.
-    assert mesh.run_until(lambda: earlier.get_shares_id() and later.get_shares_id(), within_s=300.0)
+    assert mesh.run_until(lambda: earlier.get_shares_id() and later.get_shares_id(), within_s=120.0)
     mesh.run_for(2.0)
     for _ in range(8):
         mesh.run_for(5.0)
