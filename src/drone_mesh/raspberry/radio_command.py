@@ -161,6 +161,8 @@ def _opened(options: argparse.Namespace) -> Iterator[tuple[FieldRadio, IrqPin | 
         else:
             spi, ce, irq = wired_hardware(options).open()
             runtime = SystemRuntime()
+        if irq is not None:
+            stack.callback(irq.close)
         radio = FieldRadio(spi, ce, options.id, settings, runtime)
         stack.callback(radio.close)
         yield radio, irq

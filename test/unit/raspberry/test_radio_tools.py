@@ -21,6 +21,7 @@ from drone_mesh.raspberry import radio_tests
 from drone_mesh.raspberry.field_radio import FieldRadio
 from drone_mesh.raspberry.options import parse_gateway
 from drone_mesh.raspberry.radio_command import main
+from drone_mesh.raspberry.wiring_options import Hardware
 
 SETTINGS = RadioSettings()
 
@@ -226,3 +227,14 @@ def test_a_report_holds_checks_scan_and_machine(tmp_path, capsys):
 def test_without_hardware_it_says_what_to_do_and_fails(capsys):
     assert main(["--spi", "99.0", "check"]) == 1
     assert capsys.readouterr().err.startswith("FAIL ")
+
+
+def test_it_releases_spi_and_both_pins_when_it_ends(rig, monkeypatch, capsys):
+    closed = []
+    for name in ("spi", "ce", "irq"):
+        device = getattr(rig.chip, name)
+        monkeypatch.setattr(device, "close", lambda name=name: closed.append(name), raising=True)
+    wired = (rig.chip.spi, rig.chip.ce, rig.chip.irq)
+    monkeypatch.setattr(Hardware, "open", lambda _hardware: wired)
+    assert main(["--irq", "24", "check"]) == 0, capsys.readouterr().err
+    assert sorted(closed) == ["ce", "irq", "spi"]
