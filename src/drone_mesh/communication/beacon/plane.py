@@ -213,8 +213,7 @@ class BeaconPlane(IControlPlane):
         if before[0] not in (gateway, NO_ROUTE):
             self._basics.report(MeshEventKind.GATEWAY_CHANGED, gateway)
             self._basics.places.forget_gateway()
-            if self._sealed and self._states is not None:
-                self._prove_s = now_s
+            self._prove_soon()
         self._show()
 
     def _show(self) -> None:
@@ -243,8 +242,8 @@ class BeaconPlane(IControlPlane):
             )
             self._told = False
             self._tell()
-            if self._sealed and self._prove_s == math.inf:
-                self._prove_s = self._routes.now_s
+            if self._prove_s == math.inf:
+                self._prove_soon()
         else:
             states.happened(RouterEvent.ROUTE_LOST)
             self._basics.report(MeshEventKind.DISCONNECTED, self._routes.gateway)
@@ -398,6 +397,11 @@ class BeaconPlane(IControlPlane):
         self._plan()
 
     # With a key ------------------------------------------------------------------------------
+
+    def _prove_soon(self) -> None:
+        """A new gateway: many routers find it at the same moment, while handshakes fill the air."""
+        if self._sealed and self._states is not None:
+            self._prove_s = self._routes.now_s + PROVES_AGAIN_S * self._basics.rng.random()
 
     def _prove(self, now_s: float) -> None:
         """Tell the gateway the nonce of this node's seals; orders and reports need one."""
