@@ -11,6 +11,7 @@ A node has no further idea of a neighbour, a connection or a route than its cont
 from __future__ import annotations
 
 import abc
+import math
 from typing import Callable
 
 from drone_mesh.communication.interfaces import IMeshDebugInfo
@@ -138,6 +139,10 @@ class IControlPlane(abc.ABC):
     @abc.abstractmethod
     def next_hop(self) -> int:
         """The next hop to the preferred gateway, or NO_ROUTE."""
+
+    def heard_s(self, node: int) -> float:
+        """When a packet of `node`, no neighbour, came last; -inf: not recorded. Any thread."""
+        return -math.inf
 
     @abc.abstractmethod
     def may_use(self, gateway: int) -> bool:

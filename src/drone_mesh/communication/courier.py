@@ -58,11 +58,12 @@ class Courier(IDelivery):
         on_sent: Callable[[int], None],
         on_failed: Callable[[int], None],
         on_returned: Callable[[int, int], None],
+        without_proof: Callable[[bytes], bytes],
     ) -> None:
         """`attempts`: of a packet for one neighbour where the antenna itself makes only one.
 
         `on_sent`, `on_failed`: a neighbour took a packet, or did not; `on_returned`: it sent one
-        back, for this addressee.
+        back, for this addressee; `without_proof`: see IMeshSeals.
         """
         self._node_id = node_id
         self._antenna = antenna
@@ -72,6 +73,7 @@ class Courier(IDelivery):
         self._on_sent = on_sent
         self._on_failed = on_failed
         self._on_returned = on_returned
+        self._without_proof = without_proof
         self._held: list[Transit] = []
         # Two tables used in turn, so that old packets are forgotten without a search for them.
         self._known: dict[Hashable, Transit] = {}
@@ -87,14 +89,14 @@ class Courier(IDelivery):
     def send_own(self, payload: bytes) -> bool:
         """Send this node's own packet towards its addressee, or hold it for a while."""
         transit = Transit(payload, NO_ROUTE, self._deadlines.now_s)
-        self._remember(_identity(payload), transit)
+        self._remember(self._identity(payload), transit)
         return self._carry(transit)
 
     def forward(
         self, payload: bytes, creator: int, from_: int, kind: int, forward: int, now_s: float
     ) -> None:
         """Carry a packet for another node; one that came back goes another way."""
-        identity = _identity(payload)
+        identity = self._identity(payload)
         transit = self._known.get(identity) or self._earlier.get(identity)
         if transit is None or now_s - transit.seen_s >= REMEMBERED_S:
             if creator == self._node_id:
@@ -122,7 +124,7 @@ class Courier(IDelivery):
         self.total_sent -= 1
         to, now_s = messages.receiver(payload), self._deadlines.now_s
         self._on_failed(to)
-        identity = _identity(payload)
+        identity = self._identity(payload)
         transit = self._known.get(identity) or self._earlier.get(identity)
         if transit is None or to == NO_ROUTE:
             return
@@ -173,18 +175,22 @@ class Courier(IDelivery):
             self._on_failed(to)
         return False
 
+    def _identity(self, payload: bytes) -> Hashable:
+        """What does not change on the way of a packet; of an own one, before it was sealed.
+
+        The proof in a packet of another node counts: a forged one is not the same packet.
+        """
+        creator, _from, kind, _to, forward = messages.header(payload)
+        if creator == self._node_id:
+            payload = self._without_proof(payload)
+        if kind == MessageType.HEARTBEAT:  # counts its hops
+            return messages.identity(payload)
+        end = ROUTE_RECORD_AT if kind == ROUTE_RECORD else None
+        return creator, kind, forward, payload[messages.HEADER_BYTES : end]
+
     def _remember(self, identity: Hashable, transit: Transit) -> None:
         now_s = self._deadlines.now_s
         if now_s >= self._turn_s:
             self._turn_s = now_s + REMEMBERED_S
             self._known, self._earlier = {}, self._known
         self._known[identity] = transit
-
-
-def _identity(payload: bytes) -> Hashable:
-    """What does not change on the way of a packet."""
-    creator, _from, kind, _to, forward = messages.header(payload)
-    if kind == MessageType.HEARTBEAT:  # counts its hops
-        return messages.identity(payload)
-    end = ROUTE_RECORD_AT if kind == ROUTE_RECORD else None
-    return creator, kind, forward, payload[messages.HEADER_BYTES : end]

@@ -131,6 +131,7 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
                 continue
             next_hop = self.control.routes.get_direction_to_node(node)
             hops, heard_s = self._heartbeats.get(node, (NO_ROUTE, -math.inf))
+            heard_s = max(heard_s, self.control.heard_s(node))
             heard_s = max(heard_s, self._neighbours.last_heard_s(node, otherwise=-math.inf))
             if next_hop != NO_ROUTE or heard_s > -math.inf:
                 nodes.append(KnownNode(node, next_hop, hops, heard_s))

@@ -221,6 +221,10 @@ class IMeshSeals:
         """Proves that `creator` acknowledges this to `to`; empty without a key."""
         return b""
 
+    def without_proof(self, payload: bytes) -> bytes:
+        """A packet that this node created, as it was before the seal proved that."""
+        return payload
+
     def may_be_gateway(self, node: int) -> bool:
         """Whether to believe a forwarded packet that `node` is a gateway."""
         return True

@@ -138,7 +138,7 @@ class MessageType(enum.IntEnum):
             PacketKind.INTRODUCTION, _CONTROL, _BEACON, "Beacon", answered=False, jittered=False
         ),
     )
-    # It looks for a node; that or a neighbour of it answers; a question for a sign of life
+    # It looks for a node, which answers; a question for a sign of life
     SEARCH = 41, PacketType(PacketKind.REPORT, _CONTROL, _SEARCH, "Search", answered=False)
     FOUND = 42, PacketType(PacketKind.REPORT, _CONTROL, "uint8 node", "Found")
     PROBE = 43, PacketType(PacketKind.HEARTBEAT, _CONTROL)

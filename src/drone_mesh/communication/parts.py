@@ -16,6 +16,7 @@ from drone_mesh.communication.places import KnownPlaces
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.communication.ways import IDelivery, IRoutes
 from drone_mesh.drone.interfaces import IDroneEngine
+from drone_mesh.drone.location import Location
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,14 @@ class NodeBasics:
     def now_s(self) -> float:
         """The time of the component's latest call."""
         return self.deadlines.now_s
+
+    def may_be_at(self, place: Location, gateway: bool) -> bool:
+        """Whether the gateway, or else the next hop, can be at `place`; complains if not."""
+        possible = self.places.is_possible(place, self.range_m, gateway)
+        if not possible:
+            reason = f"a place where the {'gateway' if gateway else 'next hop'} cannot be"
+            self.complaints.add(reason, place.in_words(), self.now_s)
+        return possible
 
 
 @dataclass(frozen=True)

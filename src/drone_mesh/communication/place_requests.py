@@ -13,7 +13,7 @@ from typing import NamedTuple
 from drone_mesh.communication import messages
 from drone_mesh.communication.interfaces import BROADCAST
 from drone_mesh.communication.packet_types import MessageType
-from drone_mesh.communication.parts import NodeParts
+from drone_mesh.communication.parts import NodeBasics, NodeParts
 from drone_mesh.drone.location import Location
 
 NEAR_CLEARANCES = 3.0  # our choice: a drone that moves aside once is still within that
@@ -24,15 +24,15 @@ _OLDEST_AGE_S = 2**16 - 1
 
 def ask_for_place(parts: NodeParts, node: int) -> None:
     """Ask `node` for its place, along the route to it."""
-    parts.delivery.send_own(_request(parts, node))
+    parts.delivery.send_own(request(parts, node))
 
 
 def ask_all_for_places(parts: NodeParts, may_fly_on: bool = False) -> None:
     """Ask every node in range for its place; `may_fly_on`: also of others near, as in flight."""
-    parts.antenna.broadcast_message(_request(parts, BROADCAST, may_fly_on))
+    parts.antenna.broadcast_message(request(parts, BROADCAST, may_fly_on))
 
 
-def _request(parts: NodeParts, to: int, may_fly_on: bool = False) -> bytes:
+def request(parts: NodeBasics, to: int, may_fly_on: bool = False) -> bytes:
     """A request with the place of this node: its destination, if it flies."""
     goal = parts.pilot.goal
     place = goal or parts.pilot.place()

@@ -37,6 +37,11 @@ class KnownPlaces:
         here = self.connected_at
         return here is None or math.dist(here, place) <= (hops + 1) * range_m
 
+    @property
+    def asks_gateway(self) -> bool:
+        """Whether only the gateway itself can tell where it is."""
+        return self.gateway is None or self.gateway_disputed or not self._by_gateway
+
     def update_gateway(self, place: Location, seen_s: float) -> None:
         """The preferred gateway itself was at `place` at `seen_s`; older news is ignored."""
         if self.gateway is None or seen_s >= self.gateway_seen_s:

@@ -116,7 +116,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
             return
         if creator == self.control.gateway:
             place = place_in(payload)
-            if self._is_possible(place, gateway=True):
+            if self._parts.may_be_at(place, gateway=True):
                 self.places.update_gateway(place, self._deadlines.now_s)
 
     def receive_movement_negotiation(self, payload: bytes, creator: int, from_: int) -> None:
@@ -134,7 +134,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
             control.gateway_sent_place()
         elif gateway is not None:
             self._on_gateway_place(gateway)
-        if (is_gateway or is_next_hop) and not self._is_possible(location, is_gateway):
+        if (is_gateway or is_next_hop) and not self._parts.may_be_at(location, is_gateway):
             return
         self._neighbours.set_place(node, location, now_s)
         if is_gateway:
@@ -159,18 +159,11 @@ class MeshnetworkRouter(MeshnetworkComponent):
             self._on_gateway_place(gateway)
 
     def _on_gateway_place(self, gateway: GatewayPlace) -> None:
-        if self._is_possible(gateway.place, gateway=True) and self.control.may_use(gateway.gateway):
+        if self._parts.may_be_at(gateway.place, gateway=True) and self.control.may_use(
+            gateway.gateway
+        ):
             seen_s = self._deadlines.now_s - gateway.age_s
             self.places.hear_of_gateway(gateway.place, seen_s, self._states.connected)
-
-    def _is_possible(self, place: Location, gateway: bool) -> bool:
-        """Whether the gateway, or else the next hop, can be at `place`."""
-        possible = self.places.is_possible(place, self._options.range_m, gateway)
-        if not possible:
-            who = "gateway" if gateway else "next hop"
-            reason = f"a place where the {who} cannot be"
-            self.complaints.add(reason, place.in_words(), self._deadlines.now_s)
-        return possible
 
     def _on_neighbour_found(self, node: int) -> None:
         self._repair.on_neighbour_found(node)

@@ -178,6 +178,8 @@ class Beacon(NamedTuple):
         Places are the nearest to `here` that fit the bytes; without a `here` they are left out.
         """
         flags, interval, gateway, number, hops, parent, ancestors = _HEAD.unpack_from(body)
+        if MAX_NODE_ID < gateway != NO_ROUTE:
+            return None
         parts = (_HAS_PLACE, _PLACE), (_HAS_DIGEST, _DIGEST), (_HAS_GATEWAY_PLACE, _GATEWAY_PLACE)
         sizes = sum(part.size for flag, part in parts if flags & flag)
         if _HEAD.size + sizes + 1 + (flags & _COUNT) > len(body):

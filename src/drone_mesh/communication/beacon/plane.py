@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from drone_mesh.communication import messages
+from drone_mesh.communication import messages, place_requests
+from drone_mesh.communication.beacon.losses import LUCKY
 from drone_mesh.communication.beacon.own_motion import OwnMotion
 from drone_mesh.communication.beacon.packets import (
     Beacon,
@@ -36,9 +37,10 @@ LATE = 1.25  # intervals, with their jitter: then a beacon of the parent was los
 TURN_HOPS = 8  # for each neighbour: children ask one after the other, and the answer is for all
 LATE_S = 2.0  # our choice: one lost beacon of a frequent sender says little
 GATEWAY_PLACE_EVERY = 4  # beacons: one of so many carries the gateway's place
-DIGEST_EVERY = 4  # beacons: one of so many carries the digest of the origin
+DIGEST_EVERY = 4  # beacons: one of so many carries the digest of the origin, not the same
 MOST_WAYS = 3  # our choice: to which one node sends a packet down; after that it searches
 SEARCHES_S = 0.6  # our choice: a relay without a way searches for so long, then returns a packet
+WITHOUT_BEACONS_S = 5.0  # our choice: 2.5 of the longest intervals, and more
 NOT_HELD = (MessageType.MOVEMENT_NEGOTIATION, MessageType.FOUND)  # soon sent again
 PROVES_S = 60.0  # our choice: a router and its gateway tell each other the nonces of their seals
 PROVES_AGAIN_S = 5.0  # our choice: until the gateway has answered twice
@@ -77,6 +79,7 @@ class BeaconPlane(IControlPlane):
             self._routes.alive,
             self._failed,
             lambda from_, node: self._routes.leads_not_to(node, from_),
+            basics.seals.without_proof,
         )
         self._trickle = Trickle(self._antenna.medium, basics.rng)
         self._searches = Searches(
@@ -130,6 +133,7 @@ class BeaconPlane(IControlPlane):
             self._trickle.start(self._routes.now_s)
         else:
             self._routes.neighbours.clear()
+            self._basics.neighbours.forget_all()  # it is this node that has fallen silent
             self._look_round()
         self._plan()
 
@@ -163,6 +167,10 @@ class BeaconPlane(IControlPlane):
         for node in routes.expired():
             self._trickle.reset(now_s)
             self._lost(node)
+        heard = self._basics.neighbours
+        for node in heard.ids().difference(routes.neighbours):  # it has sent other packets
+            if now_s - heard.last_heard_s(node, now_s) > WITHOUT_BEACONS_S:
+                self._lost(node)
         parent = routes.neighbours.get(routes.parent)
         if parent is not None and parent.usable and self._is_silent(parent):
             self._probed_s = now_s
@@ -225,13 +233,16 @@ class BeaconPlane(IControlPlane):
         if self._unproven is not None and newer(self._routes.number, self._unproven) > 0:
             self._unproven = None
         flies = states.repair is RepairState.FLYING  # over links that it leaves behind
-        places = self._basics.places
+        places, here = self._basics.places, self._routes.motion
+        if connected and not flies:
+            places.connected_here(None if here is None else here.place, self._routes.hops)
         is_proven = self._unproven is None or places.good is None
         if parent != NO_ROUTE and is_proven and not flies:
             neighbour = self._routes.neighbours[parent]
             if neighbour.motion is not None:
                 place, seen_s = neighbour.motion.place, neighbour.reported_s
-                places.update_next_hop(parent, place, seen_s)
+                if self._basics.may_be_at(place, gateway=False):
+                    places.update_next_hop(parent, place, seen_s)
         if connected == self._was_connected:
             return
         self._was_connected = connected
@@ -301,7 +312,7 @@ class BeaconPlane(IControlPlane):
             self._trickle.interval_s,
             routes.motion,
             self._gateway_place(),
-            basics.frame.digest if self._asks or self._sent % DIGEST_EVERY == 0 else 0,
+            basics.frame.digest if self._asks or self._sent % DIGEST_EVERY == 1 else 0,
             self._asks or routes.hops == NO_ROUTE,
             offline=routes.offline,
         )
@@ -320,10 +331,13 @@ class BeaconPlane(IControlPlane):
 
     def _gateway_place(self) -> Location | None:
         """The gateway's place, if it is this beacon's turn to spread it."""
-        place = self._basics.places.gateway
-        is_news, self._told_place = place != self._told_place, place
-        if self._routes.is_root or not is_news and self._sent % GATEWAY_PLACE_EVERY:
+        place, told = self._basics.places.gateway, self._told_place
+        if self._routes.is_root or place is None:
             return None
+        has_moved = told is None or told.distance_m(place) > self._step_m
+        if not has_moved and self._sent % GATEWAY_PLACE_EVERY:
+            return None
+        self._told_place = place
         return place
 
     def _broadcast(self, kind: int, creator: int, body: bytes) -> None:
@@ -348,12 +362,20 @@ class BeaconPlane(IControlPlane):
             self._basics.frame.heard(creator, beacon.digest)
         if self._basics.frame.refuses(creator):
             beacon = beacon._replace(motion=None, gateway_place=None)
+        elif beacon.motion is not None and not self._is_in_reach(beacon.motion.place):
+            reason = "a neighbour's place that is out of reach"
+            self._basics.complaints.add(reason, beacon.motion.place.in_words(), now_s)
+            beacon = beacon._replace(motion=None)
         is_quiet = now_s < self._look_s and not routes.is_news(creator, beacon)
         is_new = routes.heard(creator, beacon)
         self._take_place(creator, beacon)
         if self._courier.holds or not is_quiet:  # few beacons
             self._consider(creator, beacon, is_new)
         self._take_gateway_place(creator, beacon)
+
+    def _is_in_reach(self, place: Location) -> bool:
+        own = self._routes.motion
+        return own is None or own.place.distance_m(place) <= LUCKY * self._basics.range_m
 
     def _consider(self, creator: int, beacon: Beacon, is_new: bool) -> None:
         """What a neighbour's beacon changes."""
@@ -384,11 +406,15 @@ class BeaconPlane(IControlPlane):
         places, now_s = self._basics.places, self._routes.now_s
         if node == self._routes.gateway and beacon.motion is not None:
             places.update_gateway(beacon.motion.place, now_s)
-        here, place = self._routes.motion, beacon.gateway_place
-        if here is not None and place is not None and node == self._routes.parent:
-            farthest_m = (beacon.hops + 1) * self._basics.range_m
-            if here.place.distance_m(place) <= farthest_m:
-                places.update_gateway(place, now_s)
+        place = beacon.gateway_place
+        if place is None or node != self._routes.parent:
+            return
+        if not self._basics.may_be_at(place, gateway=True):
+            return
+        if self._sealed:  # the gateway itself is asked, with a proof
+            places.hear_of_gateway(place, now_s, connected=False)
+        else:
+            places.update_gateway(place, now_s)
 
     def receive_probe(self, payload: bytes, creator: int, from_: int) -> None:
         """The radio has acknowledged it; a beacon spares the other children the same question."""
@@ -411,6 +437,8 @@ class BeaconPlane(IControlPlane):
             return
         self._prove_s = now_s + PROVES_AGAIN_S * (1.0 + self._basics.rng.random())
         self._courier.send_own(messages.heartbeat(me, me, gateway, gateway, True, gateway))
+        if self._basics.places.asks_gateway:
+            self._courier.send_own(place_requests.request(self._basics, gateway))
 
     def receive_heartbeat(self, payload: bytes, creator: int, from_: int) -> None:
         """A router tells this gateway its nonce, or the gateway answers."""
@@ -463,6 +491,7 @@ class BeaconPlane(IControlPlane):
         self._routes.failed(node)
         if node == self._routes.parent:
             self._choose()
+            self._plan()
 
     def _lost(self, node: int) -> None:
         if self._basics.neighbours.lost(node, self._routes.now_s):
@@ -488,7 +517,10 @@ class BeaconPlane(IControlPlane):
             if not is_own and now_s - transit.seen_s >= SEARCHES_S and self._may_return(transit):
                 return transit.came_from
             self._searches.search(transit.addressee, MOST_HOPS if is_own else HOPS_AROUND)
-        self._retry_s = min(max(self._retry_s, now_s), now_s + RETRY_S)
+        if self._retry_s <= now_s:
+            self._retry_s = now_s + RETRY_S
+        due_s = min(self._retry_s, self._deadlines.get(Due.ROUTING))
+        self._deadlines.set(Due.ROUTING, due_s)
         return HOLD
 
     def _may_return(self, transit: Transit) -> bool:
@@ -523,7 +555,9 @@ class BeaconPlane(IControlPlane):
     def receive_found(self, payload: bytes, creator: int, from_: int) -> None:
         """A node that was looked for is that way."""
         self._set_time()
-        self._routes.led_to(Found.from_body(messages.body(payload)).node, from_)
+        node = Found.from_body(messages.body(payload)).node
+        self._searches.found(node)
+        self._routes.led_to(node, from_)
         self._courier.retry()
         self._plan()
 
@@ -542,6 +576,10 @@ class BeaconPlane(IControlPlane):
     def next_hop(self) -> int:
         """The parent."""
         return self._routes.parent
+
+    def heard_s(self, node: int) -> float:
+        """When a packet of it came last over a relay."""
+        return self._routes.led_s(node)
 
     def may_use(self, gateway: int) -> bool:
         """Whether it is the preferred one."""

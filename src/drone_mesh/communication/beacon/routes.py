@@ -62,9 +62,9 @@ class Neighbour:
         "listed_s", "loss", "motion", "near_s", "node", "reported_s", "until_s",
     )  # fmt: skip
 
-    def __init__(self, node: int) -> None:
+    def __init__(self, node: int, beacon: Beacon) -> None:
         self.node = node
-        self.beacon: Beacon
+        self.beacon = beacon
         self.heard_s = self.alive_s = self.failed_s = -math.inf
         self.doubted_s = -math.inf  # when it did not take a packet
         self.until_s = -math.inf  # it counts as a neighbour without a further sign of life
@@ -138,8 +138,9 @@ class BeaconRoutes(IRoutes):
         # By neighbour and gateway: the newest number, and when it came. A number counts only for
         # the neighbour that sent it, so a false one makes no other neighbour look old.
         self._numbers: dict[tuple[int, int], tuple[int, float]] = {}
-        # By gateway, of all neighbours: number, when it came, whether the gateway had no internet.
-        self._newest: dict[int, tuple[int, float, bool]] = {}
+        self._newest: dict[int, tuple[int, float]] = {}  # by gateway, of all neighbours
+        # By gateway: the number on which it, or the parent, said that it has no internet, and when.
+        self._offline: dict[int, tuple[int, float]] = {}
         self._hints: dict[int, tuple[int, float]] = {}  # by node: a neighbour that led to it, when
         self._announced: set[int] = set()  # of the nodes below
         self._new: set[int] = set()  # below, since this node has announced it last
@@ -156,7 +157,8 @@ class BeaconRoutes(IRoutes):
         neighbour = self.neighbours.get(node)
         is_new = neighbour is None
         if neighbour is None:
-            neighbour = self.neighbours[node] = Neighbour(node)
+            neighbour = Neighbour(node, beacon)
+            self.neighbours[node] = neighbour
         if beacon.parent == self._node_id:
             if is_new or neighbour.beacon.parent != self._node_id:
                 self._new.add(node)
@@ -168,12 +170,14 @@ class BeaconRoutes(IRoutes):
             )
         if beacon.gateway not in (NO_ROUTE, self._node_id):
             self._take_number(node, beacon)
+            if node in (beacon.gateway, self.parent):
+                self._take_internet(beacon)
         return is_new
 
     def _take_number(self, node: int, beacon: Beacon) -> None:
         """Note whether a neighbour stands on a newer beacon of the gateway than before."""
         now_s, gateway, number = self.now_s, beacon.gateway, beacon.number
-        newest, newest_s, _offline = self._newest.get(gateway, (number - 1, -math.inf, False))
+        newest, newest_s = self._newest.get(gateway, (number - 1, -math.inf))
         ahead = newer(number, newest)
         known = self._numbers.get((node, gateway))
         if known is None:
@@ -186,7 +190,20 @@ class BeaconRoutes(IRoutes):
         age_s = now_s - newest_s  # mostly less than the neighbour's own interval allows
         is_old = age_s > STALE * beacon.interval_s and age_s > STALE * self._slowest_s()
         if ahead > 0 or is_old:
-            self._newest[gateway] = number, now_s, beacon.offline
+            self._newest[gateway] = number, now_s
+
+    def _take_internet(self, beacon: Beacon) -> None:
+        """Note whether a gateway has internet; others may only say so of their own way to it."""
+        if beacon.offline:
+            self._offline[beacon.gateway] = beacon.number, self.now_s
+        elif not self._is_offline(beacon):
+            self._offline.pop(beacon.gateway, None)
+
+    def _is_offline(self, beacon: Beacon) -> bool:
+        """Whether the gateway had no internet, when it sent the number of this beacon or later."""
+        number, at_s = self._offline.get(beacon.gateway, (0, -math.inf))
+        is_old = self.now_s - at_s > STALE * self._slowest_s() if at_s > -math.inf else True
+        return beacon.offline or (not is_old and newer(beacon.number, number) <= 0)
 
     def is_news(self, node: int, beacon: Beacon) -> bool:
         """Whether a neighbour's beacon may change this node's way up or what it announces."""
@@ -227,6 +244,10 @@ class BeaconRoutes(IRoutes):
     def led_to(self, node: int, neighbour: int) -> None:
         """A packet of `node` came through this neighbour."""
         self._hints[node] = neighbour, self.now_s
+
+    def led_s(self, node: int) -> float:
+        """When a packet of this node came last through a neighbour. Any thread."""
+        return self._hints.get(node, (NO_ROUTE, -math.inf))[1]
 
     def expired(self) -> list[int]:
         """Forget the neighbours that were silent for too long; returns them."""
@@ -276,7 +297,7 @@ class BeaconRoutes(IRoutes):
             self.parent, self.gateway = parent.node, beacon.gateway
             self.hops, self.number = beacon.hops + 1, beacon.number
             self.ancestors = (beacon.parent, *beacon.ancestors)[:ANCESTORS]
-            self.offline = self._newest[beacon.gateway][2]
+            self.offline = self._is_offline(beacon)
         return before != (self.gateway, self.parent, self.hops, self.offline)
 
     def set_internet(self, works: bool) -> None:
@@ -305,7 +326,7 @@ class BeaconRoutes(IRoutes):
 
     def _candidates(self) -> Iterator[Neighbour]:
         """The neighbours that lead to a gateway without leading through this node."""
-        return filter(self._leads_up, self.neighbours.values())
+        return filter(self._leads_up, self._all())
 
     def _leads_up(self, neighbour: Neighbour) -> bool:
         me, beacon = self._node_id, neighbour.beacon
@@ -313,20 +334,21 @@ class BeaconRoutes(IRoutes):
             return False
         if beacon.parent == me or me in beacon.ancestors or not neighbour.usable:
             return False
-        _number, at_s = self._numbers[neighbour.node, beacon.gateway]
+        _number, at_s = self._numbers.get((neighbour.node, beacon.gateway), (0, -math.inf))
         is_fresh = self.now_s - at_s <= STALE * beacon.interval_s  # then it is not stale
         return is_fresh or not self._is_stale(neighbour.node, beacon.gateway)
 
     def _is_stale(self, node: int, gateway: int) -> bool:
-        return self.now_s - self._numbers[node, gateway][1] > STALE * self._slowest_s()
+        _number, at_s = self._numbers.get((node, gateway), (0, -math.inf))
+        return self.now_s - at_s > STALE * self._slowest_s()
 
     def _slowest_s(self) -> float:
-        return max((n.beacon.interval_s for n in self.neighbours.values()), default=0.0)
+        return max((n.beacon.interval_s for n in self._all()), default=0.0)
 
     def _rank(self, neighbour: Neighbour) -> Rank:
         """The lowest is the best way up: few hops over links that last; if equal, the present."""
         cost = self._hops_through(neighbour) + self.risk(neighbour)
-        if self._newest[neighbour.beacon.gateway][2]:
+        if self._is_offline(neighbour.beacon):
             cost += OFFLINE
         return cost, neighbour.node != self.parent, -neighbour.heard_s, neighbour.node
 
@@ -349,13 +371,17 @@ class BeaconRoutes(IRoutes):
         leaves = own.apart_m(soon_s, other, age_s + soon_s) > reach_m
         return max(loss, LEAVES) if leaves else loss
 
+    def _all(self) -> list[Neighbour]:
+        """A copy, as other threads ask for ways, too."""
+        return list(self.neighbours.values())
+
     # Any way -----------------------------------------------------------------------------------
 
     def next_hops(self, node: int, came_from: int) -> list[Way]:
         """The neighbours to try for a packet to `node`, the best first."""
         if node == self.gateway and not self.is_root:
             ranks = sorted(map(self._rank, self._candidates()))
-            return [Way(rank[-1], self.neighbours[rank[-1]].heard_s) for rank in ranks]
+            return [Way(neighbour, -heard) for _cost, _other, heard, neighbour in ranks]
         found: dict[int, Way] = {}  # in order
         direct, last = self.neighbours.get(node), []
         if direct is not None:
@@ -371,8 +397,9 @@ class BeaconRoutes(IRoutes):
             found.setdefault(hint, Way(hint, at_s))
         for _rank, way in sorted(self._announcements(node)):
             found.setdefault(way.neighbour, way)
-        if self.parent != NO_ROUTE and self._comes_from_below(came_from):
-            found.setdefault(self.parent, Way(self.parent, self.neighbours[self.parent].heard_s))
+        parent = self.neighbours.get(self.parent)
+        if parent is not None and self._comes_from_below(came_from):
+            found.setdefault(parent.node, Way(parent.node, parent.heard_s))
         for way in (*self._nearer(node), *last):
             found.setdefault(way.neighbour, way)
         return list(found.values())
@@ -380,7 +407,7 @@ class BeaconRoutes(IRoutes):
     def _next_to(self, node: int) -> list[Way]:
         """The neighbours that hear `node` themselves, the one that showed it last first."""
         shown = []
-        for neighbour in self.neighbours.values():
+        for neighbour in self._all():
             at_s = neighbour.near_s.get(node, -math.inf)
             age_s = self.now_s - at_s
             if age_s < NEAR * neighbour.beacon.interval_s and neighbour.usable:
@@ -389,12 +416,13 @@ class BeaconRoutes(IRoutes):
 
     def _announcements(self, node: int) -> Iterator[tuple[tuple[bool, float], Way]]:
         """The neighbours that announce `node` below them; a child, and the latest, first."""
-        for neighbour in filter(lambda one: one.usable, self.neighbours.values()):
+        for neighbour in filter(lambda one: one.usable, self._all()):
             at_s = neighbour.announced_s.get(node)
             if at_s is not None:
                 is_child = neighbour.beacon.parent == self._node_id
                 age_s = self.now_s - at_s + self.risk(neighbour)
-                yield (not is_child, age_s), Way(neighbour.node, neighbour.listed_s[node])
+                listed_s = neighbour.listed_s.get(node, at_s)
+                yield (not is_child, age_s), Way(neighbour.node, listed_s)
             elif node == neighbour.beacon.parent or node in neighbour.beacon.ancestors:
                 yield (True, math.inf), Way(neighbour.node, neighbour.heard_s)
 
@@ -413,7 +441,7 @@ class BeaconRoutes(IRoutes):
         goal = seen.place
         own_m = self.motion.place.distance_m(goal)
         nearer_ones = []
-        for neighbour in self.neighbours.values():
+        for neighbour in self._all():
             motion = neighbour.motion
             if motion is not None and neighbour.usable and self.risk(neighbour) < GONE:
                 off_m = motion.place.distance_m(goal)

@@ -49,6 +49,10 @@ class Searches:
         search = Search(node, self._number, hops)
         self._broadcast(MessageType.SEARCH, self._node_id, search.to_body())
 
+    def found(self, node: int) -> None:
+        """A search for `node` was not in vain."""
+        self._searched.pop(node, None)
+
     def heard(self, creator: int, from_: int, body: bytes) -> bool:
         """A search of another node; returns whether this node answers. Repeats it otherwise."""
         search, now_s = Search.from_body(body), self._routes.now_s
@@ -63,6 +67,6 @@ class Searches:
         if search.node == self._node_id:
             return True
         if search.hops_left > 0:
-            repeated = search._replace(hops_left=search.hops_left - 1)
+            repeated = search._replace(hops_left=min(search.hops_left, MOST_HOPS) - 1)
             self._broadcast(MessageType.SEARCH, creator, repeated.to_body())
         return False

@@ -195,6 +195,17 @@ class EndToEnd:
             return self._proved.get(forward, claimed)
         return claimed
 
+    @staticmethod
+    def without_proof(payload: bytes) -> bytes:
+        """A packet of this node, sealed or not, without its proof and nonce."""
+        kind = payload[TYPE_AT]
+        if kind in (_HEARTBEAT, _REQUEST):
+            return _without_nonce(payload)
+        form = _FORMS.get(kind)
+        if form is None or payload[FORWARD_AT] > MAX_NODE_ID:
+            return payload
+        return form.without_proof(payload)
+
     def way_of_order(self, drone: int) -> int | None:
         """The neighbour that has carried the drone's last proof, for the tries with that nonce.
 

@@ -91,6 +91,9 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
     def acknowledgement_tag(self, creator: int, to: int, body: bytes) -> bytes:
         return self._message_seal.acknowledgement_tag(creator, to, body)
 
+    def without_proof(self, payload: bytes) -> bytes:
+        return self._end_to_end.without_proof(payload)
+
     def may_be_gateway(self, node: int) -> bool:
         return self._end_to_end.is_gateway(node)
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import sys
+import threading
+
 import pytest
 
 from drone_mesh.communication.beacon.packets import (
@@ -316,3 +319,57 @@ def test_one_lucky_beacon_from_beyond_the_range_makes_no_parent(routes):
     routes.heard(1, beacon(hops=1, x=14.0))
     routes.choose()
     assert routes.parent == 2
+
+
+def test_only_the_parent_and_the_gateway_say_that_the_gateway_has_no_internet(routes):
+    routes.heard(1, beacon(hops=1, number=5))
+    assert routes.choose()
+    routes.heard(2, beacon(hops=1, number=105)._replace(offline=True))
+    routes.choose()
+    assert (routes.parent, routes.offline) == (1, False)
+
+    routes.heard(1, beacon(hops=1, number=6)._replace(offline=True))
+    assert routes.choose()
+    assert routes.offline
+
+
+def test_a_neighbour_that_has_not_heard_that_the_internet_failed_is_no_way_to_it(routes):
+    routes.heard(1, beacon(hops=1, number=5))
+    routes.heard(2, beacon(hops=1, number=5))
+    routes.choose()
+    routes.heard(routes.parent, beacon(hops=1, number=6)._replace(offline=True))
+    routes.choose()
+    assert routes.offline
+    routes.heard(3 - routes.parent, beacon(hops=1, number=7))
+    routes.choose()
+    assert not routes.offline
+
+
+def test_other_threads_may_ask_for_ways_while_beacons_come_in(routes):
+    errors = []
+    done = threading.Event()
+
+    def ask():
+        try:
+            while not done.is_set():
+                for node in range(40):
+                    routes.get_direction_to_node(node)
+                routes.get_table_size()
+        except Exception as error:  # noqa: BLE001 - whatever it is
+            errors.append(error)
+
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    asking = threading.Thread(target=ask)
+    asking.start()
+    try:
+        for step in range(4000):
+            routes.now_s = step / 10
+            routes.heard(step % 37 + 1, beacon(hops=1 + step % 3, number=step % 256))
+            routes.expired()
+            routes.choose()
+    finally:
+        done.set()
+        asking.join()
+        sys.setswitchinterval(before)
+    assert not errors

@@ -74,3 +74,17 @@ def test_a_search_that_comes_again_is_repeated_once_within_five_seconds(
     routes.now_s = after_s
     searches.heard(3, 4, FOR_21)
     assert len(sent) == repeated
+
+
+def test_searches_that_found_the_node_do_not_count(routes, searches, sent):
+    for second in range(0, 30, 3):
+        routes.now_s = float(second)
+        searches.search(21, 2)
+        searches.found(21)
+    assert len(sent) == 10
+
+
+@pytest.mark.parametrize(("hops_left", "repeated"), [(255, 11), (12, 11), (1, 0)])
+def test_a_search_is_repeated_at_most_eleven_times_more(searches, sent, hops_left, repeated):
+    searches.heard(3, 3, bytes((21, 7, 0, hops_left)))
+    assert sent == [(3, bytes((21, 7, 0, repeated)))]

@@ -1,0 +1,217 @@
+"""What false or strange packets may not do to a mesh with the technique beacon."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import pytest
+
+from drone_mesh.communication import messages
+from drone_mesh.communication.beacon.packets import NO_ANCESTORS, Beacon, Motion, Search
+from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE
+from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.communication.packet_types import MessageType
+from drone_mesh.communication.seals.keys import MeshKey
+from drone_mesh.drone.location import Location
+from drone_mesh.inprocess import Network
+from drone_mesh.inprocess.drone import InProcessDrone
+
+STILL = (0.0, 0.0, 0.0)
+FAR = Location(2000.0, 2000.0, 0.0)
+KEY = MeshKey(bytes(range(16)))
+
+
+def line(**options):
+    """Gateway 0, and routers 1 and 2 behind it."""
+    network = Network(seed=3, routing="beacon", **options)
+    network.add_gateway(0, 0.0, 0.0)
+    network.add_router(1, 6.0, 0.0)
+    network.add_router(2, 12.0, 0.0)
+    network.run_for(60.0)
+    return network
+
+
+def star(second_relay=False):
+    """A gateway, a relay or two, and four routers behind them that all hear each other."""
+    network = Network(seed=1, routing="beacon")
+    network.add_gateway(0, 0.0, 0.0)
+    network.add_router(1, 7.0, 0.0)
+    for node, (x, y) in enumerate([(12.0, 2.0), (12.0, -2.0), (13.0, 0.0), (12.5, 4.0)], 2):
+        network.add_router(node, x, y)
+    if second_relay:
+        network.add_router(6, 7.0, 3.0)
+    network.run_for(40.0)
+    return network
+
+
+def say(network, to, creator, beacon):
+    packet = messages.packet(
+        MessageType.BEACON, creator, creator, BROADCAST, BROADCAST, beacon.to_body(27)
+    )
+    network.inject(to, messages.readdressed(packet, to))
+
+
+def farthest_m(network, node, seconds):
+    """How far the drone gets from where it is, while the others are silent."""
+    start, farthest = network.location(node), 0.0
+    for other in network.nodes:
+        if other != node:
+            network.power(other, False)
+    for _ in range(int(seconds)):
+        network.run_for(1.0)
+        farthest = max(farthest, network.location(node).distance_m(start))
+    return farthest
+
+
+def nearest_m(network):
+    pairs = itertools.combinations(network.nodes, 2)
+    return min(math.dist(network.location(one), network.location(two)) for one, two in pairs)
+
+
+@pytest.mark.parametrize(("creator", "hops", "parent"), [(1, 1, 0), (0, 0, NO_ROUTE)])
+def test_a_place_that_is_out_of_reach_leads_no_drone_there(creator, hops, parent):
+    network = line()
+    number = network.nodes[2].component.control.routes.number + 1
+    motion = Motion(FAR, STILL)
+    say(network, 2, creator, Beacon(0, number % 256, hops, parent, NO_ANCESTORS, 1.6, motion))
+    network.run_for(0.1)
+    counts = network.nodes[2].component.complaints.counts
+    assert counts["a neighbour's place that is out of reach"] == 1
+    assert farthest_m(network, 2, 300.0) < 20.0
+
+
+def test_with_a_key_the_gateways_own_word_about_its_place_counts():
+    """A relay that a stranger has captured tells another one, in its own beacons."""
+    network = line(key=KEY)
+    places = network.nodes[2].component.places
+    assert not places.asks_gateway
+    relay = network.nodes[1].component
+    relay.places.update_gateway(Location(11.0, 11.0, 0.0), network.now_s() + 1e6)
+    network.run_for(20.0)
+    assert places.gateway_disputed
+    assert places.gateway.distance_m(network.location(0)) < 0.5
+    relay.places.gateway_seen_s = 0.0
+    network.run_for(80.0)
+    assert not places.gateway_disputed
+
+
+def test_a_packet_of_a_node_without_beacons_makes_no_neighbour_for_long():
+    network = star()
+    for node in range(1, 6):
+        network.inject(node, messages.packet(MessageType.PROBE, 200, 200, node, node))
+    network.run_for(1.0)
+    assert all(200 in network.nodes[node].component.get_neighbours() for node in range(1, 6))
+    network.run_for(9.0)
+    assert not any(200 in network.nodes[node].component.get_neighbours() for node in range(1, 6))
+
+
+def test_a_failed_medium_is_recognised_after_a_packet_of_a_node_without_beacons():
+    network = star()
+    for node in range(1, 6):
+        network.inject(node, messages.packet(MessageType.PROBE, 200, 200, node, node))
+    network.run_for(20.0)
+    network.air.carries = lambda _payload: False
+    network.run_for(10.0)
+    assert all(network.nodes[node].component.get_repair_status().silent for node in range(2, 6))
+    network.run_for(300.0)
+    assert nearest_m(network) > 1.0
+
+
+def test_a_failed_medium_is_recognised_after_a_neighbour_died_while_the_antenna_was_off():
+    network = star(second_relay=True)
+    for node in range(2, 6):
+        network.power(node, False)
+    network.power(6, False)
+    network.run_for(10.0)
+    for node in range(2, 6):
+        network.power(node, True)
+    network.run_for(5.0)
+    assert not any(6 in network.nodes[node].component.get_neighbours() for node in range(2, 6))
+    network.air.carries = lambda _payload: False
+    network.run_for(8.0)
+    assert all(network.nodes[node].component.get_repair_status().silent for node in range(2, 6))
+
+
+def test_what_a_stranger_says_of_the_gateways_internet_disconnects_nobody():
+    network = line()
+    routes = network.nodes[1].component.control.routes
+    ahead = Beacon(0, (routes.number + 100) % 256, 1, 0, NO_ANCESTORS, 1.6, offline=True)
+    say(network, 1, 77, ahead)
+    for _ in range(20):
+        network.run_for(0.5)
+        assert network.connected(1)
+        assert network.connected(2)
+
+
+def test_a_search_is_not_repeated_further_than_any_node_would_ask_for():
+    network = line()
+    sent = []
+    network.nodes[1].antenna.broadcast_message = sent.append
+    body = Search(77, 1, 255).to_body()
+    network.inject(1, messages.packet(MessageType.SEARCH, 99, 2, 1, BROADCAST, body))
+    (repeated,) = [packet for packet in sent if messages.type_of(packet) == MessageType.SEARCH]
+    assert Search.from_body(messages.body(repeated)).hops_left == 11
+
+
+def test_with_a_key_an_order_that_a_dead_neighbour_did_not_take_goes_another_way_at_once():
+    network = Network(seed=2, routing="beacon", radio="shared", rate="1M", key=KEY)
+    network.add_gateway(0, 0.0, 0.0)
+    for node in range(1, 9):
+        network.add_router(node, 6.0 * (node % 3), 6.0 * (node // 3))
+    network.run_for(30.0)
+    for step, dead in enumerate((4, 5, 7, 1, 3)):
+        network.power(dead, False)
+        network.run_for(0.05)
+        ordered_s = network.now_s()
+        network.order(8, 12.0 + 0.5 * (step % 2), 12.0 + 0.3 * step, allow_shared_place=True)
+
+        def arrived(since_s=ordered_s):
+            return any(
+                e.kind is MeshEventKind.FLIGHT_ORDERED and e.node == 8 and e.now_s >= since_s
+                for e in network.events
+            )
+
+        assert network.run_until(arrived, within_s=1.5), f"the order while {dead} was off"
+        network.power(dead, True)
+        network.run_for(15.0)
+
+
+def test_a_gateway_knows_when_it_heard_a_node_over_a_relay():
+    network = line()
+    network.send(2, 0, b"hello")
+    network.run_for(2.0)
+    (known,) = [node for node in network.nodes[0].component.get_known_nodes() if node.node_id == 2]
+    assert network.now_s() - known.heard_s < 3.0
+
+
+def test_a_gateway_whose_receiver_errs_a_little_is_not_told_anew_with_each_beacon():
+    network = line()
+    relay, sent = network.nodes[1], []
+    relay.antenna.broadcast_message = sent.append
+    for step in range(40):
+        here = Location(0.2 * (step % 2), 0.0, 0.0)
+        number = relay.component.control.routes.number + 1
+        beacon = Beacon(0, number % 256, 0, NO_ROUTE, NO_ANCESTORS, 1.6, Motion(here, STILL))
+        say(network, 1, 0, beacon)
+        network.run_for(0.5)
+    beacons = [
+        Beacon.from_body(messages.body(packet), relay.drone.get_location()) for packet in sent
+    ]
+    told = sum(beacon.gateway_place is not None for beacon in beacons)
+    assert len(beacons) >= 10
+    assert told <= len(beacons) / 3
+
+
+def test_the_origins_digest_and_the_gateways_place_take_turns(monkeypatch):
+    monkeypatch.setattr(InProcessDrone, "frame_digest", lambda _engine: 0x1234)
+    network = line()
+    relay, sent = network.nodes[1], []
+    relay.antenna.broadcast_message = sent.append
+    network.run_for(60.0)
+    beacons = [
+        Beacon.from_body(messages.body(packet), relay.drone.get_location()) for packet in sent
+    ]
+    assert any(beacon.digest for beacon in beacons)
+    assert any(beacon.gateway_place for beacon in beacons)
+    assert not any(beacon.digest and beacon.gateway_place for beacon in beacons)
