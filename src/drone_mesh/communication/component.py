@@ -134,13 +134,8 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
             self.control.own_came_back(from_)
         elif not self._learn(creator, from_, kind, payload):
             return
-        if (
-            kind == _PRESENT
-            and creator == from_
-            and not self._frame.heard(creator, messages.frame_digest(payload))
-            and not self.complaints.foreign_neighbour(now_s)  # its digest may be part of a seal
-        ):
-            self.complaints.add("a neighbour has another origin", f"node {creator}", now_s)
+        if kind == _PRESENT and creator == from_:
+            self._parts.heard_origin(creator, messages.frame_digest(payload))
         if kind in TYPES_WITH_PLACES and self._frame.refuses(from_):
             self._drop("a place from a node with another or an unknown origin", payload)
             # From a neighbour that has not introduced itself yet, the order is only dropped: its

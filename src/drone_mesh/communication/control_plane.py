@@ -141,7 +141,7 @@ class IControlPlane(abc.ABC):
         """The next hop to the preferred gateway, or NO_ROUTE."""
 
     def heard_s(self, node: int) -> float:
-        """When a packet of `node`, no neighbour, came last; -inf: not recorded. Any thread."""
+        """When `node`, no neighbour, was last known to be there; -inf: not recorded. Any thread."""
         return -math.inf
 
     @abc.abstractmethod

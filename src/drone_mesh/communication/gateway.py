@@ -126,11 +126,13 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
     def get_known_nodes(self) -> list[KnownNode]:
         """All other nodes that it has a route to or has heard, by id."""
         nodes = []
+        reported = {one.node_id: one.report.hops for one in self._reports.nodes()}
         for node in range(MAX_NODE_ID + 1):
             if node == self._node_id:
                 continue
             next_hop = self.control.routes.get_direction_to_node(node)
-            hops, heard_s = self._heartbeats.get(node, (NO_ROUTE, -math.inf))
+            unheard = reported.get(node, NO_ROUTE), -math.inf
+            hops, heard_s = self._heartbeats.get(node, unheard)
             heard_s = max(heard_s, self.control.heard_s(node))
             heard_s = max(heard_s, self._neighbours.last_heard_s(node, otherwise=-math.inf))
             if next_hop != NO_ROUTE or heard_s > -math.inf:

@@ -90,7 +90,7 @@ class KnownNode(NamedTuple):
 
     node_id: int
     next_hop: int  # the neighbour that leads to it; NO_ROUTE: there is none now
-    hops: int  # of its last heartbeat to this gateway; NO_ROUTE: none yet
+    hops: int  # of its last heartbeat to this gateway, or report; NO_ROUTE: none yet
     heard_s: float  # when it was last heard, in seconds of the core's clock; -inf: never
 
 

@@ -43,6 +43,13 @@ class NodeBasics:
         """The time of the component's latest call."""
         return self.deadlines.now_s
 
+    def heard_origin(self, neighbour: int, digest: int) -> None:
+        """A neighbour tells the digest of its origin; complains if it is not this node's."""
+        is_common = self.frame.heard(neighbour, digest)
+        # Otherwise the digest may be part of a seal.
+        if not is_common and not self.complaints.foreign_neighbour(self.now_s):
+            self.complaints.add("a neighbour has another origin", f"node {neighbour}", self.now_s)
+
     def may_be_at(self, place: Location, gateway: bool) -> bool:
         """Whether the gateway, or else the next hop, can be at `place`; complains if not."""
         possible = self.places.is_possible(place, self.range_m, gateway)

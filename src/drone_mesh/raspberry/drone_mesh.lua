@@ -155,6 +155,22 @@ local f = {
   can_fly = ProtoField.bool("drone_mesh.can_fly", "Can fly", 8, nil, 0x02),
   shares_id = ProtoField.bool("drone_mesh.shares_id", "Another radio uses its id", 8, nil, 0x04),
   tries = ProtoField.uint8("drone_mesh.tries", "Tries per packet (0.1)"),
+  below_bytes = ProtoField.uint8("drone_mesh.below_bytes", "Bytes of nodes below", base.DEC, nil, 0x0f),
+  has_place = ProtoField.bool("drone_mesh.has_place", "Has a place", 8, nil, 0x10),
+  has_digest = ProtoField.bool("drone_mesh.has_digest", "Has a digest of its origin", 8, nil, 0x20),
+  has_gateway_place = ProtoField.bool(
+    "drone_mesh.has_gateway_place", "Has the gateway's place", 8, nil, 0x40
+  ),
+  looks = ProtoField.bool("drone_mesh.looks", "Asks for beacons", 8, nil, 0x80),
+  interval = ProtoField.uint8("drone_mesh.interval", "Interval (0.05 s)", base.DEC, nil, 0x7f),
+  no_internet = ProtoField.bool("drone_mesh.no_internet", "No internet", 8, nil, 0x80),
+  beacon_number = ProtoField.uint8("drone_mesh.beacon_number", "Number of the gateway's beacon"),
+  ancestors = ProtoField.bytes("drone_mesh.ancestors", "Ancestors"),
+  beacon_place = ProtoField.uint16("drone_mesh.beacon_place", "Latitude, longitude or height (0.1 m)"),
+  velocity = ProtoField.int8("drone_mesh.velocity", "Velocity (root of it, 50 m/s: 127)"),
+  digest = ProtoField.uint16("drone_mesh.digest", "Digest of its origin", base.HEX),
+  after = ProtoField.uint8("drone_mesh.after", "Nodes below, after"),
+  below = ProtoField.bytes("drone_mesh.below", "Nodes below"),
   data = ProtoField.bytes("drone_mesh.data", "Data"),
   rest = ProtoField.bytes("drone_mesh.rest", "Behind the body"),
 }
@@ -164,19 +180,62 @@ local shown_as = {
   hopsUntilGateway = { f.hops }, knowGateway = { f.know_gateway }, preferredGateway = { f.gateway },
   timeSincePosix = { f.time }, nextHop = { f.next_hop }, part = { f.last_part, f.part },
   latitudeSteps = { f.place }, longitudeSteps = { f.place }, heightSteps = { f.place },
-  flags = { f.flying, f.can_fly, f.shares_id },
 }
+local BEACON, NODE_REPORT = 40, 66
+local shown_in = { -- names that mean something else in these types
+  [BEACON] = {
+    flags = { f.below_bytes, f.has_place, f.has_digest, f.has_gateway_place, f.looks },
+    interval = { f.interval, f.no_internet },
+    number = { f.beacon_number },
+    ancestors = { f.ancestors },
+  },
+  [NODE_REPORT] = { flags = { f.flying, f.can_fly, f.shares_id } },
+}
+
+local function fields_of(kind, name)
+  return shown_in[kind] and shown_in[kind][name] or shown_as[name]
+end
+
 table.insert(bodies[6], { "order", "uint16", 2 }) -- behind the body of a MOVE_TO_LOCATION
-for _, body in pairs(bodies) do
+for kind, body in pairs(bodies) do
   for _, entry in ipairs(body) do
     local name, form = entry[1], entry[2]
-    if not shown_as[name] then
+    if not fields_of(kind, name) then
       f[name] = f[name] or ProtoField[form]("drone_mesh." .. name, name)
       shown_as[name] = { f[name] }
     end
   end
 end
 mesh.fields = f
+
+-- What follows the head of a beacon, as its flags say; returns where the new nodes below begin.
+local function add_beacon_parts(tree, tvb, at)
+  local flags = tvb(HEADER_BYTES, 1):uint()
+  local function add(field, bytes, times)
+    for _ = 1, times do
+      tree:add_le(field, tvb(at, bytes))
+      at = at + bytes
+    end
+  end
+  if math.floor(flags / 0x10) % 2 == 1 then
+    add(f.beacon_place, 2, 3)
+    add(f.velocity, 1, 3)
+  end
+  if math.floor(flags / 0x20) % 2 == 1 then
+    add(f.digest, 2, 1)
+  end
+  if math.floor(flags / 0x40) % 2 == 1 then
+    add(f.beacon_place, 2, 3)
+  end
+  local below_bytes = flags % 0x10
+  if at + 1 + below_bytes <= PAYLOAD_BYTES then
+    add(f.after, 1, 1)
+    if below_bytes > 0 then
+      add(f.below, below_bytes, 1)
+    end
+  end
+  return at
+end
 
 function mesh.dissector(tvb, pinfo, root)
   if tvb:len() < PAYLOAD_BYTES then
@@ -196,10 +255,13 @@ function mesh.dissector(tvb, pinfo, root)
   end
   local at = HEADER_BYTES
   for _, entry in ipairs(bodies[kind] or {}) do
-    for _, field in ipairs(shown_as[entry[1]]) do
+    for _, field in ipairs(fields_of(kind, entry[1])) do
       tree:add_le(field, tvb(at, entry[3]))
     end
     at = at + entry[3]
+  end
+  if kind == BEACON then
+    at = add_beacon_parts(tree, tvb, at)
   end
   tree:add(kind >= 128 and f.data or f.rest, tvb(at, PAYLOAD_BYTES - at))
   return PAYLOAD_BYTES

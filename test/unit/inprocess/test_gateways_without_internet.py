@@ -5,7 +5,9 @@ from __future__ import annotations
 import pytest
 from scenarios import events, fleet, flown, run_until
 
+from drone_mesh.communication.order_record import OrderState
 from drone_mesh.communication.seals.keys import MeshKey
+from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.inprocess import Network
 
 CHECK_PERIOD_S = 10.0
@@ -152,3 +154,18 @@ def test_the_loss_and_the_return_are_events_of_the_gateway(routing):
     network.internet(0, True)
     assert [e[1:] for e in events(network, "DISCONNECTED", since_s=5.0) if e[1] == 0] == [(0, 0)]
     assert [e[1:] for e in events(network, "CONNECTED", since_s=5.0) if e[1] == 0] == [(0, 0)]
+
+
+@pytest.mark.parametrize("routing", TECHNIQUES)
+def test_with_a_key_a_gateway_without_internet_reports_and_obeys_the_other_one(routing):
+    timing = MeshTiming(report_period_s=30.0)
+    network = two_ends(routing, routers=1, key=MeshKey(bytes(range(16))), timing=timing)
+    network.internet(1, False)
+    network.run_for(100.0)
+    reports = network.nodes[0].component.get_node_reports()
+    assert {1, 2} <= {report.node_id for report in reports}
+    assert network.order(1, x=12.0, y=1.0, gateway=0)
+    network.run_for(60.0)
+    assert network.location(1).latitude == 1.0
+    (order,) = network.nodes[0].component.get_orders()
+    assert order.state is OrderState.ARRIVED

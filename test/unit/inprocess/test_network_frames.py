@@ -34,9 +34,12 @@ def test_the_digest_stands_in_the_last_two_bytes_of_a_present():
     assert frame_digest(present) == 0
 
 
-def test_places_never_cross_the_border_between_two_frames(two_frames, caplog):
+@pytest.mark.parametrize("routing", ["child_table_tree", "beacon"])
+def test_places_never_cross_the_border_between_two_frames(two_frames, caplog, routing):
     caplog.set_level(logging.WARNING)
-    network = line(3, spacing=6.0)  # 0 and 1 count from one origin, 2 and 3 from the other
+    network = line(
+        3, spacing=6.0, routing=routing
+    )  # 0 and 1 count from one origin, 2 and 3 from the other
     network.run_for(120.0)
     assert network.all_connected()  # packets without places pass
     places = {n: node.component.places for n, node in network.nodes.items()}

@@ -6,14 +6,15 @@ import pytest
 
 from drone_mesh.air.box import Box
 from drone_mesh.air.obstacles import Obstacles
+from drone_mesh.communication.order_record import OrderState
 from drone_mesh.communication.seals.keys import KEY_BYTES, MeshKey
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.inprocess import Network
 
 
-def line(**settings):
+def line(seed=3, **settings):
     """Gateway 0 and the routers 1..4, 6 m apart, connected."""
-    network = Network(seed=3, **settings)
+    network = Network(seed=seed, **settings)
     network.add_gateway(0, 0.0, 0.0)
     for node_id in (1, 2, 3):
         network.add_router(node_id, 6.0 * node_id, 0.0)
@@ -109,3 +110,22 @@ def test_a_drone_whose_goal_is_inside_an_obstacle_refuses_and_stays():
     assert (drone, state) == (3, "refused")
     assert "no path past the obstacles" in reason
     assert network.nodes[3].drone.path is None
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("routing", ["child_table_tree", "beacon"])
+def test_with_a_key_a_restarted_router_is_believed_again(routing, seed):
+    """It does not know which sequence numbers it has used."""
+    timing = MeshTiming(report_period_s=30.0)
+    key = MeshKey(bytes(range(KEY_BYTES)))
+    network = line(seed=seed, routing=routing, key=key, timing=timing)
+    network.run_for(100.0)
+    network.restart(3)
+    restarted_s = network.now_s()
+    network.run_for(180.0)
+    gateway = network.nodes[0].component
+    reported_s = {one.node_id: one.heard_s for one in gateway.get_node_reports()}
+    assert reported_s[3] > restarted_s
+    assert network.order(3, 18.0, 2.0)
+    network.run_for(30.0)
+    assert gateway.get_orders()[0].state is OrderState.ARRIVED

@@ -26,9 +26,9 @@ FLYING = sorted(set(REPAIR_STRATEGIES) - {"stay"}) + [ORACLE]
 RANGE_M = 9.0
 
 
-def broken_line(repair):
+def broken_line(repair, routing="child_table_tree"):
     """Gateway 0, routers 1, 2, 3 in a line; 2 dies, and 3 is cut off."""
-    network = line(3, spacing=8.0, repair=repair)
+    network = line(3, spacing=8.0, repair=repair, routing=routing)
     network.run_for(20.0)
     network.power(2, False)
     assert run_until(network, lambda: not network.connected(3), within_s=30.0, step_s=1.0)
@@ -44,9 +44,10 @@ def start_of(case, node):
     return {other: goal for other, goal in LAYOUTS.orders(case)}[node]
 
 
+@pytest.mark.parametrize("routing", ["child_table_tree", "beacon"])
 @pytest.mark.parametrize("repair", FLYING)
-def test_a_drone_that_is_cut_off_flies_and_is_connected(repair):
-    network = broken_line(repair)
+def test_a_drone_that_is_cut_off_flies_and_is_connected(repair, routing):
+    network = broken_line(repair, routing)
     assert run_until(network, network.all_connected, within_s=180.0)
     assert flown(network) == {3}
 

@@ -7,6 +7,8 @@ import subprocess
 
 import pytest
 
+from drone_mesh.communication import messages
+from drone_mesh.communication.beacon.packets import Beacon, Below, Motion
 from drone_mesh.communication.messages import (
     GoToLocationMessage,
     HeartbeatMessage,
@@ -15,6 +17,7 @@ from drone_mesh.communication.messages import (
     with_order_number,
 )
 from drone_mesh.communication.orders.messages import OrderOutcome, reply_packets
+from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.reports.node_report import NodeReport
 from drone_mesh.drone.location import Location
 from drone_mesh.nrf24.emulator.frames import Frame, FrameFormat
@@ -114,6 +117,30 @@ def test_the_fields_of_each_message_are_those_that_were_packed(tmp_path):
     assert shown(path, "_ws.col.Info")[1] == ["PRESENT made by 7, for 254"]
     assert shown(path, "_ws.col.Info")[5] == ["NODE_SEARCH made by 0, for 254"]
     assert shown(path, "drone_mesh.node", "drone_mesh.number")[5] == ["9", "261"]
+
+
+def test_a_beacon_is_taken_apart_as_its_flags_say(tmp_path):
+    place, gateway_place = Location(1.0, -2.4, 3.0), Location(0.0, 12.0, 0.0)
+    motion = Motion(place, (0.0, 50.0, 0.0))
+    below = Below(4, (5, 9))
+    beacon = Beacon(0, 200, 2, 4, (3, 255, 255), 1.6, motion, gateway_place, 0, True, below)
+    body = beacon._replace(digest=0x1234, gateway_place=None).to_body(27)
+    path = payloads(
+        tmp_path / "heard.pcapng",
+        *(
+            messages.packet(MessageType.BEACON, 6, 6, 254, 254, each)
+            for each in (beacon.to_body(27), body)
+        ),
+    )
+    columns = (
+        "beacon_number", "hops", "parent", "ancestors", "interval", "beacon_place", "velocity",
+        "digest", "after", "below_bytes", "below", "flying",
+    )  # fmt: skip
+    head = ["200", "2", "4", "03ffff", "32"]
+    assert shown(path, *(f"drone_mesh.{name}" for name in columns)) == [
+        [*head, "10,65512,30,0,120,0", "0,127,0", "", "4", "2", "0509", ""],
+        [*head, "10,65512,30", "0,127,0", "0x1234", "4", "2", "0509", ""],
+    ]
 
 
 def test_what_a_radio_hears_is_in_the_file_with_the_command_that_opens_it(tmp_path, capsys):

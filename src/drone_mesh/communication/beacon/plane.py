@@ -145,7 +145,9 @@ class BeaconPlane(IControlPlane):
     def on_internet(self, works: bool) -> None:
         """The next beacon says so, soon."""
         self._set_time()
+        before = self._routes.gateway
         self._routes.set_internet(works)
+        self._leaves_gateway(before)
         self._trickle.hurry(self._routes.now_s)
         self._plan()
 
@@ -218,11 +220,16 @@ class BeaconPlane(IControlPlane):
             self._trickle.hurry(now_s)
         else:
             self._trickle.reset(now_s)
-        if before[0] not in (gateway, NO_ROUTE):
+        self._leaves_gateway(before[0])
+        self._show()
+
+    def _leaves_gateway(self, before: int) -> None:
+        """If it prefers another one now: report it, and forget where that one was."""
+        gateway = self._routes.gateway
+        if before not in (gateway, NO_ROUTE):
             self._basics.report(MeshEventKind.GATEWAY_CHANGED, gateway)
             self._basics.places.forget_gateway()
             self._prove_soon()
-        self._show()
 
     def _show(self) -> None:
         """Tell the node whether a gateway is reached."""
@@ -359,7 +366,7 @@ class BeaconPlane(IControlPlane):
             self._basics.complaints.dropped("a damaged beacon", payload, now_s)
             return
         if beacon.digest:
-            self._basics.frame.heard(creator, beacon.digest)
+            self._basics.heard_origin(creator, beacon.digest)
         if self._basics.frame.refuses(creator):
             beacon = beacon._replace(motion=None, gateway_place=None)
         elif beacon.motion is not None and not self._is_in_reach(beacon.motion.place):
@@ -426,7 +433,7 @@ class BeaconPlane(IControlPlane):
 
     def _prove_soon(self) -> None:
         """A new gateway: many routers find it at the same moment, while handshakes fill the air."""
-        if self._sealed and self._states is not None:
+        if self._sealed and not self._routes.is_root:
             self._prove_s = self._routes.now_s + PROVES_AGAIN_S * self._basics.rng.random()
 
     def _prove(self, now_s: float) -> None:
@@ -446,9 +453,10 @@ class BeaconPlane(IControlPlane):
         now_s = self._routes.now_s
         if not self._sealed:
             self._basics.complaints.dropped("a heartbeat of another technique", payload, now_s)
-        elif self._states is None:
-            me = self._me
-            self._courier.send_own(messages.heartbeat(me, me, creator, creator, True, me))
+        elif messages.preferred_gateway(payload) != creator:  # gateways do not answer each other
+            if self._states is None:
+                me = self._me
+                self._courier.send_own(messages.heartbeat(me, me, creator, creator, True, me))
         elif creator == self._routes.gateway:
             if self._proven == creator:  # its second answer: by now it has a proof of this node
                 self._prove_s = now_s + PROVES_S * (1.0 - JITTER * self._basics.rng.random())
@@ -578,7 +586,7 @@ class BeaconPlane(IControlPlane):
         return self._routes.parent
 
     def heard_s(self, node: int) -> float:
-        """When a packet of it came last over a relay."""
+        """When a packet of it came last over a relay, or a relay named it."""
         return self._routes.led_s(node)
 
     def may_use(self, gateway: int) -> bool:

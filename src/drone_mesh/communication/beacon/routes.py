@@ -149,6 +149,7 @@ class BeaconRoutes(IRoutes):
         self._shared = shared
         self._losses = Losses(range_m)
         self._below_s: dict[int, float] = {}  # the nodes below, and when they were last
+        self._was_below_s: dict[int, float] = {}  # the same, at a gateway, of all that ever were
 
     # What it learns ----------------------------------------------------------------------------
 
@@ -246,8 +247,12 @@ class BeaconRoutes(IRoutes):
         self._hints[node] = neighbour, self.now_s
 
     def led_s(self, node: int) -> float:
-        """When a packet of this node came last through a neighbour. Any thread."""
-        return self._hints.get(node, (NO_ROUTE, -math.inf))[1]
+        """When this node was last known to be there, through a neighbour. Any thread.
+
+        A packet of it came, or, at a gateway, it was listed as below.
+        """
+        _neighbour, at_s = self._hints.get(node, (NO_ROUTE, -math.inf))
+        return max(at_s, self._was_below_s.get(node, -math.inf))
 
     def expired(self) -> list[int]:
         """Forget the neighbours that were silent for too long; returns them."""
@@ -464,6 +469,8 @@ class BeaconRoutes(IRoutes):
                 below_s.update(dict.fromkeys(child.announced_s, now_s))
         for node in (self._node_id, *self.ancestors, self.parent):
             below_s.pop(node, None)
+        if self._is_gateway:
+            self._was_below_s.update(below_s)
         for node in [n for n, at_s in below_s.items() if now_s - at_s > LINGERS * period_s]:
             del below_s[node]
         return set(below_s)

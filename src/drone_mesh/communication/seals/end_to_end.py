@@ -30,6 +30,9 @@ from drone_mesh.communication.seals.seal import SEAL_AT, SEAL_BYTES
 from drone_mesh.errors import PacketError
 
 NEW_NONCE_AFTER_S = 5.0  # our choice: with the next heartbeat to a gateway
+# Our choice, of a gateway: a restarted router cannot know which sequence numbers it has used, and
+# some hear a gateway's nonce once a minute only.
+NEW_GATEWAY_NONCE_AFTER_S = 60.0
 NONCES = 3  # our choice: two heartbeats may be lost
 SAME_PACKET_S = 0.1  # our choice: retransmissions and copies follow at once
 ORDER_TAG_BYTES = 6
@@ -153,7 +156,9 @@ class EndToEnd:
             return _present_with_nonce(payload, self._nonces[0].value, digest)
         if kind == _HEARTBEAT:
             gateway = messages.preferred_gateway(payload)
-            if forward == gateway and now_s - self._changed_s >= NEW_NONCE_AFTER_S:
+            is_gateway = gateway == self._node_id
+            lasts_s = NEW_GATEWAY_NONCE_AFTER_S if is_gateway else NEW_NONCE_AFTER_S
+            if (is_gateway or forward == gateway) and now_s - self._changed_s >= lasts_s:
                 self._nonces.appendleft(_Nonce(self._rng.getrandbits(32)))
                 self._changed_s = now_s
             payload = _with_nonce(payload, self._nonces[0].value)

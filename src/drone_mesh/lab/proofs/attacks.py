@@ -28,7 +28,6 @@ from drone_mesh.lab.proofs import claims
 from drone_mesh.lab.proofs.stranger import Stranger
 
 ATTACK_S = 60.0
-OUTAGE_S = 300.0
 BIDDING_S = 300.0
 SWALLOWING_S = 180.0
 FAR = Location(4900.0, 4900.0, 0.0)  # 6.9 km away, within the bounds for goals
@@ -122,7 +121,7 @@ def far_place(stranger: Stranger) -> None:
                 stranger.say(MessageType.LOCATION, 0, to, node, own_word)
                 stranger.say(MessageType.GATEWAY_PLACE, me, to, node, hearsay)
     stranger.network.power(0, False)
-    stranger.network.run_for(OUTAGE_S)
+    stranger.network.run_for(claims.OUTAGE_S)
     stranger.network.power(0, True)
     stranger.network.run_for(ATTACK_S)
 
@@ -198,6 +197,7 @@ ATTACKS: Mapping[str, Attack] = {
     "beacons with numbers ahead": claims.beacons_ahead,
     "beacons that list all drones": claims.beacons_of_all,
     "beacons in neighbours' names": claims.beacons_in_names,
+    "beacons of far places and an outage": claims.beacons_of_far_places,
 }
 RECORDING = (replayed_order, replay_after_restart, replay_on_another_path)
 

@@ -8,15 +8,23 @@ from __future__ import annotations
 import functools
 import itertools
 import random
-from typing import Callable, Sequence
+from typing import Callable, Iterator, Sequence
 
 from drone_mesh.communication import messages
-from drone_mesh.communication.beacon.packets import NO_ANCESTORS, NONE_BELOW, Beacon, Below
+from drone_mesh.communication.beacon.packets import (
+    NO_ANCESTORS,
+    NONE_BELOW,
+    Beacon,
+    Below,
+    Motion,
+)
 from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE
 from drone_mesh.communication.packet_types import MessageType
+from drone_mesh.drone.location import Location
 from drone_mesh.lab.proofs.stranger import Stranger
 
 CLAIMING_S = 60.0
+OUTAGE_S = 300.0  # of the gateway, in which its routers step back to places that they know
 FAR_AHEAD = 32_000  # counts
 CLAIMS_PER_S = 24
 ORDERED = (24, 19, 14, 9, 4, 3, 2, 1)  # drones, those far from the gateway first
@@ -24,6 +32,7 @@ ORDERED_M = 3.5  # to the west, where each keeps its neighbours
 ORDER_PERIOD_S = 15.0
 AHEAD = 10  # numbers of beacons
 BEACON_ROOM = 20  # bytes, also with a seal
+FAR = Location(1500.0, 1500.0, 0.0)  # 2.1 km away; beacons tell places within 3.2 km
 
 
 def far_counter(stranger: Stranger) -> None:
@@ -98,6 +107,29 @@ def beacons_in_names(stranger: Stranger) -> None:
             stranger.say(MessageType.BEACON, name, node, BROADCAST, lost)
 
 
+def beacons_of_far_places(stranger: Stranger) -> None:
+    """Say in beacons that the gateway, or who sends them, is far away; then the gateway is off."""
+    motions = itertools.cycle((Motion(FAR, (0.0, 0.0, 0.0)), None))
+    for newest, motion in zip(_newest_numbers(stranger), motions):
+        gateway_place = FAR if motion is None else None
+        for node, name in itertools.product(stranger.in_range(), _names(stranger)):
+            hops, parent = (1, 0) if name else (0, NO_ROUTE)
+            number = (newest + AHEAD) % 256
+            beacon = Beacon(0, number, hops, parent, NO_ANCESTORS, 0.5, motion, gateway_place)
+            if node != name:
+                body = beacon.to_body(BEACON_ROOM)
+                stranger.say(MessageType.BEACON, name, node, BROADCAST, body)
+    stranger.network.power(0, False)
+    stranger.network.run_for(OUTAGE_S)
+    stranger.network.power(0, True)
+    stranger.network.run_for(CLAIMING_S)
+
+
+def _names(stranger: Stranger) -> list[int]:
+    """Its own, and those of the nodes that hear it."""
+    return [stranger.node_id, *stranger.in_range()]
+
+
 def _order_away(stranger: Stranger, drone: int) -> None:
     """The owner sends a drone away."""
     network = stranger.network
@@ -111,6 +143,15 @@ def _beacons(stranger: Stranger, ahead: int, lists: Sequence[Below] = (NONE_BELO
 
     They take turns with the `lists` of the nodes below.
     """
+    for newest, below in zip(_newest_numbers(stranger), itertools.cycle(lists)):
+        beacon = Beacon(0, (newest + ahead) % 256, 1, 0, NO_ANCESTORS, 0.5, below=below)
+        body = beacon.to_body(BEACON_ROOM)
+        for node in stranger.in_range():
+            stranger.say(MessageType.BEACON, stranger.node_id, node, BROADCAST, body)
+
+
+def _newest_numbers(stranger: Stranger) -> Iterator[int]:
+    """Twice a second the number of the gateway's latest beacon."""
     newest = 0
 
     def note(payload: bytes) -> None:
@@ -121,11 +162,8 @@ def _beacons(stranger: Stranger, ahead: int, lists: Sequence[Below] = (NONE_BELO
             newest = newest if beacon is None else beacon.number
 
     stranger.on_packet = note
-    for _, below in zip(stranger.every(0.5, CLAIMING_S), itertools.cycle(lists)):
-        beacon = Beacon(0, (newest + ahead) % 256, 1, 0, NO_ANCESTORS, 0.5, below=below)
-        body = beacon.to_body(BEACON_ROOM)
-        for node in stranger.in_range():
-            stranger.say(MessageType.BEACON, stranger.node_id, node, BROADCAST, body)
+    for _ in stranger.every(0.5, CLAIMING_S):
+        yield newest
 
 
 BY_BEACONS: tuple[Callable[[Stranger], None], ...] = (
@@ -133,6 +171,7 @@ BY_BEACONS: tuple[Callable[[Stranger], None], ...] = (
     beacons_ahead,
     beacons_of_all,
     beacons_in_names,
+    beacons_of_far_places,
 )
 """Those on meshes with the technique `beacon`."""
 FOR_PACKETS_DOWN = (beacons_of_all,)

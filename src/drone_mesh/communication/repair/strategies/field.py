@@ -21,6 +21,7 @@ class Field(IRepairStrategy):
     """Flies leg by leg, until a gateway answers or the gateway's place is reached."""
 
     _nearest_m = math.inf  # to the gateway's place, since the connection was lost
+    _asked_s = -math.inf  # for the places of the neighbours
 
     def on_gateway_found(self) -> None:
         """Forget the distance reached: the next loss starts over."""
@@ -28,12 +29,17 @@ class Field(IRepairStrategy):
 
     def on_emergency(self) -> None:
         """Request the places of the neighbours, then move."""
-        self.mesh.ask_places()
-        self.mesh.wait_until(self.mesh.now_s + PAUSE_S)
+        if self.mesh.now_s > self._asked_s + PAUSE_S:  # checks may follow each other faster
+            self._ask()
 
     def on_landed(self) -> None:
         """Request places again, then move on."""
-        self.on_emergency()
+        self._ask()
+
+    def _ask(self) -> None:
+        self._asked_s = self.mesh.now_s
+        self.mesh.ask_places()
+        self.mesh.wait_until(self._asked_s + PAUSE_S)
 
     def on_time(self) -> None:
         """Fly one leg."""
