@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 
@@ -58,14 +59,18 @@ SENTENCES = [
     f"one stranger next to the gateway of {damage.NODES} nodes, {damage.SPACING_M:g} m apart",
     f"for invented ids, {damage.SHARED_NODES} nodes on the shared channel",
     f"Each attack takes {attacks.ATTACK_S:g} s (bids {attacks.BIDDING_S:g} s, relay that swallows "
-    f"and jammed requests {attacks.SWALLOWING_S:g} s, far place {attacks.OUTAGE_S:g} s more, "
+    f"and jammed requests {attacks.SWALLOWING_S:g} s, far places {claims.OUTAGE_S:g} s more, "
     f"nonces {len(claims.ORDERED)} orders of {claims.ORDER_PERIOD_S:g} s); seeds 0 to 11",
     f"{claims.FAR_AHEAD:,} counts ahead",
     f"*Packets in receivers' own names*: {claims.CLAIMS_PER_S} a second",
     f"*Nonces in drones' names*: {claims.CLAIMS_PER_S} a second at the gateway, while the owner "
     f"orders {len(claims.ORDERED)} drones away by {claims.ORDERED_M:g} m",
+    f"are {claims.FAR.longitude * math.sqrt(2) / 1000:.1f} km away; "
+    f"then the gateway is off for {claims.OUTAGE_S:g} s",
+    f"a gateway draws one every {end_to_end.NEW_GATEWAY_NONCE_AFTER_S:g} s",
     f"*with numbers ahead* are {claims.AHEAD} ahead",
     f"Meanwhile the owner orders {len(claims.ORDERED)} drones away by {claims.ORDERED_M:g} m;",
+    f"a heartbeat within {plane.PROVES_AGAIN_S:g} s after it connects",
     f"again after {plane.PROVES_AGAIN_S:g} to {2 * plane.PROVES_AGAIN_S:g} s until the gateway",
     f"every {plane.PROVES_S * (1 - trickle.JITTER):g} to {plane.PROVES_S:g} s. After a restart",
     f"more than {damage.LURED_M:g} m from their place, or more than {damage.OFF_ORDER_M:g} m from",
