@@ -80,6 +80,13 @@ class MissionsTest(unittest.TestCase):
         good = order(2, waypoints=there, speed=2.0)
         self.assertTrue(good.success)
         self.passes(2, (6.0, 6.0, 1.0))
+        wait_for("the end of a mission", WALL_LIMIT_S, lambda: not len(self.node(2).heading))
+        answer = order(2, action=FlyMissionRequest.RESUME)
+        self.assertEqual((answer.success, answer.message), (False, "drone 2 has no mission"))
+        answer = order(1, action=9)
+        self.assertEqual(
+            (answer.success, answer.message), (False, "drone 1: unknown action 9: use 0 to 3")
+        )
         self.assertEqual(log.failures(), [])
 
 

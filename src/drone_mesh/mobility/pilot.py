@@ -23,7 +23,9 @@ class TrackPilot:
         self._track_s = 0.0
         self._last_s: float | None = None
         self._on_track = False
-        self.paused = False  # the drone stays where it is; any thread may read it
+        # Any thread may read these two:
+        self.paused = False  # the drone stays where it is
+        self.has_arrived = False  # the track has ended, and the drone rests there
 
     def pause(self) -> None:
         """Stay, or leave the drone to an order."""
@@ -51,7 +53,9 @@ class TrackPilot:
         if not self._on_track:
             return self._approach(place, self._speed_m_s * passed_s)
         self._track_s += passed_s
-        return self._track.position_at(self._track_s)
+        leg = self._track.leg_at(self._track_s)
+        self.has_arrived = leg.end_s == math.inf and not any(leg.velocity)
+        return leg.position_at(self._track_s)
 
     def wait(self, now_s: float) -> None:
         """The drone falls behind: let no time of the track pass."""

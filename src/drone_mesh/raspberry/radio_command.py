@@ -11,7 +11,7 @@ import time
 from pathlib import Path
 from typing import Callable, Iterator, Sequence
 
-from drone_mesh.arguments import whole
+from drone_mesh.arguments import decimal, whole
 from drone_mesh.channel.runtime import Runtime, SystemRuntime
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.drone.location import Location
@@ -36,6 +36,7 @@ from drone_mesh.stopping import ends_as
 
 REPORT_ROUNDS = 20
 PARTNER_ID = 1  # with an emulated radio
+FARTHEST_M = 100_000.0  # our choice: no radio reaches further
 USUAL_NODES = 17  # our choice: the field case
 DISSECTOR = Path(__file__).with_name("drone_mesh.lua")
 
@@ -207,7 +208,7 @@ def _parser() -> argparse.ArgumentParser:
     add_channel_options(parser)
     parser.add_argument(
         "--emulated",
-        type=float,
+        type=decimal(0, FARTHEST_M),
         default=0.0,
         metavar="METRES",
         help=f"without hardware: use an emulated radio, with node {PARTNER_ID} at this distance",
@@ -243,7 +244,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     reach.add_argument(
         "--distance",
-        type=float,
+        type=decimal(0, FARTHEST_M),
         metavar="METRES",
         help="distance to the other node: also print the loss measured near that distance in 2019",
     )

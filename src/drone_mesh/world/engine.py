@@ -129,8 +129,9 @@ class DroneEngine(IDroneEngine):
 
     @property
     def pilot(self) -> TrackPilot | None:
-        """Who flies it while it is not on an ordered flight; None: nobody. Any thread."""
-        return self._pilot
+        """Who flies it while it is not on an ordered flight; None: nobody any more. Any thread."""
+        pilot = self._pilot
+        return None if pilot is None or pilot.has_arrived else pilot
 
     def fly_with(self, pilot: TrackPilot | None) -> None:
         """Let this pilot fly it from the next step on, or nobody. Any thread."""

@@ -238,3 +238,11 @@ def test_it_releases_spi_and_both_pins_when_it_ends(rig, monkeypatch, capsys):
     monkeypatch.setattr(Hardware, "open", lambda _hardware: wired)
     assert main(["--irq", "24", "check"]) == 0, capsys.readouterr().err
     assert sorted(closed) == ["ce", "irq", "spi"]
+
+
+@pytest.mark.parametrize("metres", ["nan", "-5", "1e9"])
+def test_a_distance_that_is_none_is_refused(capsys, metres):
+    with pytest.raises(SystemExit) as ended:
+        main([f"--emulated={metres}", "scan"])
+    assert ended.value.code == 2
+    assert "must be a number 0..100000" in capsys.readouterr().err

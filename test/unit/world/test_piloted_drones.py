@@ -118,3 +118,18 @@ def test_a_ceiling_lowers_a_flight_but_takes_no_longer():
     assert low.duration_s == free.duration_s
     high = FlightPath((0.0, 0.0, 5.0), (20.0, 0.0, 0.0), 0.0, ceiling_m=3.0)
     assert high.above_start[2] == 5.0
+
+
+def test_a_mission_that_has_ended_is_gone_and_one_that_an_order_ended_early_is_not(world):
+    engine = drone(world)
+    engine.fly_with(pilot(speed_m_s=2.0, loop=False))
+    run(world, 3.0)
+    engine.pause_pilot(True)
+    assert engine.pilot is not None
+    engine.pause_pilot(False)
+    run(world, 20.0)
+    assert engine.pilot is None
+    there = engine.get_location()
+    engine.pause_pilot(False)
+    run(world, 3.0)
+    assert engine.get_location().distance_m(there) < 0.3

@@ -91,7 +91,11 @@ def start_node(about: str | None, name: str, *, disable_signals: bool = False) -
     except MeshError as error:
         print(f"{program}: {error}", file=sys.stderr)
         sys.exit(FAILED)
-    rospy.init_node(name, argv=_words(), disable_signals=disable_signals)
+    try:
+        rospy.init_node(name, argv=_words(), disable_signals=disable_signals)
+    except rospy.ROSInitException as error:  # it is told to end while it registers
+        print(f"{program}: {error}", file=sys.stderr)
+        sys.exit(FAILED)
 
 
 def run_tool(name: str, work: Callable[[], int]) -> None:

@@ -24,6 +24,13 @@ from drone_mesh.world.factory import DroneFactory, VirtualDrone
 INFO_PERIOD_S = 0.05  # at most 20 DroneInfo per simulated second
 _ROUNDING_S = 1e-6  # simulated time moves in hundredths, which floats do not hold exactly
 
+_ACTIONS = (
+    srv.FlyMissionRequest.FLY,
+    srv.FlyMissionRequest.PAUSE,
+    srv.FlyMissionRequest.RESUME,
+    srv.FlyMissionRequest.STOP,
+)
+
 _log = logging.getLogger(__name__)
 
 
@@ -70,6 +77,9 @@ class EngineServer:
 
     def _mission(self, request: srv.FlyMissionRequest) -> srv.FlyMissionResponse:
         engine = self._engine
+        if request.action not in _ACTIONS:
+            why_not = f"unknown action {request.action}: use {_ACTIONS[0]} to {_ACTIONS[-1]}"
+            return srv.FlyMissionResponse(False, f"drone {self._node_id}: {why_not}")
         if request.action == srv.FlyMissionRequest.FLY:
             places = [(p.longitude, p.latitude, float(p.height)) for p in request.waypoints]
             why_not = engine.why_not_fly()

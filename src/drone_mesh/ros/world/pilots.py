@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from typing import Mapping, Sequence
 
@@ -15,6 +16,8 @@ from drone_mesh.world.factory import VirtualDrone
 MEAN_DEGREE = 10.0  # our choice: neighbours on average, if drones were uniform in the area
 HEIGHT_M = 2.0  # our choice: of the models' flights
 
+_log = logging.getLogger(__name__)
+
 
 def start_pilots(
     configuration: FactoryConfiguration,
@@ -23,8 +26,14 @@ def start_pilots(
 ) -> None:
     """Give each drone that moves its pilot; `missions` name drones of the fleet only.
 
-    The models move the routers in a square around the fleet.
+    The models move the routers in a square around the fleet, all at one height.
     """
+    if configuration.flight == "dynamic" and configuration.mobility != "none":
+        _log.warning(
+            "mobility:=%s flies all drones at one height, and with flight:=dynamic those that meet "
+            "crash; missions can keep them apart",
+            configuration.mobility,
+        )
     by_id = {drone.node_id: drone for drone in drones}
     speed_m_s = configuration.speed
     mobility = Mobility(
