@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from drone_mesh.communication import complaints, limits
-from drone_mesh.communication.beacon import plane, trickle
+from drone_mesh.communication.beacon import proofs, trickle
 from drone_mesh.communication.data import packets as data
 from drone_mesh.communication.heartbeats import detours, relay_check
 from drone_mesh.communication.interfaces import BROADCAST, MAX_NODE_ID, PAYLOAD_BYTES
@@ -70,9 +70,9 @@ SENTENCES = [
     f"a gateway draws one every {end_to_end.NEW_GATEWAY_NONCE_AFTER_S:g} s",
     f"*with numbers ahead* are {claims.AHEAD} ahead",
     f"Meanwhile the owner orders {len(claims.ORDERED)} drones away by {claims.ORDERED_M:g} m;",
-    f"a heartbeat within {plane.PROVES_AGAIN_S:g} s after it connects",
-    f"again after {plane.PROVES_AGAIN_S:g} to {2 * plane.PROVES_AGAIN_S:g} s until the gateway",
-    f"every {plane.PROVES_S * (1 - trickle.JITTER):g} to {plane.PROVES_S:g} s. After a restart",
+    f"a heartbeat within {proofs.AGAIN_S:g} s after it connects",
+    f"again after {proofs.AGAIN_S:g} to {2 * proofs.AGAIN_S:g} s until the gateway",
+    f"every {proofs.PERIOD_S * (1 - trickle.JITTER):g} to {proofs.PERIOD_S:g} s. After a restart",
     f"more than {damage.LURED_M:g} m from their place, or more than {damage.OFF_ORDER_M:g} m from",
     f"| {limits.STRANGERS} losses in {limits.LIMIT_PERIOD_S:g} s; until the "
     f"{limits.LIMIT_PERIOD_S:g} s are over",

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 
-from drone_mesh.communication import messages, place_requests
+from drone_mesh.communication import messages
 from drone_mesh.communication.beacon.losses import LUCKY
+from drone_mesh.communication.beacon.neighbour import Neighbour
 from drone_mesh.communication.beacon.own_motion import OwnMotion
 from drone_mesh.communication.beacon.packets import (
     Beacon,
@@ -15,9 +16,10 @@ from drone_mesh.communication.beacon.packets import (
     names_gateway,
     newer,
 )
-from drone_mesh.communication.beacon.routes import BeaconRoutes, Neighbour
+from drone_mesh.communication.beacon.proofs import Proofs
+from drone_mesh.communication.beacon.routes import BeaconRoutes
 from drone_mesh.communication.beacon.search import HOPS_AROUND, MOST_HOPS, Searches
-from drone_mesh.communication.beacon.trickle import JITTER, Trickle
+from drone_mesh.communication.beacon.trickle import Trickle
 from drone_mesh.communication.control_plane import IControlHost, IControlPlane, IControlTechnique
 from drone_mesh.communication.courier import DROP, HOLD, Courier, Transit
 from drone_mesh.communication.deadlines import Due
@@ -42,8 +44,6 @@ MOST_WAYS = 3  # our choice: to which one node sends a packet down; after that i
 SEARCHES_S = 0.6  # our choice: a relay without a way searches for so long, then returns a packet
 WITHOUT_BEACONS_S = 5.0  # our choice: 2.5 of the longest intervals, and more
 NOT_HELD = (MessageType.MOVEMENT_NEGOTIATION, MessageType.FOUND)  # soon sent again
-PROVES_S = 60.0  # our choice: a router and its gateway tell each other the nonces of their seals
-PROVES_AGAIN_S = 5.0  # our choice: until the gateway has answered twice
 SEALED_ROOM = 20  # bytes of a beacon with a seal
 MOVED = 0.05  # of the range: a drone that is further from where it stood flies; from where the
 # others expect it, it has turned
@@ -81,6 +81,7 @@ class BeaconPlane(IControlPlane):
             lambda from_, node: self._routes.leads_not_to(node, from_),
             basics.seals.without_proof,
         )
+        self._proofs = Proofs(basics, self._routes, self._courier, states is None)
         self._trickle = Trickle(self._antenna.medium, basics.rng)
         self._searches = Searches(
             self._me, self._routes, self._broadcast, self._antenna.medium.hop_s
@@ -93,9 +94,6 @@ class BeaconPlane(IControlPlane):
         self._was_connected = self._told = False
         self._told_place: Location | None = None  # of the gateway
         self._unproven: int | None = None  # the gateway's newest number when the parent was chosen
-        self._sealed = basics.seals.reserved_bytes(MessageType.HEARTBEAT) > 0
-        self._prove_s = math.inf  # when this router sends its next heartbeat
-        self._proven: int | None = None  # the gateway that answered the last one
         self.learn = self._learn
         self.forward = self._courier.forward
 
@@ -118,8 +116,7 @@ class BeaconPlane(IControlPlane):
             self._retry(now_s)
         if now_s >= self._trickle.due_s:
             self._send_beacon()
-        if now_s >= self._prove_s:
-            self._prove(now_s)
+        self._proofs.on_time()
         self._plan()
 
     def check(self, due_s: float) -> None:
@@ -229,7 +226,7 @@ class BeaconPlane(IControlPlane):
         if before not in (gateway, NO_ROUTE):
             self._basics.report(MeshEventKind.GATEWAY_CHANGED, gateway)
             self._basics.places.forget_gateway()
-            self._prove_soon()
+            self._proofs.begin()
 
     def _show(self) -> None:
         """Tell the node whether a gateway is reached."""
@@ -260,8 +257,8 @@ class BeaconPlane(IControlPlane):
             )
             self._told = False
             self._tell()
-            if self._prove_s == math.inf:
-                self._prove_soon()
+            if self._proofs.due_s == math.inf:
+                self._proofs.begin()
         else:
             states.happened(RouterEvent.ROUTE_LOST)
             self._basics.report(MeshEventKind.DISCONNECTED, self._routes.gateway)
@@ -298,7 +295,7 @@ class BeaconPlane(IControlPlane):
             due_s = min(due_s, self._retry_s)
         if self._states is not None and not self._states.connected:
             due_s = min(due_s, self._check_s)
-        due_s = min(due_s, self._prove_s)
+        due_s = min(due_s, self._proofs.due_s)
         self._deadlines.set(Due.ROUTING, max(due_s, routes.now_s))
 
     # Beacons ---------------------------------------------------------------------------------
@@ -418,7 +415,7 @@ class BeaconPlane(IControlPlane):
             return
         if not self._basics.may_be_at(place, gateway=True):
             return
-        if self._sealed:  # the gateway itself is asked, with a proof
+        if self._proofs.has_key:  # the gateway itself is asked, with a proof
             places.hear_of_gateway(place, now_s, connected=False)
         else:
             places.update_gateway(place, now_s)
@@ -429,38 +426,10 @@ class BeaconPlane(IControlPlane):
         self._trickle.answer(self._routes.now_s, alone=True)
         self._plan()
 
-    # With a key ------------------------------------------------------------------------------
-
-    def _prove_soon(self) -> None:
-        """A new gateway: many routers find it at the same moment, while handshakes fill the air."""
-        if self._sealed and not self._routes.is_root:
-            self._prove_s = self._routes.now_s + PROVES_AGAIN_S * self._basics.rng.random()
-
-    def _prove(self, now_s: float) -> None:
-        """Tell the gateway the nonce of this node's seals; orders and reports need one."""
-        me, gateway = self._me, self._routes.gateway
-        if self._routes.parent == NO_ROUTE:
-            self._prove_s = math.inf
-            return
-        self._prove_s = now_s + PROVES_AGAIN_S * (1.0 + self._basics.rng.random())
-        self._courier.send_own(messages.heartbeat(me, me, gateway, gateway, True, gateway))
-        if self._basics.places.asks_gateway:
-            self._courier.send_own(place_requests.request(self._basics, gateway))
-
     def receive_heartbeat(self, payload: bytes, creator: int, from_: int) -> None:
-        """A router tells this gateway its nonce, or the gateway answers."""
+        """A node tells this gateway the nonce of its seals, or the gateway answers."""
         self._set_time()
-        now_s = self._routes.now_s
-        if not self._sealed:
-            self._basics.complaints.dropped("a heartbeat of another technique", payload, now_s)
-        elif messages.preferred_gateway(payload) != creator:  # gateways do not answer each other
-            if self._states is None:
-                me = self._me
-                self._courier.send_own(messages.heartbeat(me, me, creator, creator, True, me))
-        elif creator == self._routes.gateway:
-            if self._proven == creator:  # its second answer: by now it has a proof of this node
-                self._prove_s = now_s + PROVES_S * (1.0 - JITTER * self._basics.rng.random())
-            self._proven = creator
+        self._proofs.heard(payload, creator)
         self._plan()
 
     # Packets ---------------------------------------------------------------------------------

@@ -1,0 +1,64 @@
+"""Neighbour: what the beacons of one neighbour have told a node."""
+
+from __future__ import annotations
+
+import math
+
+from drone_mesh.communication.beacon.packets import Beacon, Motion
+
+FRESH = 2.5  # intervals: a neighbour that was silent for longer is none
+
+
+class Neighbour:
+    """What is known of one neighbour."""
+
+    __slots__ = (
+        "alive_s", "announced_s", "apart_m", "beacon", "doubted_s", "failed_s", "heard_s",
+        "listed_s", "loss", "motion", "near_s", "node", "reported_s", "until_s",
+    )  # fmt: skip
+
+    def __init__(self, node: int, beacon: Beacon) -> None:
+        self.node = node
+        self.beacon = beacon
+        self.heard_s = self.alive_s = self.failed_s = -math.inf
+        self.doubted_s = -math.inf  # when it did not take a packet
+        self.until_s = -math.inf  # it counts as a neighbour without a further sign of life
+        self.motion: Motion | None = None  # the last one that it reported
+        self.reported_s = -math.inf
+        self.apart_m = 0.0  # then
+        self.loss = 0.0  # of its link, in hops
+        self.announced_s: dict[int, float] = {}  # the nodes below it, and since when
+        self.listed_s: dict[int, float] = {}  # and when it listed them last
+        self.near_s: dict[int, float] = {}  # its own neighbours, and when it showed them
+
+    @property
+    def usable(self) -> bool:
+        """Whether it was alive since it failed."""
+        return self.alive_s > self.failed_s
+
+    def heard(self, beacon: Beacon, own: Motion | None, now_s: float) -> None:
+        """Its beacon arrived, while this node was where `own` says."""
+        self.beacon, self.heard_s = beacon, now_s
+        self.alive(now_s)
+        if beacon.motion is not None:
+            self.motion, self.reported_s = beacon.motion, now_s
+            self.apart_m = 0.0 if own is None else own.place.distance_m(beacon.motion.place)
+        if beacon.near:
+            self.near_s.update(dict.fromkeys(beacon.near, now_s))
+        _after, listed, new = below = beacon.below
+        announced_s = self.announced_s
+        if announced_s:
+            for node in [n for n in announced_s if n not in listed and below.covers(n)]:
+                del announced_s[node]
+        if listed:
+            for node in listed:
+                announced_s.setdefault(node, now_s)
+            self.listed_s.update(dict.fromkeys(listed, now_s))
+        if new:
+            announced_s.update(dict.fromkeys(new, now_s))
+            self.listed_s.update(dict.fromkeys(new, now_s))
+
+    def alive(self, now_s: float) -> None:
+        """A sign of life."""
+        self.alive_s = now_s
+        self.until_s = now_s + FRESH * self.beacon.interval_s

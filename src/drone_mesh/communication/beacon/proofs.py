@@ -1,0 +1,67 @@
+"""Proofs: the heartbeats of a node with a key, which tell the nonces that seals need.
+
+docs/security.md, "End-to-end seal".
+"""
+
+from __future__ import annotations
+
+import math
+
+from drone_mesh.communication import messages, place_requests
+from drone_mesh.communication.beacon.routes import BeaconRoutes
+from drone_mesh.communication.beacon.trickle import JITTER
+from drone_mesh.communication.courier import Courier
+from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.packet_types import MessageType
+from drone_mesh.communication.parts import NodeBasics
+
+PERIOD_S = 60.0  # our choice: a router and its gateway tell each other the nonces of their seals
+AGAIN_S = 5.0  # our choice: until the gateway has answered twice
+
+
+class Proofs:
+    """When this node tells its gateway its nonce, and what it answers as a gateway.
+
+    Orders and reports need them; nothing else in a mesh with beacons depends on heartbeats.
+    """
+
+    def __init__(
+        self, basics: NodeBasics, routes: BeaconRoutes, courier: Courier, is_gateway: bool
+    ) -> None:
+        self._basics, self._routes, self._courier = basics, routes, courier
+        self._is_gateway = is_gateway
+        self.has_key = basics.seals.reserved_bytes(MessageType.HEARTBEAT) > 0
+        self.due_s = math.inf  # the next heartbeat
+        self._proven: int | None = None  # the gateway that answered the last one
+
+    def begin(self) -> None:
+        """A new gateway: many find it at the same moment, while handshakes fill the air."""
+        if self.has_key and not self._routes.is_root:
+            self.due_s = self._routes.now_s + AGAIN_S * self._basics.rng.random()
+
+    def on_time(self) -> None:
+        """Tell the gateway this node's nonce, if it is due."""
+        now_s = self._routes.now_s
+        if now_s < self.due_s:
+            return
+        me, gateway = self._basics.node_id, self._routes.gateway
+        if self._routes.parent == NO_ROUTE:
+            self.due_s = math.inf
+            return
+        self.due_s = now_s + AGAIN_S * (1.0 + self._basics.rng.random())
+        self._courier.send_own(messages.heartbeat(me, me, gateway, gateway, True, gateway))
+        if self._basics.places.asks_gateway:
+            self._courier.send_own(place_requests.request(self._basics, gateway))
+
+    def heard(self, payload: bytes, creator: int) -> None:
+        """A node tells this gateway its nonce, or the gateway answers."""
+        now_s, me = self._routes.now_s, self._basics.node_id
+        if not self.has_key:
+            self._basics.complaints.dropped("a heartbeat of another technique", payload, now_s)
+        elif messages.preferred_gateway(payload) != creator:  # gateways do not answer each other
+            if self._is_gateway:
+                self._courier.send_own(messages.heartbeat(me, me, creator, creator, True, me))
+        elif creator == self._routes.gateway:
+            if self._proven == creator:  # its second answer: by now it has a proof of this node
+                self.due_s = now_s + PERIOD_S * (1.0 - JITTER * self._basics.rng.random())
+            self._proven = creator
