@@ -65,7 +65,7 @@ SENTENCES = [
     f"*Packets in receivers' own names*: {claims.CLAIMS_PER_S} a second",
     f"*Nonces in drones' names*: {claims.CLAIMS_PER_S} a second at the gateway, while the owner "
     f"orders {len(claims.ORDERED)} drones away by {claims.ORDERED_M:g} m",
-    f"are {claims.FAR.longitude * math.sqrt(2) / 1000:.1f} km away; "
+    f"are {claims.ELSEWHERE.longitude * math.sqrt(2) / 1000:.1f} km away; "
     f"then the gateway is off for {claims.OUTAGE_S:g} s",
     f"a gateway draws one every {end_to_end.NEW_GATEWAY_NONCE_AFTER_S:g} s",
     f"*with numbers ahead* are {claims.AHEAD} ahead",

@@ -62,6 +62,10 @@ class Neighbours:
             self.silent = sum(at_s > since_s for at_s in self._fell_silent_s.values()) >= 2
         return True
 
+    def forget(self, node: int) -> None:
+        """`node` is no neighbour, and perhaps never was: its silence says nothing."""
+        self._heard_s.pop(node, None)
+
     def takes_off(self, by_order: bool) -> None:
         """This node flies: if it no longer hears its neighbours, its medium still works.
 

@@ -46,7 +46,7 @@ class NodeBasics:
     def heard_origin(self, neighbour: int, digest: int) -> None:
         """A neighbour tells the digest of its origin; complains if it is not this node's."""
         is_common = self.frame.heard(neighbour, digest)
-        # Otherwise the digest may be part of a seal.
+        # The digest of a neighbour with a key, at a node without one, is part of a seal.
         if not is_common and not self.complaints.foreign_neighbour(self.now_s):
             self.complaints.add("a neighbour has another origin", f"node {neighbour}", self.now_s)
 

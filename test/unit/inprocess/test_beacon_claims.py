@@ -8,7 +8,14 @@ import math
 import pytest
 
 from drone_mesh.communication import messages
-from drone_mesh.communication.beacon.packets import NO_ANCESTORS, Beacon, Motion, Search
+from drone_mesh.communication.beacon.packets import (
+    NO_ANCESTORS,
+    Beacon,
+    Below,
+    Motion,
+    Search,
+)
+from drone_mesh.communication.deadlines import Due
 from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.packet_types import MessageType
@@ -16,6 +23,7 @@ from drone_mesh.communication.seals.keys import MeshKey
 from drone_mesh.drone.location import Location
 from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.drone import InProcessDrone
+from drone_mesh.mobility.track import Legs, leg_to, rest
 
 STILL = (0.0, 0.0, 0.0)
 FAR = Location(2000.0, 2000.0, 0.0)
@@ -45,11 +53,13 @@ def star(second_relay=False):
     return network
 
 
+def beacon_packet(creator, beacon, room=27):
+    body = beacon.to_body(room)
+    return messages.packet(MessageType.BEACON, creator, creator, BROADCAST, BROADCAST, body)
+
+
 def say(network, to, creator, beacon):
-    packet = messages.packet(
-        MessageType.BEACON, creator, creator, BROADCAST, BROADCAST, beacon.to_body(27)
-    )
-    network.inject(to, messages.readdressed(packet, to))
+    network.inject(to, messages.readdressed(beacon_packet(creator, beacon), to))
 
 
 def farthest_m(network, node, seconds):
@@ -81,19 +91,48 @@ def test_a_place_that_is_out_of_reach_leads_no_drone_there(creator, hops, parent
     assert farthest_m(network, 2, 300.0) < 20.0
 
 
-def test_with_a_key_the_gateways_own_word_about_its_place_counts():
-    """A relay that a stranger has captured tells another one, in its own beacons."""
+@pytest.mark.parametrize(("creator", "hops", "parent"), [(1, 1, 0), (0, 0, NO_ROUTE)])
+def test_with_a_key_the_gateways_own_word_about_its_place_counts(creator, hops, parent):
+    """Any node with the key can send a beacon in another's name; the hop seal is behind it."""
     network = line(key=KEY)
-    places = network.nodes[2].component.places
+    router = network.nodes[2].component
+    places = router.places
     assert not places.asks_gateway
-    relay = network.nodes[1].component
-    relay.places.update_gateway(Location(11.0, 11.0, 0.0), network.now_s() + 1e6)
-    network.run_for(20.0)
-    assert places.gateway_disputed
-    assert places.gateway.distance_m(network.location(0)) < 0.5
-    relay.places.gateway_seen_s = 0.0
-    network.run_for(80.0)
+    lie = Location(9.0, 9.0, 0.0)
+    for _ in range(60):
+        number = (router.control.routes.number + 1) % 256
+        motion, elsewhere = (None, lie) if creator else (Motion(lie, STILL), None)
+        beacon = Beacon(0, number, hops, parent, NO_ANCESTORS, 1.6, motion, elsewhere)
+        packet = beacon_packet(creator, beacon, room=20)
+        router.on_msg(messages.readdressed(packet, 2), network.now_s())
+        assert places.gateway_disputed
+        network.run_for(0.5)
+        assert places.gateway.distance_m(network.location(0)) < 0.5
+    network.run_for(70.0)
     assert not places.gateway_disputed
+
+
+@pytest.mark.parametrize("key", [None, KEY])
+def test_where_a_gateway_is_that_moves_is_known_at_each_hop(key):
+    network = Network(seed=1, routing="beacon", key=key)
+    start = {node: (6.0 * node, 0.0, 0.0) for node in range(6)}
+    network.add_gateway(0, 0.0, 0.0)
+    for node in range(1, 6):
+        network.add_router(node, *start[node][:2])
+    network.run_for(60.0)
+    now_s, speed_m_s = network.now_s(), 0.3
+    tracks = {}
+    for node, (x, y, z) in start.items():
+        away = (x, y + 300.0 * speed_m_s, z)
+        tracks[node] = Legs(
+            [rest(0.0, (x, y, z), now_s), leg_to(now_s, now_s + 300.0, (x, y, z), away)]
+        )
+    network.fly(tracks)
+    for _ in range(20):
+        network.run_for(10.0)
+        for node in range(1, 6):
+            away_m = network.nodes[node].component.places.gateway.distance_m(network.location(0))
+            assert away_m < speed_m_s * (25.0 if key else 10.0), node
 
 
 def test_a_packet_of_a_node_without_beacons_makes_no_neighbour_for_long():
@@ -215,3 +254,67 @@ def test_the_origins_digest_and_the_gateways_place_take_turns(monkeypatch):
     assert any(beacon.digest for beacon in beacons)
     assert any(beacon.gateway_place for beacon in beacons)
     assert not any(beacon.digest and beacon.gateway_place for beacon in beacons)
+
+
+def test_a_node_without_beacons_that_leaves_has_not_fallen_silent():
+    network = line()
+    network.inject(2, messages.packet(MessageType.PROBE, 200, 200, 2, 2))
+    network.run_for(1.0)
+    network.power(1, False)
+    for _ in range(20):
+        network.run_for(1.0)
+        assert not network.nodes[2].component.get_repair_status().silent
+
+
+def test_a_drone_that_is_flown_while_the_internet_is_off_learns_whom_to_step_back_to():
+    network = Network(seed=1, routing="beacon")
+    network.add_gateway(0, 0.0, 0.0)
+    for node in range(1, 5):
+        network.add_router(node, 6.0 * node, 0.0)
+    network.add_router(9, 3.0, 3.0)
+    network.run_for(30.0)
+    network.internet(0, False)
+    network.run_for(5.0)
+    start = (3.0, 3.0, 0.0)
+    begin_s = network.now_s()
+    way = leg_to(begin_s, begin_s + 60.0, start, (26.0, 3.0, 0.0))
+    network.fly({9: Legs([rest(0.0, start, begin_s), way])})
+    network.run_for(70.0)
+    places = network.nodes[9].component.places
+    assert not network.connected(9)
+    assert places.good_id in (3, 4)
+    assert places.connected_at.distance_m(network.location(9)) < 0.5
+
+
+def test_a_list_of_nodes_that_nobody_hears_is_soon_forgotten():
+    network = line()
+    say(network, 0, 77, Beacon(0, 1, 1, 0, NO_ANCESTORS, 1.6, below=Below(100, (101, 102, 103))))
+    network.run_for(2.0)
+    network.send(2, 0, b"hello")
+    network.run_for(20.0)
+    known = {node.node_id for node in network.nodes[0].component.get_known_nodes()}
+    assert known == {1, 2}
+
+
+def test_a_packet_that_is_held_is_tried_again_in_time():
+    network = line()
+    router = network.nodes[2].component
+    network.air.carries = lambda _payload: False
+    assert router.control.delivery.send_own(messages.packet(MessageType.FOUND + 1, 2, 2, 99, 99))
+    assert router.deadlines.at_s[Due.ROUTING] <= network.now_s() + 0.15 + 1e-9
+
+
+def test_a_child_of_a_dead_relay_tells_of_its_new_parent_at_once():
+    network = Network(seed=1, routing="beacon")
+    network.add_gateway(0, 0.0, 0.0)
+    network.add_router(1, 6.0, 2.0)
+    network.add_router(2, 6.0, -2.0)
+    network.add_router(3, 12.0, 0.0)
+    network.run_for(30.0)
+    router = network.nodes[3].component
+    parent = router.control.next_hop()
+    network.power(parent, False)
+    network.send(3, 0, b"hello")
+    network.run_for(0.02)
+    assert router.control.next_hop() == 3 - parent
+    assert router.deadlines.at_s[Due.ROUTING] <= network.now_s() + 0.3

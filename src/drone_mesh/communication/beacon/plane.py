@@ -39,7 +39,7 @@ LATE = 1.25  # intervals, with their jitter: then a beacon of the parent was los
 TURN_HOPS = 8  # for each neighbour: children ask one after the other, and the answer is for all
 LATE_S = 2.0  # our choice: one lost beacon of a frequent sender says little
 GATEWAY_PLACE_EVERY = 4  # beacons: one of so many carries the gateway's place
-DIGEST_EVERY = 4  # beacons: one of so many carries the digest of the origin, not the same
+DIGEST_EVERY = 4  # beacons: one of so many carries the digest of the origin
 MOST_WAYS = 3  # our choice: to which one node sends a packet down; after that it searches
 SEARCHES_S = 0.6  # our choice: a relay without a way searches for so long, then returns a packet
 WITHOUT_BEACONS_S = 5.0  # our choice: 2.5 of the longest intervals, and more
@@ -92,7 +92,8 @@ class BeaconPlane(IControlPlane):
         self._turn = basics.rng.random()  # among the children of its parent
         self._asks = True  # whether its next beacon asks for those of the neighbours
         self._was_connected = self._told = False
-        self._told_place: Location | None = None  # of the gateway
+        self._heard_place: Location | None = None  # of the gateway: what the latest beacon said
+        self._told_place: Location | None = None  # what this node's beacons have said
         self._unproven: int | None = None  # the gateway's newest number when the parent was chosen
         self.learn = self._learn
         self.forward = self._courier.forward
@@ -144,7 +145,7 @@ class BeaconPlane(IControlPlane):
         self._set_time()
         before = self._routes.gateway
         self._routes.set_internet(works)
-        self._leaves_gateway(before)
+        self._gateway_was(before)
         self._trickle.hurry(self._routes.now_s)
         self._plan()
 
@@ -169,7 +170,8 @@ class BeaconPlane(IControlPlane):
         heard = self._basics.neighbours
         for node in heard.ids().difference(routes.neighbours):  # it has sent other packets
             if now_s - heard.last_heard_s(node, now_s) > WITHOUT_BEACONS_S:
-                self._lost(node)
+                heard.forget(node)
+                self._left(node)
         parent = routes.neighbours.get(routes.parent)
         if parent is not None and parent.usable and self._is_silent(parent):
             self._probed_s = now_s
@@ -217,15 +219,16 @@ class BeaconPlane(IControlPlane):
             self._trickle.hurry(now_s)
         else:
             self._trickle.reset(now_s)
-        self._leaves_gateway(before[0])
+        self._gateway_was(before[0])
         self._show()
 
-    def _leaves_gateway(self, before: int) -> None:
+    def _gateway_was(self, before: int) -> None:
         """If it prefers another one now: report it, and forget where that one was."""
         gateway = self._routes.gateway
         if before not in (gateway, NO_ROUTE):
             self._basics.report(MeshEventKind.GATEWAY_CHANGED, gateway)
             self._basics.places.forget_gateway()
+            self._heard_place = None
             self._proofs.begin()
 
     def _show(self) -> None:
@@ -238,15 +241,14 @@ class BeaconPlane(IControlPlane):
             self._unproven = None
         flies = states.repair is RepairState.FLYING  # over links that it leaves behind
         places, here = self._basics.places, self._routes.motion
-        if connected and not flies:
+        if parent != NO_ROUTE and not flies:
             places.connected_here(None if here is None else here.place, self._routes.hops)
         is_proven = self._unproven is None or places.good is None
         if parent != NO_ROUTE and is_proven and not flies:
             neighbour = self._routes.neighbours[parent]
             if neighbour.motion is not None:
                 place, seen_s = neighbour.motion.place, neighbour.reported_s
-                if self._basics.may_be_at(place, gateway=False):
-                    places.update_next_hop(parent, place, seen_s)
+                places.update_next_hop(parent, place, seen_s)
         if connected == self._was_connected:
             return
         self._was_connected = connected
@@ -295,7 +297,7 @@ class BeaconPlane(IControlPlane):
             due_s = min(due_s, self._retry_s)
         if self._states is not None and not self._states.connected:
             due_s = min(due_s, self._check_s)
-        due_s = min(due_s, self._proofs.due_s)
+        due_s = min(due_s, self._proofs.next_s)
         self._deadlines.set(Due.ROUTING, max(due_s, routes.now_s))
 
     # Beacons ---------------------------------------------------------------------------------
@@ -316,7 +318,7 @@ class BeaconPlane(IControlPlane):
             self._trickle.interval_s,
             routes.motion,
             self._gateway_place(),
-            basics.frame.digest if self._asks or self._sent % DIGEST_EVERY == 1 else 0,
+            basics.frame.digest if self._asks or self._is_digests_turn() else 0,
             self._asks or routes.hops == NO_ROUTE,
             offline=routes.offline,
         )
@@ -333,13 +335,20 @@ class BeaconPlane(IControlPlane):
             self._shown = now_s, beacon.motion
         self._broadcast(MessageType.BEACON, self._me, body)
 
+    def _is_digests_turn(self) -> bool:
+        """With a seal, a beacon has room for it and the gateway's place, or for its own place."""
+        turn = 0 if self._room <= SEALED_ROOM else 1
+        return self._sent % DIGEST_EVERY == turn
+
     def _gateway_place(self) -> Location | None:
         """The gateway's place, if it is this beacon's turn to spread it."""
-        place, told = self._basics.places.gateway, self._told_place
+        place, told = self._heard_place, self._told_place
         if self._routes.is_root or place is None:
             return None
-        has_moved = told is None or told.distance_m(place) > self._step_m
-        if not has_moved and self._sent % GATEWAY_PLACE_EVERY:
+        every = GATEWAY_PLACE_EVERY
+        if told is None or told.distance_m(place) > self._step_m:
+            every = 2 if self._room <= SEALED_ROOM else 1  # with a seal, instead of its own
+        if self._sent % every:
             return None
         self._told_place = place
         return place
@@ -407,18 +416,22 @@ class BeaconPlane(IControlPlane):
             neighbours.set_place(node, beacon.motion.place, self._routes.now_s)
 
     def _take_gateway_place(self, node: int, beacon: Beacon) -> None:
-        places, now_s = self._basics.places, self._routes.now_s
-        if node == self._routes.gateway and beacon.motion is not None:
-            places.update_gateway(beacon.motion.place, now_s)
-        place = beacon.gateway_place
-        if place is None or node != self._routes.parent:
+        """Where the gateway is, as it says itself or the parent does."""
+        places, now_s, place = self._basics.places, self._routes.now_s, beacon.gateway_place
+        if node == self._routes.gateway:
+            place = None if beacon.motion is None else beacon.motion.place
+        elif node != self._routes.parent:
             return
-        if not self._basics.may_be_at(place, gateway=True):
+        if place is None or not self._basics.may_be_at(place, gateway=True):
             return
-        if self._proofs.has_key:  # the gateway itself is asked, with a proof
-            places.hear_of_gateway(place, now_s, connected=False)
-        else:
+        self._heard_place = place
+        if not self._proofs.has_key:
             places.update_gateway(place, now_s)
+            return
+        # Any node with the key can send a beacon in another's name; only an answer has a proof.
+        places.hear_of_gateway(place, now_s, connected=False)
+        if places.gateway is not None and places.gateway.distance_m(place) > self._step_m:
+            self._proofs.ask_soon()
 
     def receive_probe(self, payload: bytes, creator: int, from_: int) -> None:
         """The radio has acknowledged it; a beacon spares the other children the same question."""
@@ -472,7 +485,12 @@ class BeaconPlane(IControlPlane):
 
     def _lost(self, node: int) -> None:
         if self._basics.neighbours.lost(node, self._routes.now_s):
-            self._basics.report(MeshEventKind.NEIGHBOUR_LOST, node)
+            self._left(node)
+        else:
+            self._host.on_neighbour_lost(node)
+
+    def _left(self, node: int) -> None:
+        self._basics.report(MeshEventKind.NEIGHBOUR_LOST, node)
         self._host.on_neighbour_lost(node)
 
     def _verdict(self, transit: Transit) -> int:

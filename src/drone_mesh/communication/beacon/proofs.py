@@ -1,4 +1,6 @@
-"""Proofs: the heartbeats of a node with a key, which tell the nonces that seals need.
+"""Proofs: what a node with a key exchanges with its gateway because beacons prove nothing.
+
+Heartbeats tell the nonces that seals need, and the gateway is asked for its place.
 
 docs/security.md, "End-to-end seal".
 """
@@ -15,14 +17,15 @@ from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.parts import NodeBasics
 
+ASKS_S = 10.0  # our choice: at most so often for the place of a gateway that moves
 PERIOD_S = 60.0  # our choice: a router and its gateway tell each other the nonces of their seals
 AGAIN_S = 5.0  # our choice: until the gateway has answered twice
 
 
 class Proofs:
-    """When this node tells its gateway its nonce, and what it answers as a gateway.
+    """When this node sends its gateway a heartbeat or a question, and its answers as a gateway.
 
-    Orders and reports need them; nothing else in a mesh with beacons depends on heartbeats.
+    Orders and reports need the nonces; nothing else in a mesh with beacons depends on heartbeats.
     """
 
     def __init__(
@@ -32,6 +35,7 @@ class Proofs:
         self._is_gateway = is_gateway
         self.has_key = basics.seals.reserved_bytes(MessageType.HEARTBEAT) > 0
         self.due_s = math.inf  # the next heartbeat
+        self._asked_s, self._ask_s = -math.inf, math.inf  # for the place of the gateway: last, next
         self._proven: int | None = None  # the gateway that answered the last one
 
     def begin(self) -> None:
@@ -39,9 +43,26 @@ class Proofs:
         if self.has_key and not self._routes.is_root:
             self.due_s = self._routes.now_s + AGAIN_S * self._basics.rng.random()
 
-    def on_time(self) -> None:
-        """Tell the gateway this node's nonce, if it is due."""
+    def ask_soon(self) -> None:
+        """A beacon tells another place of the gateway than it told itself."""
         now_s = self._routes.now_s
+        if self._ask_s == math.inf and now_s - self._asked_s >= ASKS_S:
+            self._ask_s = now_s + AGAIN_S * self._basics.rng.random()  # others hear the same
+
+    @property
+    def next_s(self) -> float:
+        """When to call `on_time` next."""
+        return min(self.due_s, self._ask_s)
+
+    def _ask(self) -> None:
+        self._asked_s, self._ask_s = self._routes.now_s, math.inf
+        self._courier.send_own(place_requests.request(self._basics, self._routes.gateway))
+
+    def on_time(self) -> None:
+        """Do what is due."""
+        now_s = self._routes.now_s
+        if now_s >= self._ask_s:
+            self._ask()
         if now_s < self.due_s:
             return
         me, gateway = self._basics.node_id, self._routes.gateway
@@ -51,7 +72,7 @@ class Proofs:
         self.due_s = now_s + AGAIN_S * (1.0 + self._basics.rng.random())
         self._courier.send_own(messages.heartbeat(me, me, gateway, gateway, True, gateway))
         if self._basics.places.asks_gateway:
-            self._courier.send_own(place_requests.request(self._basics, gateway))
+            self._ask()
 
     def heard(self, payload: bytes, creator: int) -> None:
         """A node tells this gateway its nonce, or the gateway answers."""

@@ -84,7 +84,7 @@ class BeaconRoutes(IRoutes):
         # the neighbour that sent it, so a false one makes no other neighbour look old.
         self._numbers: dict[tuple[int, int], tuple[int, float]] = {}
         self._newest: dict[int, tuple[int, float]] = {}  # by gateway, of all neighbours
-        # By gateway: the number on which it, or the parent, said that it has no internet, and when.
+        # By gateway: the number on which the parent said that it has no internet, and when.
         self._offline: dict[int, tuple[int, float]] = {}
         self._hints: dict[int, tuple[int, float]] = {}  # by node: a neighbour that led to it, when
         self._announced: set[int] = set()  # of the nodes below
@@ -94,7 +94,6 @@ class BeaconRoutes(IRoutes):
         self._shared = shared
         self._losses = Losses(range_m)
         self._below_s: dict[int, float] = {}  # the nodes below, and when they were last
-        self._was_below_s: dict[int, float] = {}  # the same, at a gateway, of all that ever were
 
     # What it learns ----------------------------------------------------------------------------
 
@@ -116,7 +115,7 @@ class BeaconRoutes(IRoutes):
             )
         if beacon.gateway not in (NO_ROUTE, self._node_id):
             self._take_number(node, beacon)
-            if node in (beacon.gateway, self.parent):
+            if node == self.parent:
                 self._take_internet(beacon)
         return is_new
 
@@ -139,7 +138,7 @@ class BeaconRoutes(IRoutes):
             self._newest[gateway] = number, now_s
 
     def _take_internet(self, beacon: Beacon) -> None:
-        """Note whether a gateway has internet; others may only say so of their own way to it."""
+        """Note what the parent says of a gateway's internet; others speak for their own way."""
         if beacon.offline:
             self._offline[beacon.gateway] = beacon.number, self.now_s
         elif not self._is_offline(beacon):
@@ -147,9 +146,11 @@ class BeaconRoutes(IRoutes):
 
     def _is_offline(self, beacon: Beacon) -> bool:
         """Whether the gateway had no internet, when it sent the number of this beacon or later."""
-        number, at_s = self._offline.get(beacon.gateway, (0, -math.inf))
-        is_old = self.now_s - at_s > STALE * self._slowest_s() if at_s > -math.inf else True
-        return beacon.offline or (not is_old and newer(beacon.number, number) <= 0)
+        known = self._offline.get(beacon.gateway)
+        if known is None or beacon.offline:
+            return beacon.offline
+        number, at_s = known
+        return newer(beacon.number, number) <= 0 and self.now_s - at_s <= STALE * self._slowest_s()
 
     def is_news(self, node: int, beacon: Beacon) -> bool:
         """Whether a neighbour's beacon may change this node's way up or what it announces."""
@@ -192,12 +193,9 @@ class BeaconRoutes(IRoutes):
         self._hints[node] = neighbour, self.now_s
 
     def led_s(self, node: int) -> float:
-        """When this node was last known to be there, through a neighbour. Any thread.
-
-        A packet of it came, or, at a gateway, it was listed as below.
-        """
+        """When a packet of this node came last over a relay, or a relay named it. Any thread."""
         _neighbour, at_s = self._hints.get(node, (NO_ROUTE, -math.inf))
-        return max(at_s, self._was_below_s.get(node, -math.inf))
+        return max(at_s, self._below_s.get(node, -math.inf))
 
     def expired(self) -> list[int]:
         """Forget the neighbours that were silent for too long; returns them."""
@@ -414,8 +412,6 @@ class BeaconRoutes(IRoutes):
                 below_s.update(dict.fromkeys(child.announced_s, now_s))
         for node in (self._node_id, *self.ancestors, self.parent):
             below_s.pop(node, None)
-        if self._is_gateway:
-            self._was_below_s.update(below_s)
         for node in [n for n, at_s in below_s.items() if now_s - at_s > LINGERS * period_s]:
             del below_s[node]
         return set(below_s)

@@ -32,7 +32,7 @@ ORDERED_M = 3.5  # to the west, where each keeps its neighbours
 ORDER_PERIOD_S = 15.0
 AHEAD = 10  # numbers of beacons
 BEACON_ROOM = 20  # bytes, also with a seal
-FAR = Location(1500.0, 1500.0, 0.0)  # 2.1 km away; beacons tell places within 3.2 km
+ELSEWHERE = Location(1500.0, 1500.0, 0.0)  # 2.1 km away; beacons tell places within 3.2 km
 
 
 def far_counter(stranger: Stranger) -> None:
@@ -109,9 +109,9 @@ def beacons_in_names(stranger: Stranger) -> None:
 
 def beacons_of_far_places(stranger: Stranger) -> None:
     """Say in beacons that the gateway, or who sends them, is far away; then the gateway is off."""
-    motions = itertools.cycle((Motion(FAR, (0.0, 0.0, 0.0)), None))
+    motions = itertools.cycle((Motion(ELSEWHERE, (0.0, 0.0, 0.0)), None))
     for newest, motion in zip(_newest_numbers(stranger), motions):
-        gateway_place = FAR if motion is None else None
+        gateway_place = ELSEWHERE if motion is None else None
         for node, name in itertools.product(stranger.in_range(), _names(stranger)):
             hops, parent = (1, 0) if name else (0, NO_ROUTE)
             number = (newest + AHEAD) % 256
