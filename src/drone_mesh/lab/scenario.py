@@ -17,7 +17,7 @@ from drone_mesh.errors import ConfigurationError
 from drone_mesh.lab.faults import Fault
 from drone_mesh.lab.parts import Above0, AtLeast0, NodeId, Part, PartOfKind, Point, Share
 from drone_mesh.mobility import Mobility
-from drone_mesh.mobility.named_models import check as check_mobility
+from drone_mesh.mobility.limits import check as check_mobility
 from drone_mesh.mobility.settings import Knot
 
 _RANDOM = ("drones", "width_m", "least_distance_m", "require", "gateway_at")

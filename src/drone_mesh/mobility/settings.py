@@ -33,6 +33,13 @@ class Mobility:
     knots: Mapping[int, Sequence[Knot]] = field(default_factory=dict)  # trace, by drone
 
     @property
+    def moves_over_area(self) -> bool:
+        """Whether the area, and not the drones' places or given points, says where they fly."""
+        return self.kind in ("random_waypoint", "gauss_markov", "group") or (
+            self.kind == "patrol" and not self.waypoints
+        )
+
+    @property
     def mean_speed_m_s(self) -> float:
         """The middle of the range."""
         return sum(self.speed_m_s) / 2
