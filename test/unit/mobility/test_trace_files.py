@@ -10,6 +10,8 @@ from drone_mesh.errors import ConfigurationError
 from drone_mesh.mobility import Area, Mobility, tracks_of
 from drone_mesh.mobility.trace_files import read_trace, write_csv
 
+FITS_BOTH = "0 0 0 2 10 0 20 2 20 30 40 2\n"  # a line of BonnMotion: t x y, or t x y z
+
 
 def read(tmp_path, text, name="trace.txt"):
     path = tmp_path / name
@@ -28,6 +30,32 @@ def test_bonnmotion_has_a_line_for_each_drone(tmp_path):
 def test_bonnmotion_in_three_dimensions_is_recognised_by_its_times(tmp_path):
     knots = read(tmp_path, "0.0 9.0 8.0 7.0 5.0 1.0 2.0 3.0 9.0 4.0 4.0 4.0\n")
     assert knots == {0: [(0.0, 9.0, 8.0, 7.0), (5.0, 1.0, 2.0, 3.0), (9.0, 4.0, 4.0, 4.0)]}
+
+
+def test_bonnmotions_own_files_in_three_dimensions_begin_with_their_kind(tmp_path):
+    assert read(tmp_path, f"#3D\n{FITS_BOTH}") == {
+        0: [(0.0, 0.0, 0.0, 2.0), (10.0, 0.0, 20.0, 2.0), (20.0, 30.0, 40.0, 2.0)]
+    }
+    assert read(tmp_path, f"#2D\n{FITS_BOTH}") == {
+        0: [
+            (0.0, 0.0, 0.0, 0.0),
+            (2.0, 10.0, 0.0, 0.0),
+            (20.0, 2.0, 20.0, 0.0),
+            (30.0, 40.0, 2.0, 0.0),
+        ]
+    }
+
+
+def test_one_line_that_fits_only_one_kind_decides_for_all(tmp_path):
+    knots = read(tmp_path, f"{FITS_BOTH}0 1 1 2 10 5 5 2\n")
+    assert [len(knots[node]) for node in (0, 1)] == [3, 2]
+
+
+def test_comments_of_bonnmotion_are_no_drones(tmp_path):
+    assert read(tmp_path, "# by hand\n0 1 2\n\n# the other\n0 3 4\n") == {
+        0: [(0.0, 1.0, 2.0, 0.0)],
+        1: [(0.0, 3.0, 4.0, 0.0)],
+    }
 
 
 def test_bonnmotions_own_compressed_files_are_read(tmp_path):
@@ -71,6 +99,11 @@ def test_csv_rows_may_come_in_any_order(tmp_path):
         ("t,id,x,y,z\n1,2,nan,0,0\n", "line 2"),
         ("0.0 1.0 two\n", "line 1: expected numbers"),
         ("5.0 1.0 2.0 4.0 1.0 2.0\n", "rising t"),
+        (FITS_BOTH, "fits both t x y and t x y z: .* first line #2D or #3D"),
+        ("0 1 1 9 2 2\n0 1 1 2 9 2 2 2\n", "lines of t x y and lines of t x y z"),
+        ("#3D\n0 1 1\n", "line 2: expected t x y z again and again"),
+        ("0 1 1 10 5 5 10 6 6\n", "line 1: .* rising t"),
+        ("0 1 1 10 5\n", "line 1: expected t x y or t x y z"),
         ("$node_(0) set X_ left\n", "line 1: expected numbers"),
     ],
 )
