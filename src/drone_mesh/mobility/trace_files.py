@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import gzip
+import zlib
 from pathlib import Path
 from typing import Iterable, Tuple
 
@@ -33,7 +34,9 @@ def read_trace(path: Path) -> Knots:
             text = gzip.decompress(path.read_bytes()).decode("utf-8")
         else:
             text = path.read_text(encoding="utf-8")
-    except (OSError, EOFError, UnicodeDecodeError) as error:
+    except (EOFError, zlib.error) as error:
+        raise ConfigurationError(f"trace {path}: damaged or cut off; compress it again") from error
+    except (OSError, UnicodeDecodeError) as error:
         raise ConfigurationError(f"trace {path}: {error}") from error
     lines = text.splitlines()
     try:

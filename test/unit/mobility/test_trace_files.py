@@ -64,6 +64,15 @@ def test_bonnmotions_own_compressed_files_are_read(tmp_path):
     assert read_trace(path) == {0: [(0.0, 1.0, 2.0, 0.0)]}
 
 
+def test_a_damaged_or_cut_off_compressed_file_is_named(tmp_path):
+    path = tmp_path / "scenario.movements.gz"
+    whole = gzip.compress(b"0.0 1.0 2.0\n" * 100)
+    for content in (whole[:-12], whole[:10] + bytes(20) + whole[30:]):
+        path.write_bytes(content)
+        with pytest.raises(ConfigurationError, match=r"trace .*movements\.gz: damaged or cut off"):
+            read_trace(path)
+
+
 def test_ns2_nodes_fly_to_their_destinations_until_a_new_one_comes(tmp_path):
     knots = read(
         tmp_path,
