@@ -236,6 +236,13 @@ def _read_files(content: Dict[str, Any], source: Source) -> None:
 def _check_ids(scenario: Scenario, source: Source) -> None:
     if scenario.layout.kind in ("casus", "file"):
         return
+    layout_has = f"the layout has 0..{scenario.layout.drones - 1}"
+    for node, *_knot in scenario.mobility.knots or ():
+        if node >= scenario.layout.drones:
+            raise source.error(
+                ("base", "mobility", "path"),
+                f"mobility.path: the trace names drone {node:g}; {layout_has}",
+            )
     for index, fault in enumerate(scenario.faults):
         one = getattr(fault.what, "id", None)
         for node in (
@@ -246,8 +253,7 @@ def _check_ids(scenario: Scenario, source: Source) -> None:
             if node >= scenario.layout.drones:
                 raise source.error(
                     ("base", "faults", index, fault.action),
-                    f"faults.{index}.{fault.action}: no drone {node}; the layout has "
-                    f"0..{scenario.layout.drones - 1}",
+                    f"faults.{index}.{fault.action}: no drone {node}; {layout_has}",
                 )
 
 

@@ -90,12 +90,11 @@ def _around_its_place(
 
 
 def _trace(fleet: Fleet) -> dict[int, Track]:
-    """The drones that the trace names; before its first time, a drone is at its first place."""
+    """Before the first time of a drone, it is at its first place."""
     tracks: dict[int, Track] = {}
     for node in fleet.places:
-        knots = [(t, (x, y, z)) for t, x, y, z in fleet.mobility.knots.get(node, ())]
-        if knots:
-            tracks[node] = Legs(legs_between([(min(-1.0, knots[0][0] - 1.0), knots[0][1]), *knots]))
+        knots = [(t, (x, y, z)) for t, x, y, z in fleet.mobility.knots[node]]
+        tracks[node] = Legs(legs_between([(min(-1.0, knots[0][0] - 1.0), knots[0][1]), *knots]))
     return tracks
 
 
@@ -120,14 +119,27 @@ def tracks_of(
 ) -> dict[int, Track]:
     """By id: the tracks of the drones that move. `places`: of all drones, at time 0.
 
-    The same seed gives the same motion, whatever else is random. Raises ConfigurationError.
+    A trace moves the drones that it names, gateways included. The same seed gives the same motion,
+    whatever else is random. Raises ConfigurationError.
     """
     if mobility.kind not in KINDS:
         known = ", ".join(KINDS)
         raise ConfigurationError(f"unknown mobility {mobility.kind}: use one of {known}")
     check(mobility)
     check_area(mobility, area)
+    chosen = _movers(mobility, places, gateways, seed)
+    return KINDS[mobility.kind](Fleet(mobility, {n: places[n] for n in chosen}, area, seed))
+
+
+def _movers(
+    mobility: Mobility, places: Mapping[int, Vector], gateways: Collection[int], seed: int
+) -> list[int]:
+    if mobility.kind == "trace":  # the file says who moves
+        unknown = sorted(mobility.knots.keys() - places.keys())
+        if unknown:
+            ids = f"{min(places)}..{max(places)}" if places else "none"
+            raise ConfigurationError(f"the trace names drone {unknown[0]}; the drones are {ids}")
+        return sorted(mobility.knots)
     movable = [node for node in sorted(places) if mobility.gateways or node not in gateways]
     count = round(mobility.share * len(movable))
-    chosen = sorted(random.Random(f"{seed} movers").sample(movable, count))
-    return KINDS[mobility.kind](Fleet(mobility, {n: places[n] for n in chosen}, area, seed))
+    return sorted(random.Random(f"{seed} movers").sample(movable, count))

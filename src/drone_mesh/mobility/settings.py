@@ -19,7 +19,7 @@ class Mobility:
     speed_m_s: tuple[float, float] = (0.3, 0.3)  # least and greatest
     pause_s: float = 0.0  # at each way-point
     height_m: float = 0.0  # of all flights
-    share: float = 1.0  # of the drones; they are drawn
+    share: float = 1.0  # of the drones; they are drawn. trace: those that it names, instead
     gateways: bool = False  # move as well
     steady: bool = True  # random_waypoint: from its steady state on; False: from where drones stand
     climbs: bool = False  # random_waypoint: each leg by the document's profile

@@ -150,7 +150,9 @@ def test_positions_can_be_unknown_to_the_mesh() -> None:
 
 
 def test_a_trace_is_read_beside_the_experiment(tmp_path: Path) -> None:
-    (tmp_path / "flight.csv").write_text("t,id,x,y,z\n0,2,1,0,0\n10,2,4,0,0\n", encoding="utf-8")
+    (tmp_path / "flight.csv").write_text(
+        "t,id,x,y,z\n0,2,1,0,0\n10,2,4,0,0\n0,0,9,9,0\n", encoding="utf-8"
+    )
     file = tmp_path / "motion.yaml"
     file.write_text(
         "name: motion\nbase:\n  layout: {kind: line, drones: 3}\n  duration_s: 12\n"
@@ -160,6 +162,10 @@ def test_a_trace_is_read_beside_the_experiment(tmp_path: Path) -> None:
     (cell,) = load_experiment(file).cells
     record = Simulation(cell.scenario, Streams(1, 0)).run()
     assert record.end.places[2] == pytest.approx((4.0, 0.0, 0.0))
+    assert record.end.places[0] == pytest.approx((9.0, 9.0, 0.0))  # the gateway
+    (tmp_path / "flight.csv").write_text("t,id,x,y,z\n0,3,1,0,0\n", encoding="utf-8")
+    with pytest.raises(ConfigurationError, match=r"line 5: .*drone 3; the layout has 0\.\.2"):
+        load_experiment(file)
     (tmp_path / "flight.csv").write_text("t,id\n", encoding="utf-8")
     with pytest.raises(ConfigurationError, match=r"mobility\.path: trace .*flight\.csv"):
         load_experiment(file)

@@ -141,3 +141,20 @@ def test_drones_fly_a_trace_and_rest_before_and_after_it():
     mobility = Mobility("trace", knots=knots)
     (track,) = tracks_of(mobility, places, {0}, Area(0, 0, 1, 1), 1).values()
     assert [track.position_at(t)[0] for t in (0.0, 2.0, 3.0, 4.0, 9.0)] == [0.0, 0.0, 4.0, 8.0, 8.0]
+
+
+def test_a_trace_moves_every_drone_that_it_names_gateways_included():
+    knots = {0: [(0.0, 0.0, 0.0, 1.0), (4.0, 8.0, 0.0, 1.0)], 2: [(0.0, 5.0, 5.0, 0.0)]}
+    places = {node: (3.0, 3.0, 0.0) for node in range(3)}
+    tracks = tracks_of(Mobility("trace", knots=knots), places, {0}, Area(0, 0, 1, 1), 1)
+    assert {node: track.position_at(2.0) for node, track in tracks.items()} == {
+        0: (4.0, 0.0, 1.0),
+        2: (5.0, 5.0, 0.0),
+    }
+
+
+def test_a_trace_of_a_drone_that_is_not_there_is_refused():
+    mobility = Mobility("trace", knots={7: [(0.0, 0.0, 0.0, 1.0)]})
+    places = {node: (3.0, 3.0, 0.0) for node in range(3)}
+    with pytest.raises(ConfigurationError, match=r"the trace names drone 7; the drones are 0\.\.2"):
+        tracks_of(mobility, places, (), Area(0, 0, 1, 1), 1)
