@@ -23,7 +23,7 @@ def read_bonnmotion(lines: Iterable[str]) -> Knots:
         if line.strip() in _COLUMNS:
             readings = [_COLUMNS[line.strip()]]
         elif line.strip() and not line.startswith("#"):
-            drones.append((number, list(_numbers(number, line))))
+            drones.append((number, [number_in(word, number) for word in line.split()]))
     if not drones:
         return {}
     for number, numbers in drones:
@@ -35,13 +35,6 @@ def read_bonnmotion(lines: Iterable[str]) -> Knots:
         both = "fits both t x y and t x y z" if fit else "has lines of t x y and lines of t x y z"
         raise ValueError(f"{both}: say which it is in a first line #2D or #3D")
     return {node: list(_knots(numbers, fit[0])) for node, (_number, numbers) in enumerate(drones)}
-
-
-def _numbers(number: int, line: str) -> Iterator[float]:
-    try:
-        yield from map(number_in, line.split())
-    except ValueError as error:
-        raise ValueError(f"line {number}: expected numbers, t x y again and again") from error
 
 
 def _is_track(numbers: list[float], columns: int) -> bool:

@@ -10,11 +10,15 @@ from drone_mesh.mobility.settings import Knot
 Knots = Dict[int, List[Knot]]  # by drone, in order of time
 
 
-def number_in(text: str) -> float:
-    """Raises ValueError, also for nan and inf."""
-    value = float(text)
+def number_in(text: str, line: int, name: str = "") -> float:
+    """The number called `name` in this line. Raises ValueError, also for nan and inf."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
     if not math.isfinite(value):
-        raise ValueError(f"{text} is not finite")
+        given = f"{name} {text}".strip()
+        raise ValueError(f"line {line}: expected numbers, not {given}")
     return value
 
 

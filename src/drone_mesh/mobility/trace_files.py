@@ -6,13 +6,14 @@ import csv
 import gzip
 import zlib
 from pathlib import Path
-from typing import Iterable, Tuple
+from typing import Iterable, Sequence, Tuple
 
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.mobility.bonnmotion import read_bonnmotion
 from drone_mesh.mobility.gateway_record import FIRST_BYTE, answers, places
-from drone_mesh.mobility.knots import Knots, number_in
+from drone_mesh.mobility.knots import Knots, follows, number_in
 from drone_mesh.mobility.ns2_movement import is_ns2, read_ns2
+from drone_mesh.mobility.settings import Knot
 
 TraceRow = Tuple[float, int, float, float, float]  # t (s), drone, x, y, z (m)
 
@@ -31,12 +32,14 @@ def read_trace(path: Path) -> Knots:
     """
     try:
         if path.suffix == ".gz":
-            text = gzip.decompress(path.read_bytes()).decode("utf-8")
+            text = gzip.decompress(path.read_bytes()).decode("utf-8-sig")
         else:
-            text = path.read_text(encoding="utf-8")
+            text = path.read_text(encoding="utf-8-sig")
     except (EOFError, zlib.error) as error:
         raise ConfigurationError(f"trace {path}: damaged or cut off; compress it again") from error
-    except (OSError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError as error:
+        raise ConfigurationError(f"trace {path}: not a text file in UTF-8") from error
+    except OSError as error:
         raise ConfigurationError(f"trace {path}: {error}") from error
     lines = text.splitlines()
     try:
@@ -46,9 +49,12 @@ def read_trace(path: Path) -> Knots:
             knots = read_ns2(lines)
         elif lines and lines[0].startswith(FIRST_BYTE):
             knots = _recorded(lines)
+        elif lines and _is_another_table(lines[0]):
+            header = ",".join(CSV_HEADER)
+            raise ValueError(f"line 1: expected the header {header}, not {lines[0][:60]!r}")
         else:
             knots = read_bonnmotion(lines)
-    except ValueError as error:
+    except (ValueError, csv.Error) as error:
         raise ConfigurationError(f"trace {path}: {error}") from error
     if not knots:
         raise ConfigurationError(f"trace {path}: no drone in it")
@@ -64,18 +70,37 @@ def write_csv(path: Path, rows: Iterable[TraceRow]) -> None:
             writer.writerow([f"{t:.3f}", node, *(f"{value:.3f}" for value in place)])
 
 
+def _is_another_table(line: str) -> bool:
+    """Whether a file that begins so is CSV with another header or separator, or with none."""
+    words = line.split()
+    return "," in line or ";" in line or bool(words) and words[0].isidentifier()
+
+
 def _csv(lines: Iterable[str]) -> Knots:
-    found: Knots = {}
+    """Rows may come in any order. Raises ValueError, which names the line."""
+    found: dict[int, list[tuple[Knot, int]]] = {}  # each with its line
     for number, row in enumerate(csv.reader(lines), start=1):
         if number == 1 or not row:
             continue
-        try:
-            t, node, x, y, z = row
-            knot = (number_in(t), number_in(x), number_in(y), number_in(z))
-            found.setdefault(int(node), []).append(knot)
-        except ValueError as error:
-            raise ValueError(f"line {number}: expected t,id,x,y,z as numbers") from error
-    return {node: sorted(knots) for node, knots in sorted(found.items())}
+        node, knot = _row(number, row)
+        found.setdefault(node, []).append((knot, number))
+    for node, knots in found.items():
+        knots.sort()
+        for (before, _line), (knot, number) in zip(knots, knots[1:]):
+            if not follows(knot, before):
+                raise ValueError(f"line {number}: drone {node} is at two places at {knot[0]:g} s")
+    return {node: [knot for knot, _line in found[node]] for node in sorted(found)}
+
+
+def _row(number: int, row: Sequence[str]) -> tuple[int, Knot]:
+    if len(row) != len(CSV_HEADER):
+        raise ValueError(f"line {number}: expected {','.join(CSV_HEADER)}, not {len(row)} values")
+    if not row[1].strip().isdecimal():
+        raise ValueError(f"line {number}: id {row[1].strip()} must be a whole number, 0 or more")
+    t, x, y, z = (
+        number_in(text, number, name) for name, text in zip(CSV_HEADER, row) if name != "id"
+    )
+    return int(row[1]), (t, x, y, z)
 
 
 def _recorded(lines: Iterable[str]) -> Knots:
@@ -83,6 +108,6 @@ def _recorded(lines: Iterable[str]) -> Knots:
     for t, answer in answers(lines):
         for node, place in places(answer):
             knots = found.setdefault(node, [])
-            if not knots or knots[-1][1:] != place:
+            if not knots or (t > knots[-1][0] and knots[-1][1:] != place):
                 knots.append((t, *place))
     return found

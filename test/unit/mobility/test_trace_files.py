@@ -82,6 +82,8 @@ def test_ns2_nodes_fly_to_their_destinations_until_a_new_one_comes(tmp_path):
         "$node_(0) set Z_ 0.0\n"
         "$node_(1) set X_ 0.0\n"
         "$god_ set-dist 0 1 1\n"
+        '$ns_ at 1.0 "$god_ set-dist 0 1 2"\n'
+        "\n"
         '$ns_ at 2.0 "$node_(0) setdest 1.0 12.0 2.0"\n'
         '$ns_ at 4.0 "$node_(0) setdest 7.0 6.0 3.0"\n',
     )
@@ -100,10 +102,32 @@ def test_csv_rows_may_come_in_any_order(tmp_path):
     assert knots == {2: [(0.5, 9.0, 9.0, 1.0)], 4: [(0.0, 1.0, 2.0, 0.0), (1.0, 3.0, 3.0, 0.0)]}
 
 
+def test_csv_may_begin_with_a_byte_order_mark(tmp_path):
+    assert read(tmp_path, "\ufefft,id,x,y,z\r\n1.0,4,3,3,0\r\n") == {4: [(1.0, 3.0, 3.0, 0.0)]}
+
+
+NS2 = "$node_(1) set X_ 4.0\n"
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
         ("", "no drone"),
+        ("t;id;x;y;z\n0;1;0;0;2\n", "line 1: expected the header t,id,x,y,z, not 't;id;x;y;z'"),
+        ("time,node,x,y,z\n0,1,0,0,2\n", "line 1: expected the header t,id,x,y,z, not 'time,"),
+        ("0,1,0,0,2\n", "line 1: expected the header t,id,x,y,z, not '0,1,0,0,2'"),
+        ("t id x y z\n0 1 0 0 2\n", "line 1: expected the header t,id,x,y,z"),
+        ("t,id,x,y,z\n0,1,0,0,2\n1,1,nan,0,2\n", "line 3: expected numbers, not x nan"),
+        ("t,id,x,y,z\ninf,1,0,0,2\n", "line 2: expected numbers, not t inf"),
+        ("t,id,x,y,z\n0,1.5,0,0,2\n", "line 2: id 1.5 must be a whole number"),
+        ("t,id,x,y,z\n0,-1,0,0,2\n", "line 2: id -1 must be a whole number"),
+        ("t,id,x,y,z\n0,1,5,5,2\n0,1,0,0,2\n", "drone 1 is at two places at 0 s"),
+        (f'{NS2}$ns_ at 2.0 "$node_(1) setdst 3 4 1"\n', "line 2: expected .*, not .*setdst"),
+        (f'{NS2}$ns at 2.0 "$node_(1) setdest 3 4 1"\n', "line 2: expected .*, not '.ns at"),
+        (f'{NS2}$ns_ at 2.0 "$node_(1) setdest 3 4 5 1"\n', "line 2: expected .* setdest X Y"),
+        (f'{NS2}$ns_ at 2.0 "$node_(1) setdest 3 4 -1.5"\n', "line 2: .* speed -1.5 must be 0"),
+        (f'{NS2}$ns_ at -2.0 "$node_(1) setdest 3 4 1"\n', "line 2: time -2.0 .* must be 0"),
+        ('$ns_ at 2.0 "$node_(1) setdest 3 4 1"\n', "node 1 has no start"),
         ("t,id,x,y,z\n1,2,3\n", "line 2: expected t,id,x,y,z"),
         ("t,id,x,y,z\n1,2,nan,0,0\n", "line 2"),
         ("0.0 1.0 two\n", "line 1: expected numbers"),
@@ -158,3 +182,10 @@ def test_a_trace_of_a_drone_that_is_not_there_is_refused():
     places = {node: (3.0, 3.0, 0.0) for node in range(3)}
     with pytest.raises(ConfigurationError, match=r"the trace names drone 7; the drones are 0\.\.2"):
         tracks_of(mobility, places, (), Area(0, 0, 1, 1), 1)
+
+
+def test_a_file_that_is_no_text_is_named(tmp_path):
+    path = tmp_path / "flight.csv"
+    path.write_bytes("t,id,x,y,z\n0,1,0,0,2 \u00e9\n".encode("latin-1"))
+    with pytest.raises(ConfigurationError, match="flight.csv: not a text file in UTF-8"):
+        read_trace(path)
