@@ -308,6 +308,23 @@ def test_a_further_drone_does_not_change_the_motion_of_the_others():
         ("share", 1.5, "0..1"),
         ("alpha", -0.1, "0..1"),
         ("radius_m", 0.0, "above 0"),
+        ("speed_m_s", (1.0, math.inf), "two speeds above 0"),
+        ("speed_m_s", 0.3, "two speeds above 0"),
+        ("speed_m_s", (0.3, 0.4, 0.5), "two speeds above 0"),
+        ("speed_m_s", ("slow", "fast"), "two speeds above 0"),
+        ("pause_s", math.nan, "0 or more"),
+        ("update_s", math.inf, "above 0"),
+        ("groups", 2.5, "a whole number"),
+        ("height_m", math.nan, "0..500"),
+        ("height_m", -3.0, "0..500"),
+        ("height_m", "high", "0..500"),
+        ("cruise_height_m", math.nan, "from height_m, 0, to 500"),
+        ("waypoints", ((1.0, math.nan), (1.0, 1.0)), "pairs x, y of finite numbers"),
+        ("waypoints", ((1.0, 1.0, 2.0), (5.0, 1.0, 2.0)), "pairs x, y"),
+        ("knots", {1: ()}, "knots of drone 1: must be t, x, y and z"),
+        ("knots", {1: ((0.0, 1.0, 1.0),)}, "knots of drone 1: must be t, x, y and z"),
+        ("knots", {1: ((0.0, math.nan, 1.0, 0.0),)}, "knots of drone 1: .* finite"),
+        ("knots", {1: ((2.0, 1.0, 1.0, 0.0), (1.0, 1.0, 1.0, 0.0))}, "t must rise"),
         ("waypoints", ((1.0, 1.0), (1.0, 1.0)), "two different places"),
         ("kind", "teleport", "use one of none, random_waypoint"),
     ],
@@ -316,6 +333,11 @@ def test_a_number_that_no_model_can_use_is_refused(number, value, words):
     mobility = dataclasses.replace(Mobility("patrol"), **{number: value})
     with pytest.raises(ConfigurationError, match=words):
         tracks_of(mobility, MANY, (), AREA, 1)
+
+
+def test_a_ceiling_below_the_flights_is_refused():
+    with pytest.raises(ConfigurationError, match="cruise_height_m 3.0: must be from height_m, 5,"):
+        tracks("random_waypoint", climbs=True, height_m=5.0, cruise_height_m=3.0)
 
 
 # Tracks --------------------------------------------------------------------------------------
