@@ -214,6 +214,7 @@ def _scenario(
         except ConfigurationError as error:
             raise source.error(named.get(key, ("base", key)), f"{key}: {error}") from None
     _check_ids(scenario, source)
+    _check_begins(scenario, source)
     return scenario
 
 
@@ -255,6 +256,26 @@ def _check_ids(scenario: Scenario, source: Source) -> None:
                     ("base", "faults", index, fault.action),
                     f"faults.{index}.{fault.action}: no drone {node}; {layout_has}",
                 )
+
+
+def _check_begins(scenario: Scenario, source: Source) -> None:
+    """Refuse what begins after the end of the run: nothing would show that it never happened."""
+    if scenario.sequence is not None:  # it has faults and an end of its own
+        return
+    begins: List[Tuple[KeyPath, Optional[float]]] = [
+        (("faults", index, fault.action), fault.at_s) for index, fault in enumerate(scenario.faults)
+    ]
+    if scenario.probes.per_s:
+        begins.append((("probes", "from_s"), scenario.probes.from_s + scenario.probes.within_s))
+    if scenario.mobility.knots:
+        begins.append((("mobility", "path"), min(t for _id, t, *_place in scenario.mobility.knots)))
+    for place, begin_s in begins:
+        if begin_s is not None and begin_s >= scenario.duration_s:
+            raise source.error(
+                ("base", *place),
+                f"{'.'.join(map(str, place))}: begins at {begin_s:g} s, after the end of the run "
+                f"(duration_s {scenario.duration_s:g})",
+            )
 
 
 def _check_metrics(experiment: Experiment, source: Source) -> None:
