@@ -305,8 +305,10 @@ def _check_compare(experiment: Experiment, cells: Sequence[Cell], source: Source
             ("compare", "over"),
             f"compare.over: no axis {compare.over}; {nearest_name(compare.over, axes)}",
         )
-    if all(cell.values[compare.over] != compare.baseline for cell in cells):
+    values = [cell.values[compare.over] for cell in cells]
+    if compare.baseline not in values:
         raise source.error(
             ("compare", "baseline"),
-            f"compare.baseline: {compare.baseline!r} is not a value of {compare.over}",
+            f"compare.baseline: {compare.baseline!r} is not a value of {compare.over}; "
+            f"give one that is, as in compare.baseline={as_text(values[0])}",
         )

@@ -181,6 +181,13 @@ def test_what_belongs_to_the_whole_file_is_checked_as_well(
     assert "\n" not in message
 
 
+def test_an_axis_without_the_baseline_asks_for_another_baseline(tmp_path: Path) -> None:
+    path = write(tmp_path, f"{GOOD}compare: {{over: radio.loss, baseline: 0.2}}\n")
+    with pytest.raises(ConfigurationError, match=r"line 14: .*as in compare\.baseline=0\.4$"):
+        load_experiment(path, ["sweep.radio.loss=[0.4]"])
+    load_experiment(path, ["sweep.radio.loss=[0.4]", "compare.baseline=0.4"])
+
+
 @pytest.mark.parametrize(
     ("argument", "words"),
     [
