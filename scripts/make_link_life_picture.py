@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import csv
 import statistics
 import sys
@@ -17,10 +18,14 @@ WAYS = (("pdr_up", "to the gateway"), ("pdr_down", "from the gateway"))
 
 def main() -> None:
     """Arguments: the folders of the results."""
-    rows = []
-    for folder in sys.argv[1:]:
-        with (Path(folder) / "runs.csv").open(encoding="utf-8") as file:
-            rows += csv.DictReader(file)
+    parser = argparse.ArgumentParser(description=__doc__, allow_abbrev=False)
+    parser.add_argument("results", type=Path, nargs="+", help="a folder that `lab run` made")
+    try:
+        rows = [row for folder in parser.parse_args().results for row in runs_in(folder)]
+    except OSError as error:
+        sys.exit(f"make_link_life_picture: {error.filename}: {error.strerror}")
+    except ValueError as error:
+        sys.exit(f"make_link_life_picture: {error}")
     figure = Figure(figsize=(9, 3.6), layout="constrained")
     for axes, (metric, title) in zip(figure.subplots(1, 2, sharey=True), WAYS):
         for routing in dict.fromkeys(row["routing"] for row in rows):
@@ -39,6 +44,16 @@ def main() -> None:
     figure.axes[0].set_ylabel("messages that arrive, %")
     figure.axes[0].legend(loc="lower right")
     figure.savefig(PICTURE, dpi=110)
+
+
+def runs_in(folder: Path) -> list[dict[str, str]]:
+    """The rows of its runs.csv. Raises OSError, and ValueError if they do not fit the picture."""
+    with (folder / "runs.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    missing = {"routing", "mobility.speed_m_s", "link_life_s", *dict(WAYS)}.difference(*rows[:1])
+    if missing:
+        raise ValueError(f"{folder}: no runs of experiments/link_life.yaml: no {min(missing)}")
+    return rows
 
 
 def mean(rows: list[dict[str, str]], metric: str) -> float:

@@ -226,6 +226,7 @@ class Network:
         """Pilots fly these drones along their tracks from now on; the mesh is not told.
 
         See drone_mesh.mobility for tracks; `share` and `gateways` of a Mobility say which drones.
+        Raises ConfigurationError for a drone that is not in the network.
         """
         drones = {node_id: node.drone for node_id, node in self.nodes.items()}
         return Pilots(self.clock, self.air, drones, tracks)

@@ -7,6 +7,7 @@ from typing import Iterable, Mapping
 import numpy as np
 
 from drone_mesh.drone.location import Location
+from drone_mesh.errors import ConfigurationError
 from drone_mesh.inprocess.clock import Clock
 from drone_mesh.inprocess.drone import InProcessDrone
 from drone_mesh.inprocess.interfaces import IInProcessAir
@@ -29,7 +30,13 @@ class Pilots:
         drones: Mapping[int, InProcessDrone],
         tracks: Mapping[int, Track],
     ) -> None:
-        """From now on these drones are where their tracks say, which begin at time 0."""
+        """From now on these drones are where their tracks say, which begin at time 0.
+
+        Raises ConfigurationError for a track of a drone that there is not.
+        """
+        unknown = sorted(tracks.keys() - drones.keys())
+        if unknown:
+            raise ConfigurationError(f"drone {unknown[0]} has a track and is not in the network")
         self._clock, self._air = clock, air
         self._drones, self._tracks = drones, tracks
         for node in tracks:

@@ -214,6 +214,7 @@ def _scenario(
         except ConfigurationError as error:
             raise source.error(named.get(key, ("base", key)), f"{key}: {error}") from None
     _check_ids(scenario, source)
+    _check_begins(scenario, source)
     return scenario
 
 
@@ -236,6 +237,13 @@ def _read_files(content: Dict[str, Any], source: Source) -> None:
 def _check_ids(scenario: Scenario, source: Source) -> None:
     if scenario.layout.kind in ("casus", "file"):
         return
+    layout_has = f"the layout has 0..{scenario.layout.drones - 1}"
+    for node, *_knot in scenario.mobility.knots or ():
+        if node >= scenario.layout.drones:
+            raise source.error(
+                ("base", "mobility", "path"),
+                f"mobility.path: the trace names drone {node:g}; {layout_has}",
+            )
     for index, fault in enumerate(scenario.faults):
         one = getattr(fault.what, "id", None)
         for node in (
@@ -246,9 +254,28 @@ def _check_ids(scenario: Scenario, source: Source) -> None:
             if node >= scenario.layout.drones:
                 raise source.error(
                     ("base", "faults", index, fault.action),
-                    f"faults.{index}.{fault.action}: no drone {node}; the layout has "
-                    f"0..{scenario.layout.drones - 1}",
+                    f"faults.{index}.{fault.action}: no drone {node}; {layout_has}",
                 )
+
+
+def _check_begins(scenario: Scenario, source: Source) -> None:
+    """Refuse what begins after the end of the run: nothing would show that it never happened."""
+    if scenario.sequence is not None:  # it has faults and an end of its own
+        return
+    begins: List[Tuple[KeyPath, Optional[float]]] = [
+        (("faults", index, fault.action), fault.at_s) for index, fault in enumerate(scenario.faults)
+    ]
+    if scenario.probes.per_s:
+        begins.append((("probes", "from_s"), scenario.probes.from_s + scenario.probes.within_s))
+    if scenario.mobility.knots:
+        begins.append((("mobility", "path"), min(t for _id, t, *_place in scenario.mobility.knots)))
+    for place, begin_s in begins:
+        if begin_s is not None and begin_s >= scenario.duration_s:
+            raise source.error(
+                ("base", *place),
+                f"{'.'.join(map(str, place))}: begins at {begin_s:g} s, after the end of the run "
+                f"(duration_s {scenario.duration_s:g})",
+            )
 
 
 def _check_metrics(experiment: Experiment, source: Source) -> None:
@@ -278,8 +305,10 @@ def _check_compare(experiment: Experiment, cells: Sequence[Cell], source: Source
             ("compare", "over"),
             f"compare.over: no axis {compare.over}; {nearest_name(compare.over, axes)}",
         )
-    if all(cell.values[compare.over] != compare.baseline for cell in cells):
+    values = [cell.values[compare.over] for cell in cells]
+    if compare.baseline not in values:
         raise source.error(
             ("compare", "baseline"),
-            f"compare.baseline: {compare.baseline!r} is not a value of {compare.over}",
+            f"compare.baseline: {compare.baseline!r} is not a value of {compare.over}; "
+            f"give one that is, as in compare.baseline={as_text(values[0])}",
         )

@@ -26,6 +26,7 @@ class PartOfKind(Part):
 
     KEYS: ClassVar[Dict[str, FrozenSet[str]]]
     OF_ALL_KINDS: ClassVar[FrozenSet[str]] = frozenset()
+    NAME: ClassVar[str] = ""  # in errors; default: that of the class
 
     kind: str
 
@@ -34,7 +35,7 @@ class PartOfKind(Part):
         allowed = self.KEYS[self.kind] | self.OF_ALL_KINDS
         extra = sorted(self.model_fields_set - allowed - {"kind"})
         if extra:
-            what, words = type(self).__name__.lower(), ", ".join(sorted(allowed))
+            what, words = self.NAME or type(self).__name__.lower(), ", ".join(sorted(allowed))
             raise ValueError(f"{what} {self.kind} has no {extra[0]}: it has {words}")
         return self
 

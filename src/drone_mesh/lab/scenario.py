@@ -17,9 +17,21 @@ from drone_mesh.errors import ConfigurationError
 from drone_mesh.lab.faults import Fault
 from drone_mesh.lab.parts import Above0, AtLeast0, NodeId, Part, PartOfKind, Point, Share
 from drone_mesh.mobility import Mobility
-from drone_mesh.mobility.named_models import check as check_mobility
+from drone_mesh.mobility.limits import check as check_mobility
 from drone_mesh.mobility.settings import Knot
+from drone_mesh.yaml_file import is_number
 
+_MODEL = ("speed_m_s", "height_m", "share", "gateways")
+_CLIMBS = ("climbs", "cruise_height_m")
+_MOTION: Dict[str, FrozenSet[str]] = {
+    "random_waypoint": frozenset({"pause_s", "steady", "area", *_CLIMBS, *_MODEL}),
+    "gauss_markov": frozenset({"alpha", "update_s", "area", *_MODEL}),
+    "group": frozenset({"groups", "radius_m", "pause_s", "area", *_CLIMBS, *_MODEL}),
+    "patrol": frozenset({"lanes", "waypoints", "area", *_MODEL}),
+    "oval": frozenset({"radius_m", *_MODEL}),
+    "eight": frozenset({"radius_m", *_MODEL}),
+    "trace": frozenset({"path", "knots"}),
+}
 _RANDOM = ("drones", "width_m", "least_distance_m", "require", "gateway_at")
 
 
@@ -82,14 +94,22 @@ class Radio(PartOfKind):
     jitter_s: AtLeast0 = 0.0
 
 
-class MotionSettings(Part):
+class MotionSettings(PartOfKind):
     """How drones move that the mesh does not steer, as in Mobility; see docs/motion.md."""
+
+    NAME: ClassVar[str] = "mobility"
+    # An axis may set the kind to none beside others: their numbers do no harm.
+    KEYS: ClassVar[Dict[str, FrozenSet[str]]] = {
+        **_MOTION,
+        "none": frozenset().union(*_MOTION.values()),
+    }
+    OF_ALL_KINDS = frozenset({"told"})
 
     kind: Literal[
         "none", "random_waypoint", "gauss_markov", "group", "patrol", "oval", "eight", "trace"
     ] = "none"
     told: bool = False  # each leg is ordered through the mesh, and flown like every order
-    speed_m_s: Union[Above0, Annotated[List[Above0], Field(min_length=2, max_length=2)]] = 0.3
+    speed_m_s: Union[float, List[float]] = 0.3
     pause_s: AtLeast0 = Mobility.pause_s
     height_m: Annotated[float, Field(ge=0, le=MAX_HEIGHT_M)] = Mobility.height_m
     share: Share = Mobility.share
@@ -109,8 +129,18 @@ class MotionSettings(Part):
     knots: Optional[List[Annotated[List[float], Field(min_length=5, max_length=5)]]] = None
     # its content: id, t, x, y, z
 
+    @field_validator("speed_m_s", mode="before")
+    @classmethod
+    def _is_one_speed_or_two(cls, value: object) -> object:
+        speeds = value if isinstance(value, list) and len(value) == 2 else [value]
+        if not all(is_number(speed) and 0 < speed <= 1e6 for speed in speeds):
+            raise ValueError("give one speed above 0, or two in a list, the lower first, in m/s")
+        return value
+
     @model_validator(mode="after")
     def _can_move(self) -> "MotionSettings":
+        if self.model_fields_set and "kind" not in self.model_fields_set:
+            raise ValueError("nothing moves without a kind: add kind: random_waypoint, for example")
         if self.kind == "trace" and self.path is None:
             raise ValueError("mobility of kind trace needs path")
         if self.area is not None and min(self.area[2:]) <= 0:

@@ -12,17 +12,21 @@ FIRST_BYTE = "{"  # of every line, and of no other file that is read in its plac
 
 
 def answers(lines: Iterable[str]) -> Iterator[Answer]:
-    """Each answer, oldest first. Raises ValueError if there is none.
+    """Each answer, oldest first. Raises ValueError if there is none, or for one with wrong places.
 
     A line that was cut off, as by a power failure, is left out.
     """
     latest_s, start_s, found = 0.0, 0.0, False
-    for line in lines:
+    for number, line in enumerate(lines, start=1):
         try:
             answer = json.loads(line)
             uptime_s = float(answer["uptime_s"])
         except (ValueError, KeyError, TypeError):
             continue
+        try:
+            list(places(answer))
+        except ValueError as error:
+            raise ValueError(f"line {number}: {error}") from error
         if start_s + uptime_s < latest_s:  # the gateway was started again
             start_s = latest_s
         latest_s, found = start_s + uptime_s, True
@@ -40,3 +44,7 @@ def places(answer: Any) -> Iterator[tuple[int, tuple[float, float, float]]]:
                 yield int(node["id"]), (longitude, latitude, height)
     except (KeyError, TypeError) as error:
         raise ValueError("expected an answer to GET /mesh") from error
+    except ValueError as error:
+        raise ValueError(
+            f"node {node['id']}: place {node['place']} must be three numbers"
+        ) from error

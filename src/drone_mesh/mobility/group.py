@@ -10,14 +10,20 @@ from drone_mesh.drone.flight_path import Vector
 from drone_mesh.mobility.area import Area
 from drone_mesh.mobility.random_waypoint import random_waypoint
 from drone_mesh.mobility.settings import Mobility
-from drone_mesh.mobility.track import Legs, Track, legs_between
+from drone_mesh.mobility.track import Legs, Track, legs_between, rest
 
 WANDERING = 0.5  # our choice: mean speed within the group, as a share of the group's
 
 
 def reference_point(mobility: Mobility, area: Area, rng: random.Random) -> Legs:
-    """The middle of one group, on random waypoints that keep the whole group in the area."""
-    return random_waypoint(mobility, area.without_border(mobility.radius_m), rng)
+    """The middle of one group, on random waypoints that keep the whole group in the area.
+
+    A group that does not fit into the area stays around its middle.
+    """
+    inside = area.without_border(mobility.radius_m)
+    if not inside.diagonal_m:
+        return Legs([rest(0.0, mobility.at_height(inside[:2]))])
+    return random_waypoint(mobility, inside, rng)
 
 
 def wandering(mobility: Mobility, rng: random.Random) -> Track:

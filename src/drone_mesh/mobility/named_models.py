@@ -10,6 +10,7 @@ from drone_mesh.errors import ConfigurationError
 from drone_mesh.mobility.area import Area
 from drone_mesh.mobility.gauss_markov import gauss_markov
 from drone_mesh.mobility.group import reference_point, wandering
+from drone_mesh.mobility.limits import check, check_area
 from drone_mesh.mobility.patrol import eight, lanes, oval
 from drone_mesh.mobility.random_waypoint import random_waypoint
 from drone_mesh.mobility.settings import Mobility
@@ -89,12 +90,11 @@ def _around_its_place(
 
 
 def _trace(fleet: Fleet) -> dict[int, Track]:
-    """The drones that the trace names; before its first time, a drone is at its first place."""
+    """Before the first time of a drone, it is at its first place."""
     tracks: dict[int, Track] = {}
     for node in fleet.places:
-        knots = [(t, (x, y, z)) for t, x, y, z in fleet.mobility.knots.get(node, ())]
-        if knots:
-            tracks[node] = Legs(legs_between([(min(-1.0, knots[0][0] - 1.0), knots[0][1]), *knots]))
+        knots = [(t, (x, y, z)) for t, x, y, z in fleet.mobility.knots[node]]
+        tracks[node] = Legs(legs_between([(min(-1.0, knots[0][0] - 1.0), knots[0][1]), *knots]))
     return tracks
 
 
@@ -119,33 +119,27 @@ def tracks_of(
 ) -> dict[int, Track]:
     """By id: the tracks of the drones that move. `places`: of all drones, at time 0.
 
-    The same seed gives the same motion, whatever else is random. Raises ConfigurationError.
+    A trace moves the drones that it names, gateways included. The same seed gives the same motion,
+    whatever else is random. Raises ConfigurationError.
     """
-    check(mobility)
-    movable = [node for node in sorted(places) if mobility.gateways or node not in gateways]
-    count = round(mobility.share * len(movable))
-    chosen = sorted(random.Random(f"{seed} movers").sample(movable, count))
-    return KINDS[mobility.kind](Fleet(mobility, {n: places[n] for n in chosen}, area, seed))
-
-
-def check(mobility: Mobility) -> None:
-    """Raise ConfigurationError for numbers that no model can use."""
-    low, high = mobility.speed_m_s
     if mobility.kind not in KINDS:
         known = ", ".join(KINDS)
         raise ConfigurationError(f"unknown mobility {mobility.kind}: use one of {known}")
-    for name, is_right, rule in (
-        ("speed_m_s", 0 < low <= high, "two speeds above 0, the lower first"),
-        ("share", 0 <= mobility.share <= 1, "0..1"),
-        ("alpha", 0 <= mobility.alpha <= 1, "0..1"),
-        ("pause_s", mobility.pause_s >= 0, "0 or more"),
-        ("update_s", mobility.update_s > 0, "above 0"),
-        ("radius_m", mobility.radius_m > 0, "above 0"),
-        ("groups", mobility.groups >= 1, "1 or more"),
-        ("lanes", mobility.lanes >= 1, "1 or more"),
-        ("waypoints", len(set(mobility.waypoints)) != 1, "two different places or more"),
-    ):
-        if not is_right:
-            raise ConfigurationError(
-                f"invalid mobility {name} {getattr(mobility, name)}: must be {rule}"
-            )
+    check(mobility)
+    check_area(mobility, area)
+    chosen = _movers(mobility, places, gateways, seed)
+    return KINDS[mobility.kind](Fleet(mobility, {n: places[n] for n in chosen}, area, seed))
+
+
+def _movers(
+    mobility: Mobility, places: Mapping[int, Vector], gateways: Collection[int], seed: int
+) -> list[int]:
+    if mobility.kind == "trace":  # the file says who moves
+        unknown = sorted(mobility.knots.keys() - places.keys())
+        if unknown:
+            ids = f"{min(places)}..{max(places)}" if places else "none"
+            raise ConfigurationError(f"the trace names drone {unknown[0]}; the drones are {ids}")
+        return sorted(mobility.knots)
+    movable = [node for node in sorted(places) if mobility.gateways or node not in gateways]
+    count = round(mobility.share * len(movable))
+    return sorted(random.Random(f"{seed} movers").sample(movable, count))

@@ -19,7 +19,7 @@ class Mobility:
     speed_m_s: tuple[float, float] = (0.3, 0.3)  # least and greatest
     pause_s: float = 0.0  # at each way-point
     height_m: float = 0.0  # of all flights
-    share: float = 1.0  # of the drones; they are drawn
+    share: float = 1.0  # of the drones; they are drawn. trace: those that it names, instead
     gateways: bool = False  # move as well
     steady: bool = True  # random_waypoint: from its steady state on; False: from where drones stand
     climbs: bool = False  # random_waypoint: each leg by the document's profile
@@ -31,6 +31,13 @@ class Mobility:
     lanes: int = 6  # patrol over the area
     waypoints: Sequence[Point] = ()  # patrol: a loop instead of lanes
     knots: Mapping[int, Sequence[Knot]] = field(default_factory=dict)  # trace, by drone
+
+    @property
+    def moves_over_area(self) -> bool:
+        """Whether the area, and not the drones' places or given points, says where they fly."""
+        return self.kind in ("random_waypoint", "gauss_markov", "group") or (
+            self.kind == "patrol" and not self.waypoints
+        )
 
     @property
     def mean_speed_m_s(self) -> float:

@@ -8,6 +8,7 @@ import pytest
 
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.drone.location import Location
+from drone_mesh.errors import ConfigurationError
 from drone_mesh.inprocess import Network
 from drone_mesh.mobility import Area, Mobility, tracks_of
 from drone_mesh.mobility.track import Legs, leg_to, legs_between
@@ -119,3 +120,10 @@ def test_the_same_seed_gives_the_same_motion_with_every_technique():
         return [network.location(node) for node in network.nodes]
 
     assert places("child_table_tree") == places("flooding")
+
+
+def test_a_track_of_a_drone_that_is_not_in_the_network_is_refused():
+    network = fleet("disc", drones=3)
+    track = Legs(legs_between([(0.0, (0.0, 0.0, 0.0))]))
+    with pytest.raises(ConfigurationError, match="drone 50 has a track and is not in the network"):
+        network.fly({1: track, 50: track})

@@ -112,6 +112,8 @@ def test_a_default_that_is_written_out_is_the_same_run(tmp_path: Path) -> None:
         ("drones: 5", "drones: 300", 4, "base.layout.drones: input should be less than or equal"),
         ("drones: 5", "mean_degree: 8", 4, "base.layout: layout grid has no mean_degree"),
         ("at_s: 2", "at_s: -2", 7, "base.faults.0.at_s: input should be greater than or equal"),
+        ("at_s: 2", "at_s: 5", 8, "faults.0.kill: begins at 5 s, after the end of the run"),
+        ("  faults:", "  probes: {per_s: 1}\n  faults:", 6, "probes.from_s: begins at 22 s, after"),
         ("at_s: 2", "at: 2", 7, "unknown key base.faults.0.at; did you mean at_s?"),
         ("share: 0.1}", "share: 0.1, number: 3}", 8, "give exactly one of share, number"),
         ("share: 0.1}", "ids: [9]}", 8, "base.faults.0.kill: give exactly one"),
@@ -177,6 +179,13 @@ def test_what_belongs_to_the_whole_file_is_checked_as_well(
     assert message.startswith(f"{path}, line {line}: ")
     assert words in message
     assert "\n" not in message
+
+
+def test_an_axis_without_the_baseline_asks_for_another_baseline(tmp_path: Path) -> None:
+    path = write(tmp_path, f"{GOOD}compare: {{over: radio.loss, baseline: 0.2}}\n")
+    with pytest.raises(ConfigurationError, match=r"line 14: .*as in compare\.baseline=0\.4$"):
+        load_experiment(path, ["sweep.radio.loss=[0.4]"])
+    load_experiment(path, ["sweep.radio.loss=[0.4]", "compare.baseline=0.4"])
 
 
 @pytest.mark.parametrize(

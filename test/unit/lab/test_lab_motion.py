@@ -150,7 +150,9 @@ def test_positions_can_be_unknown_to_the_mesh() -> None:
 
 
 def test_a_trace_is_read_beside_the_experiment(tmp_path: Path) -> None:
-    (tmp_path / "flight.csv").write_text("t,id,x,y,z\n0,2,1,0,0\n10,2,4,0,0\n", encoding="utf-8")
+    (tmp_path / "flight.csv").write_text(
+        "t,id,x,y,z\n0,2,1,0,0\n10,2,4,0,0\n0,0,9,9,0\n", encoding="utf-8"
+    )
     file = tmp_path / "motion.yaml"
     file.write_text(
         "name: motion\nbase:\n  layout: {kind: line, drones: 3}\n  duration_s: 12\n"
@@ -160,6 +162,13 @@ def test_a_trace_is_read_beside_the_experiment(tmp_path: Path) -> None:
     (cell,) = load_experiment(file).cells
     record = Simulation(cell.scenario, Streams(1, 0)).run()
     assert record.end.places[2] == pytest.approx((4.0, 0.0, 0.0))
+    assert record.end.places[0] == pytest.approx((9.0, 9.0, 0.0))  # the gateway
+    (tmp_path / "flight.csv").write_text("t,id,x,y,z\n0,3,1,0,0\n", encoding="utf-8")
+    with pytest.raises(ConfigurationError, match=r"line 5: .*drone 3; the layout has 0\.\.2"):
+        load_experiment(file)
+    (tmp_path / "flight.csv").write_text("t,id,x,y,z\n12,2,1,0,0\n", encoding="utf-8")
+    with pytest.raises(ConfigurationError, match=r"mobility\.path: begins at 12 s, after the end"):
+        load_experiment(file)
     (tmp_path / "flight.csv").write_text("t,id\n", encoding="utf-8")
     with pytest.raises(ConfigurationError, match=r"mobility\.path: trace .*flight\.csv"):
         load_experiment(file)
@@ -172,11 +181,31 @@ def test_a_trace_is_read_beside_the_experiment(tmp_path: Path) -> None:
         ({"kind": "patrol", "area": [0.0, 0.0, 0.0, 5.0]}, "above 0"),
         ({"kind": "random_waypoint", "speed_m_s": [2.0, 1.0]}, "lower first"),
         ({"kind": "hover"}, "random_waypoint"),
+        ({"speed_m_s": 1.0}, "nothing moves without a kind"),
+        (
+            {"kind": "patrol", "path": "ok.csv"},
+            "mobility patrol has no path: it has area, gateways",
+        ),
+        ({"kind": "trace", "path": "ok.csv", "gateways": True}, "mobility trace has no gateways"),
+        ({"kind": "random_waypoint", "radius_m": 3.0}, "mobility random_waypoint has no radius_m"),
+        ({"kind": "oval", "speed_m_s": [1.0, 2.0, 3.0]}, "give one speed above 0, or two"),
+        ({"kind": "oval", "speed_m_s": 0.0}, "give one speed above 0, or two"),
+        ({"kind": "oval", "speed_m_s": [1.0, "fast"]}, "give one speed above 0, or two"),
+        (
+            {"kind": "group", "climbs": True, "height_m": 5.0, "cruise_height_m": 3.0},
+            "cruise_height_m 3.0: must be from height_m, 5,",
+        ),
     ],
 )
 def test_motion_that_cannot_be_is_refused(mobility: dict[str, Any], words: str) -> None:
     with pytest.raises(ValueError, match=words):
         Scenario.model_validate({"mobility": mobility})
+
+
+def test_an_axis_may_compare_motion_with_rest() -> None:
+    numbers = {"speed_m_s": 0.5, "radius_m": 2.0}
+    for kind in ("none", "oval"):
+        Scenario.model_validate({"mobility": {"kind": kind, **numbers}})
 
 
 def test_many_drones_at_once_are_switched_off_and_on_again_each_minute() -> None:

@@ -169,6 +169,50 @@ def test_the_middle_of_a_group_keeps_the_circle_in_the_area():
     assert all(5.0 <= value <= 35.0 for x, y, _z in points for value in (x, y))
 
 
+@pytest.mark.parametrize("radius_m", [20.0, 500.0])
+def test_a_group_that_does_not_fit_into_the_area_stays_around_its_middle(radius_m):
+    flown = tracks("group", groups=2, radius_m=radius_m, height_m=3.0)
+    middle = (20.0, 20.0, 3.0)
+    for t_s in (0.0, 250.0):
+        away_m = [math.dist(track.position_at(t_s), middle) for track in flown.values()]
+        assert radius_m / 2 < max(away_m) <= radius_m
+
+
+def test_a_group_wider_than_the_area_is_deep_moves_along_it():
+    middle = reference_point(Mobility("group", radius_m=5.0), Area(0, 0, 40, 8), random.Random(1))
+    points = [middle.position_at(t) for t in range(0, 2000, 13)]
+    assert {y for _x, y, _z in points} == {4.0}
+    assert max(x for x, _y, _z in points) > 30.0
+
+
+@pytest.mark.parametrize("kind", ["random_waypoint", "gauss_markov", "group", "patrol"])
+@pytest.mark.parametrize(
+    ("area", "words"),
+    [
+        (Area(5.0, 5.0, 0.0, 0.0), "above 0"),
+        (Area(0.0, 0.0, -5.0, 5.0), "0 or more"),
+        (Area(0.0, 0.0, 5.0, math.inf), "finite"),
+        (Area(math.nan, 0.0, 5.0, 5.0), "finite"),
+    ],
+)
+def test_an_area_without_room_to_move_is_refused(kind, area, words):
+    with pytest.raises(ConfigurationError, match=f"invalid area .*{words}"):
+        tracks(kind, area=area)
+
+
+def test_gauss_markov_on_a_line_is_refused_and_random_waypoints_are_not():
+    line = Area(0.0, 3.0, 40.0, 0.0)
+    with pytest.raises(ConfigurationError, match="gauss_markov needs a width and a depth above 0"):
+        tracks("gauss_markov", area=line)
+    assert {t.position_at(9.0)[1] for t in tracks("random_waypoint", area=line).values()} == {3.0}
+
+
+def test_kinds_that_need_no_area_take_any():
+    loop = ((0.0, 0.0), (9.0, 0.0))
+    assert tracks("patrol", area=Area(5.0, 5.0, 0.0, 0.0), waypoints=loop)
+    assert tracks("oval", area=Area(5.0, 5.0, 0.0, 0.0))
+
+
 # Patrols -------------------------------------------------------------------------------------
 
 
@@ -264,6 +308,23 @@ def test_a_further_drone_does_not_change_the_motion_of_the_others():
         ("share", 1.5, "0..1"),
         ("alpha", -0.1, "0..1"),
         ("radius_m", 0.0, "above 0"),
+        ("speed_m_s", (1.0, math.inf), "two speeds above 0"),
+        ("speed_m_s", 0.3, "two speeds above 0"),
+        ("speed_m_s", (0.3, 0.4, 0.5), "two speeds above 0"),
+        ("speed_m_s", ("slow", "fast"), "two speeds above 0"),
+        ("pause_s", math.nan, "0 or more"),
+        ("update_s", math.inf, "above 0"),
+        ("groups", 2.5, "a whole number"),
+        ("height_m", math.nan, "0..500"),
+        ("height_m", -3.0, "0..500"),
+        ("height_m", "high", "0..500"),
+        ("cruise_height_m", math.nan, "from height_m, 0, to 500"),
+        ("waypoints", ((1.0, math.nan), (1.0, 1.0)), "pairs x, y of finite numbers"),
+        ("waypoints", ((1.0, 1.0, 2.0), (5.0, 1.0, 2.0)), "pairs x, y"),
+        ("knots", {1: ()}, "knots of drone 1: must be t, x, y and z"),
+        ("knots", {1: ((0.0, 1.0, 1.0),)}, "knots of drone 1: must be t, x, y and z"),
+        ("knots", {1: ((0.0, math.nan, 1.0, 0.0),)}, "knots of drone 1: .* finite"),
+        ("knots", {1: ((2.0, 1.0, 1.0, 0.0), (1.0, 1.0, 1.0, 0.0))}, "t must rise"),
         ("waypoints", ((1.0, 1.0), (1.0, 1.0)), "two different places"),
         ("kind", "teleport", "use one of none, random_waypoint"),
     ],
@@ -272,6 +333,11 @@ def test_a_number_that_no_model_can_use_is_refused(number, value, words):
     mobility = dataclasses.replace(Mobility("patrol"), **{number: value})
     with pytest.raises(ConfigurationError, match=words):
         tracks_of(mobility, MANY, (), AREA, 1)
+
+
+def test_a_ceiling_below_the_flights_is_refused():
+    with pytest.raises(ConfigurationError, match="cruise_height_m 3.0: must be from height_m, 5,"):
+        tracks("random_waypoint", climbs=True, height_m=5.0, cruise_height_m=3.0)
 
 
 # Tracks --------------------------------------------------------------------------------------

@@ -100,7 +100,8 @@ def test_an_experiment_flies_along_the_reported_places(tmp_path: Path) -> None:
         answer(2.0, 10.0, 20.0, 5.0),
         answer(3.0, 10.0, 20.0, 5.0),
         answer(32.0, 10.0, 50.0, 5.0),
-        answer(4.0, 10.0, 60.0, 5.0),  # the gateway was started again
+        answer(0.0, 10.0, 55.0, 5.0),  # the gateway was started again
+        answer(4.0, 10.0, 60.0, 5.0),
     )
     assert read_trace(file) == {
         3: [(2.0, 20.0, 10.0, 5.0), (32.0, 50.0, 10.0, 5.0), (36.0, 60.0, 10.0, 5.0)]
@@ -117,6 +118,15 @@ def test_a_line_that_a_power_failure_cut_is_left_out_and_another_file_is_refused
         file.write_text(content)
         with pytest.raises(ConfigurationError, match="answer to GET /mesh"):
             read_trace(file)
+
+
+def test_a_place_that_is_not_three_numbers_is_named_with_its_line(tmp_path: Path) -> None:
+    file = tmp_path / "flight.jsonl"
+    write(file, answer(1.0, 1.0, 2.0, 3.0), answer(2.0, 1.0, 2.0))
+    with pytest.raises(
+        ConfigurationError, match=r"line 2: node 3: place \[1.0, 2.0\] must be three"
+    ):
+        read_trace(file)
 
 
 def test_an_answer_becomes_a_state_and_its_events() -> None:

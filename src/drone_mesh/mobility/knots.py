@@ -1,0 +1,27 @@
+"""Knots: the times and places that a recorded motion is made of."""
+
+from __future__ import annotations
+
+import math
+from typing import Dict, List
+
+from drone_mesh.mobility.settings import Knot
+
+Knots = Dict[int, List[Knot]]  # by drone, in order of time
+
+
+def number_in(text: str, line: int, name: str = "") -> float:
+    """The number called `name` in this line. Raises ValueError, also for nan and inf."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        given = f"{name} {text}".strip()
+        raise ValueError(f"line {line}: expected numbers, not {given}")
+    return value
+
+
+def follows(knot: Knot, before: Knot) -> bool:
+    """Whether a drone can be there next: later, or at the same time at the same place."""
+    return knot[0] > before[0] or knot == before
