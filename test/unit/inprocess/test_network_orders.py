@@ -129,3 +129,23 @@ def test_with_a_key_a_restarted_router_is_believed_again(routing, seed):
     assert network.order(3, 18.0, 2.0)
     network.run_for(30.0)
     assert gateway.get_orders()[0].state is OrderState.ARRIVED
+
+
+@pytest.mark.parametrize("routing", ["child_table_tree", "steady_tree", "beacon"])
+def test_with_a_key_a_gateway_goes_on_believing_the_relays_of_others(routing):
+    """A relay learns from the gateway's answers to others that it is connected, and no nonce."""
+    network = Network(
+        seed=0,
+        routing=routing,
+        radio="shared",
+        rate="250k",
+        key=MeshKey(bytes(range(KEY_BYTES))),
+        timing=MeshTiming(report_period_s=30.0),
+    )
+    network.add_fleet(gateways=1, routers=15, gridsize=4, spacing=6.0)
+    network.run_for(60.0)
+    for _ in range(10):
+        network.run_for(60.0)
+        reports = network.nodes[0].component.get_node_reports()
+        late = [one.node_id for one in reports if network.now_s() - one.heard_s > 65.0]
+        assert (len(reports), late) == (15, [])

@@ -14,11 +14,13 @@ from drone_mesh.communication.heartbeats.parts import HeartbeatParts
 from drone_mesh.communication.heartbeats.relay_check import RelayCheck
 from drone_mesh.communication.interfaces import MAX_NODE_ID, NO_ROUTE
 from drone_mesh.communication.observer import MeshEventKind, in_hops
+from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.place_requests import ask_for_place
 from drone_mesh.communication.router_states import ConnectionState, RouterEvent, RouterStates
 
 _HOPS_UNTIL_KNOWN = 10  # our choice: the number of hops for which to wait for the first answer
 RESIGNED_PERIODS = 2.5  # our choice: a gateway without internet that is silent for longer is lost
+NONCE_PERIODS = 5.0  # our choice: a gateway's nonce is valid for two minutes after it was told
 MAX_AGE_PERIODS = 3  # docs/protocol.md, "Places to step back to": of the gateway's place
 
 
@@ -46,6 +48,8 @@ class GatewayConnection:
         self._introduce = introduce
         self._heartbeat_sent_s = -math.inf
         self._answered_s = -math.inf
+        self._answered_itself_s = -math.inf  # this router, and not only one behind it
+        self._has_key = parts.seals.reserved_bytes(MessageType.HEARTBEAT) > 0
         self.just_lost = False  # the last route failed since the last check
         self._shown_connected = False
         self._shortcut: Shortcut | None = None
@@ -248,9 +252,18 @@ class GatewayConnection:
         return self._parts.now_s - self._resigned_s <= periods * self._parts.timing.check_period_s
 
     def proven(self, patience: float) -> bool:
-        """Whether the gateway answered within the last `patience` check periods."""
-        since_s = self._parts.now_s - patience * self._parts.timing.check_period_s
-        return self._answered_s > since_s
+        """Whether the gateway answered within the last `patience` check periods.
+
+        With a key, answers for others do not tell this router the gateway's nonce.
+        """
+        now_s, period_s = self._parts.now_s, self._parts.timing.check_period_s
+        if self._has_key and now_s - self._answered_itself_s > NONCE_PERIODS * period_s:
+            return False
+        return self._answered_s > now_s - patience * period_s
+
+    def answered_itself(self) -> None:
+        """The gateway has answered a heartbeat of this router."""
+        self._answered_itself_s = self._parts.now_s
 
     def check(self, patience: float) -> None:
         """The part of the periodic check for a connected router."""

@@ -40,8 +40,16 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         self._parts = HeartbeatParts(**vars(basics), routing=technique, delivery=self._delivery)
         self._introduction = Introduction(self._parts, host, lambda node: self.send_heartbeat(node))
         self._search = NodeSearch(self._parts, self._answer_search)
-        self.learn = technique.learn
+        self._learn_from = technique.learn
+        self.learn = self._learn
         self.forward = self._forwarding.forward
+
+    def _learn(self, creator: int, from_: int, kind: int, payload: bytes) -> bool:
+        """Where a technique adds bytes, a neighbour with a key has a part of its seal."""
+        room = messages.EXTENSION_ROOM.get(kind)
+        if room and self._parts.complaints.is_foreign(from_, self._deadlines.now_s):
+            payload = messages.extended(payload, bytes(room))
+        return self._learn_from(creator, from_, kind, payload)
 
     # Time and surroundings -------------------------------------------------------------------
 

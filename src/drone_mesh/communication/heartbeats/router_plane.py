@@ -141,6 +141,8 @@ class RouterHeartbeats(HeartbeatPlane):
         if creator == self._connection.gateway != preferred_gateway:
             self._connection.gateway_resigned()
         if creator == preferred_gateway:
+            if creator == self._connection.gateway:
+                self._connection.answered_itself()
             if self._connection.on_gateway_heartbeat(creator, hops + 1):
                 self._host.on_connected()
         elif know_gateway != self._states.connected:
