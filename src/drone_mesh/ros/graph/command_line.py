@@ -93,7 +93,7 @@ def start_node(about: str | None, name: str, *, disable_signals: bool = False) -
         sys.exit(FAILED)
     try:
         rospy.init_node(name, argv=_words(), disable_signals=disable_signals)
-    except rospy.ROSInitException as error:  # it is told to end while it registers
+    except rospy.ROSException as error:  # it is told to end while it registers
         print(f"{program}: {error}", file=sys.stderr)
         sys.exit(FAILED)
 
