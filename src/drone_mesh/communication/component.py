@@ -277,7 +277,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
             if places.gateway is not None:
                 gateway, age_s = self.get_preferred_gateway(), now_s - places.gateway_seen_s
                 extension = messages.GatewayPlace(gateway, places.gateway, age_s)
-                if self._parts.seals.reserved_bytes(MessageType.LOCATION):
+                if self._parts.has_key:
                     self._parts.delivery.send_own(extension.to_payload(me, me, asker, asker))
                 else:
                     answer = extension.appended_to(answer)

@@ -12,6 +12,7 @@ from drone_mesh.communication.frames import CommonFrame
 from drone_mesh.communication.interfaces import IMeshSeals, IWirelessCommunication
 from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.observer import Reporter
+from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.places import KnownPlaces
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.communication.ways import IDelivery, IRoutes
@@ -42,6 +43,11 @@ class NodeBasics:
     def now_s(self) -> float:
         """The time of the component's latest call."""
         return self.deadlines.now_s
+
+    @property
+    def has_key(self) -> bool:
+        """Whether its mesh has a key."""
+        return self.seals.reserved_bytes(MessageType.HEARTBEAT) > 0
 
     def heard_origin(self, neighbour: int, digest: int) -> None:
         """A neighbour tells the digest of its origin; complains if it is not this node's."""

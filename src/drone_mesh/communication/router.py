@@ -19,7 +19,6 @@ from drone_mesh.communication.messages import (
     place_in,
 )
 from drone_mesh.communication.observer import MeshEventKind
-from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.place_requests import LastPlace
 from drone_mesh.communication.repair.connection_repair import ConnectionRepair
 from drone_mesh.communication.repair.interfaces import IRepairStrategy
@@ -112,7 +111,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
 
     def _on_passing_location(self, creator: int, payload: bytes) -> None:
         """Relays use the gateway's place as well, unless only the addressee can check it."""
-        if self._parts.seals.reserved_bytes(MessageType.LOCATION):
+        if self._parts.has_key:
             return
         if creator == self.control.gateway:
             place = place_in(payload)

@@ -14,7 +14,6 @@ from drone_mesh.communication.beacon.routes import BeaconRoutes
 from drone_mesh.communication.beacon.trickle import JITTER
 from drone_mesh.communication.courier import Courier
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.parts import NodeBasics
 
 ASKS_S = 10.0  # our choice: at most so often for the place of a gateway that moves
@@ -33,7 +32,7 @@ class Proofs:
     ) -> None:
         self._basics, self._routes, self._courier = basics, routes, courier
         self._is_gateway = is_gateway
-        self.has_key = basics.seals.reserved_bytes(MessageType.HEARTBEAT) > 0
+        self.has_key = basics.has_key
         self.due_s = math.inf  # the next heartbeat
         self._asked_s, self._ask_s = -math.inf, math.inf  # for the place of the gateway: last, next
         self._proven: int | None = None  # the gateway that answered the last one

@@ -14,7 +14,6 @@ from drone_mesh.communication.heartbeats.parts import HeartbeatParts
 from drone_mesh.communication.heartbeats.relay_check import RelayCheck
 from drone_mesh.communication.interfaces import MAX_NODE_ID, NO_ROUTE
 from drone_mesh.communication.observer import MeshEventKind, in_hops
-from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.place_requests import ask_for_place
 from drone_mesh.communication.router_states import ConnectionState, RouterEvent, RouterStates
 
@@ -49,7 +48,7 @@ class GatewayConnection:
         self._heartbeat_sent_s = -math.inf
         self._answered_s = -math.inf
         self._answered_itself_s = -math.inf  # this router, and not only one behind it
-        self._has_key = parts.seals.reserved_bytes(MessageType.HEARTBEAT) > 0
+        self._has_key = parts.has_key
         self.just_lost = False  # the last route failed since the last check
         self._shown_connected = False
         self._shortcut: Shortcut | None = None

@@ -14,7 +14,6 @@ import math
 from drone_mesh.communication.heartbeats.detours import SWALLOWER_AVOIDED_S, Detours
 from drone_mesh.communication.heartbeats.parts import HeartbeatParts
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.place_requests import ask_for_place
 
 ASK_PERIODS = 3.0  # our choice, in check periods: one packet and its answer in half a minute
@@ -79,7 +78,7 @@ class RelayCheck:
         If no answers come, later heartbeats go through another neighbour.
         """
         parts, now_s = self._parts, self._parts.now_s
-        sealed = parts.seals.reserved_bytes(MessageType.LOCATION) > 0
+        sealed = parts.has_key
         relayed = next_hop not in (gateway, NO_ROUTE)
         if not (sealed and relayed and parts.routing.TAKES_SHORTCUTS):
             return False

@@ -11,7 +11,6 @@ import math
 from drone_mesh.communication.control_plane import IControlPlane
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.observer import MeshEventKind
-from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.parts import NodeParts
 from drone_mesh.communication.repair.actions import RepairActions, Step
 from drone_mesh.communication.repair.election import NO_BID, TOOK_OFF, TOOK_OFF_HOME
@@ -268,10 +267,8 @@ class ConnectionRepair(RepairActions):
         )
 
     def _await_answers(self) -> None:
-        is_slow = self.medium.shared and self._parts.seals.reserved_bytes(MessageType.LOCATION) > 0
-        self.wait_until(
-            self.now_s + self.medium.stretched(ASK_SEALED_S if is_slow else ASK_AGAIN_S)
-        )
+        again_s = ASK_SEALED_S if self.medium.shared and self._parts.has_key else ASK_AGAIN_S
+        self.wait_until(self.now_s + self.medium.stretched(again_s))
 
     def goal_of(self, step: Step) -> Location:  # noqa: D102
         if step.owner == self.node_id:

@@ -85,7 +85,7 @@ def test_a_relay_that_swallowed_is_tried_again_after_ten_minutes():
         node_id=8,
         now_s=100.0,
         timing=MeshTiming(),
-        seals=SimpleNamespace(reserved_bytes=lambda _kind: 7),
+        has_key=True,
         routing=ChildTableTree(),
     )
     check = RelayCheck(parts, detours)
