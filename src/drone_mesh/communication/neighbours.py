@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Iterable, NamedTuple
 
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.seen_motion import SeenMotion
 from drone_mesh.drone.location import Location
+
+NAMED_AFTER_DEATH_S = 30.0  # our choice: by then no list of nodes still has a dead one
 
 
 class HeardPlace(NamedTuple):
@@ -35,6 +37,7 @@ class Neighbours:
         self.motion = motion
         self._heard_s: dict[int, float] = {}
         self._fell_silent_s: dict[int, float] = {}  # when each of those lost did so
+        self._out_of_reach: set[int] = set()  # of these
         self._stands_since_s = -math.inf  # infinity: this node flies
         self._gateways: dict[int, int] = {}
         self._hops: dict[int, int] = {}
@@ -47,6 +50,7 @@ class Neighbours:
         self._heard_s[node] = now_s
         if is_new:
             self._fell_silent_s.pop(node, None)
+            self._out_of_reach.discard(node)
             self.silent = False
         return is_new
 
@@ -73,6 +77,7 @@ class Neighbours:
         """
         self._stands_since_s = math.inf
         self._fell_silent_s.clear()
+        self._out_of_reach.clear()
         self.silent = self.silent and not by_order
 
     def stands(self, now_s: float) -> None:
@@ -83,10 +88,21 @@ class Neighbours:
         """This node moved and may have other neighbours."""
         self._heard_s.clear()
         self._fell_silent_s.clear()
+        self._out_of_reach.clear()
 
     def ids(self) -> frozenset[int]:
         """The current neighbours."""
         return frozenset(self._heard_s)
+
+    def named(self, nodes: Iterable[int], now_s: float) -> None:
+        """Another node knows these: one that fell silent long ago lives, its link here failed."""
+        for node in self._fell_silent_s.keys() & nodes:
+            if now_s - self._fell_silent_s[node] > NAMED_AFTER_DEATH_S:
+                self._out_of_reach.add(node)
+
+    def out_of_reach(self) -> frozenset[int]:
+        """Former neighbours that live, but no longer have a link to this node where it stands."""
+        return frozenset(self._out_of_reach)
 
     def heard_s(self) -> dict[int, float]:
         """A copy: for each neighbour the time of its last packet, in seconds."""

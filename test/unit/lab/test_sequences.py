@@ -36,6 +36,20 @@ def test_no_drone_rests_at_the_place_of_one_that_was_silent_or_lost_a_link(numbe
     assert resting_close(record) == 0
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [2259, 2312, 2369])
+def test_with_beacons_no_drone_rests_beside_one_whose_place_it_hears_rounded_or_not_at_all(number):
+    """Once two drones without a link took one place; twice a drone stopped at 6.6 m, heard as 7."""
+    incidents = ["silent_for_a_while", "links_cut", "cut_vertex_killed", "many_killed"]
+    content = {
+        "sequence": {"density": [5, 6.5], "incidents": incidents},
+        "sample_s": 2,
+        "routing": "beacon",
+    }
+    record = SequenceRun(Scenario.model_validate(content), Streams(0, number)).run()
+    assert resting_close(record) == 0
+
+
 @pytest.mark.parametrize(("density", "number"), [([5, 6.5], 1520), ([7, 9], 1250)])
 def test_a_lone_drone_whose_link_to_the_gateway_failed_for_good_finds_others(density, number):
     """The next ones are 9.1 and 9.2 m from where it first lands beside the gateway."""

@@ -128,6 +128,10 @@ class Beacon(NamedTuple):
     near: tuple[int, ...] = ()  # some of its neighbours
     offline: bool = False  # the gateway has no internet
 
+    def named(self) -> tuple[int, ...]:
+        """The nodes that the sender hears or leads to, as far as they fit this beacon."""
+        return (*self.below.listed, *self.below.new, *self.near)
+
     def to_body(self, room: int) -> bytes:
         """Its `room` bytes. It has to fit: see `room_below`."""
         flags = _LOOKS if self.looks else 0

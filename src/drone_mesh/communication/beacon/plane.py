@@ -394,6 +394,7 @@ class BeaconPlane(IControlPlane):
         """What a neighbour's beacon changes."""
         routes, now_s = self._routes, self._routes.now_s
         self._look_s = now_s + LOOK_S
+        self._basics.neighbours.named(beacon.named(), now_s)
         if is_new:
             self._trickle.reset(now_s)
         if routes.has_news and not routes.is_root:

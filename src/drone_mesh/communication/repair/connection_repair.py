@@ -17,7 +17,13 @@ from drone_mesh.communication.repair.election import NO_BID, TOOK_OFF, TOOK_OFF_
 from drone_mesh.communication.repair.flight import ASK_AGAIN_S, ASK_SEALED_S, RepairFlight
 from drone_mesh.communication.repair.interfaces import IRepairStrategy
 from drone_mesh.communication.repair.options import RepairOptions
-from drone_mesh.communication.repair.spots import PITCH, Landing, own_spot
+from drone_mesh.communication.repair.spots import (
+    BLOCK,
+    PITCH,
+    Landing,
+    own_spot,
+    small_block,
+)
 from drone_mesh.communication.repair.status import NOTHING_TO_REPAIR, RepairStatus
 from drone_mesh.communication.repair.taken_places import TakenPlaces
 from drone_mesh.communication.router_states import RepairState, RouterEvent, RouterStates
@@ -273,10 +279,24 @@ class ConnectionRepair(RepairActions):
     def goal_of(self, step: Step) -> Location:  # noqa: D102
         if step.owner == self.node_id:
             return step.place
-        if self.silent:
-            known = [step.place, *self._taken.all(), *self._tried_spots]
-            return own_spot(step.place, self.node_id, self.clearance_m, known)
-        return self._taken.at_or_beside(step.place, self._landing(step), self._tried_spots)
+        # A LOCATION has whole metres of height: elsewhere others would not know how near it is
+        place = step.place._replace(height=round(step.place.height))
+        rivals = self._rivals(step)
+        if self.silent or rivals:
+            known = [place, *self._taken.all(), *self._tried_spots]
+            block = BLOCK if self.silent else small_block(self.node_id, rivals)
+            return own_spot(place, self.node_id, self.clearance_m, known, block)
+        return self._taken.at_or_beside(place, self._landing(step), self._tried_spots)
+
+    def _rivals(self, step: Step) -> list[int]:
+        """Drones that this one cannot hear, and that may fly there, too: it is in their range."""
+        neighbours = self._parts.neighbours
+        places = {node: neighbours.place_of(node) for node in neighbours.out_of_reach()}
+        return [
+            node
+            for node, heard in places.items()
+            if heard is not None and heard.place.distance_m(step.place) < self.range_m
+        ]
 
     def _landing(self, step: Step) -> Landing:
         """Where the drone comes from, and which links it needs at the place of the lost node.

@@ -11,7 +11,7 @@ from rig import FROM_0, Rig, packet
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.repair.election import HOME_FAILED, TOOK_OFF, TOOK_OFF_HOME
 from drone_mesh.communication.repair.options import LostPlace, RepairOptions
-from drone_mesh.communication.repair.spots import own_spot
+from drone_mesh.communication.repair.spots import own_spot, small_block
 from drone_mesh.communication.repair.strategies.thesis import Thesis
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.location import Location
@@ -1152,6 +1152,19 @@ def test_it_flies_to_a_spot_near_the_place_that_belongs_to_it_alone():
     (goal,) = rig.engine.goals
     assert 1.0 <= goal.distance_m(NEIGHBOUR_PLACE) < 7.0
     assert goal == own_spot(NEIGHBOUR_PLACE, 1, 1.0, [NEIGHBOUR_PLACE, Location(4.0, 0.0, 0.0)])
+
+
+@pytest.mark.parametrize(("other", "block"), [(3, 3), (10, 8)])
+def test_drones_whose_ids_differ_modulo_nine_have_their_own_spots_in_small_blocks(other, block):
+    assert small_block(1, [2, other]) == block
+
+
+@pytest.mark.parametrize("node", range(9))
+def test_spots_in_blocks_of_nine_are_near_and_clear_of_those_of_other_ids(node):
+    place = Location(8.3, -2.9, 0.0)
+    spots = [own_spot(place, other, 1.0, block=3) for other in range(9)]
+    assert spots[node].distance_m(place) < 2.4
+    assert all(spots[node].distance_m(spots[other]) >= 1.0 for other in range(9) if other != node)
 
 
 def test_a_node_that_is_heard_again_gives_the_mesh_time_to_recover():

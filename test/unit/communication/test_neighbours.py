@@ -1,0 +1,43 @@
+"""What a node concludes from the silence of its neighbours."""
+
+from __future__ import annotations
+
+import pytest
+
+from drone_mesh.communication.neighbours import Neighbours
+from drone_mesh.communication.seen_motion import SeenMotion
+
+
+@pytest.fixture
+def neighbours() -> Neighbours:
+    """Of a node that has lost its neighbour 3 at 100 s and still hears 2."""
+    known = Neighbours(10.0, False, SeenMotion(1.0, 10.0))
+    known.stands(0.0)
+    for node in (2, 3):
+        known.heard(node, 99.0)
+    known.lost(3, 100.0)
+    return known
+
+
+def test_one_that_others_know_long_after_is_out_of_reach(neighbours):
+    neighbours.named((7, 3), 131.0)
+    assert neighbours.out_of_reach() == {3}
+
+
+def test_one_that_others_still_name_at_first_may_be_dead(neighbours):
+    neighbours.named((3,), 129.0)
+    assert neighbours.out_of_reach() == set()
+
+
+def test_it_is_no_longer_out_of_reach_once_it_is_heard(neighbours):
+    neighbours.named((3,), 131.0)
+    neighbours.heard(3, 132.0)
+    assert neighbours.out_of_reach() == set()
+
+
+@pytest.mark.parametrize("leaves", [Neighbours.forget_all, lambda known: known.takes_off(True)])
+def test_after_a_flight_all_links_are_new(neighbours, leaves):
+    neighbours.named((3,), 131.0)
+    leaves(neighbours)
+    neighbours.named((3,), 200.0)
+    assert neighbours.out_of_reach() == set()
