@@ -168,9 +168,24 @@ prepare_checks() {
   npm_install
 }
 
-prepare_everything() {
+# What all tests need. pip mostly waits for the network, apt-get for the disk.
+prepare_tests() {
+  make_venv
+  set -m  # a process group of its own, which can be ended as a whole
+  (prepare_unit_tests) </dev/null &
+  set +m
+  local pip=$!
+  # shellcheck disable=SC2064  # the number of now
+  trap "kill -- -$pip 2>/dev/null" EXIT
   apt_install "${ros_packages[@]}" "${screen_packages[@]}"
-  prepare_checks
+  wait "$pip" || exit
+  trap - EXIT
   map_library
+}
+
+# What the checks and rostests need beside that.
+prepare_rest() {
+  prepare_checks
   pip_install requirements/{browser,docs}.txt
+  build
 }

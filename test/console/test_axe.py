@@ -16,7 +16,7 @@ KEEP_HELD = """() => {
 
 
 def check(page: Visit, state: str) -> None:
-    results = Axe().run(page.page)
+    results = Axe().run(page.page, options={"resultTypes": ["violations"]})  # takes half the time
     assert results.violations_count == 0, f"{state}: {results.generate_report()}"
 
 
