@@ -42,6 +42,11 @@ class Proofs:
         if self.has_key and not self._routes.is_root:
             self.due_s = self._routes.now_s + AGAIN_S * self._basics.rng.random()
 
+    def connected(self) -> None:
+        """A gateway is reached."""
+        if self.due_s == math.inf:
+            self.begin()
+
     def ask_soon(self) -> None:
         """A beacon tells another place of the gateway than it told itself."""
         now_s = self._routes.now_s

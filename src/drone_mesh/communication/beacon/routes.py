@@ -1,4 +1,4 @@
-"""BeaconRoutes: the neighbours of one node, its parent, and the nodes below it.
+"""BeaconRoutes: the neighbours of one node, its parent, and its ways to the others.
 
 docs/protocol.md, "Beacons", describes the rules.
 """
@@ -14,11 +14,8 @@ from drone_mesh.communication.beacon.neighbour import Neighbour
 from drone_mesh.communication.beacon.packets import (
     ANCESTORS,
     NO_ANCESTORS,
-    NOT_LISTED,
     Beacon,
-    Below,
     Motion,
-    ids_that_fit,
     newer,
 )
 from drone_mesh.communication.interfaces import NO_ROUTE
@@ -38,7 +35,6 @@ REACH = 0.97  # of the range: two nodes further apart are expected to lose each 
 LEAVES, GONE = 1.0, 3.0  # hops that a detour may cost around a link that will break, or should have
 ANOTHER_GATEWAY = 1.5  # hops that another gateway must be nearer
 OFFLINE = 256.0  # hops: any gateway with internet is nearer than one without
-LINGERS = 1.0  # intervals: a node that has left is still announced for so long
 SEEN_S = 10.0  # our choice: an older place of a node does not tell the way to it
 NEAR = 2.0  # intervals: an older report that a neighbour hears a node shows no way to it
 HINT_S = 3.0  # a packet that came from a node shows the way to it for this long
@@ -87,13 +83,9 @@ class BeaconRoutes(IRoutes):
         # By gateway: the number on which the parent said that it has no internet, and when.
         self._offline: dict[int, tuple[int, float]] = {}
         self._hints: dict[int, tuple[int, float]] = {}  # by node: a neighbour that led to it, when
-        self._announced: set[int] = set()  # of the nodes below
-        self._new: set[int] = set()  # below, since this node has announced it last
-        self._announced_last = self._shown_last = 0
         self._place_of = place_of
         self._shared = shared
         self._losses = Losses(range_m)
-        self._below_s: dict[int, float] = {}  # the nodes below, and when they were last
 
     # What it learns ----------------------------------------------------------------------------
 
@@ -104,10 +96,6 @@ class BeaconRoutes(IRoutes):
         if neighbour is None:
             neighbour = Neighbour(node, beacon)
             self.neighbours[node] = neighbour
-        if beacon.parent == self._node_id:
-            if is_new or neighbour.beacon.parent != self._node_id:
-                self._new.add(node)
-            self._new.update(beacon.below.new)
         neighbour.heard(beacon, self.motion, self.now_s)
         if self.motion is not None and neighbour.motion is not None:  # maybe of an earlier beacon
             neighbour.loss = self._losses.heard(
@@ -193,9 +181,9 @@ class BeaconRoutes(IRoutes):
         self._hints[node] = neighbour, self.now_s
 
     def led_s(self, node: int) -> float:
-        """When a packet of this node came last over a relay, or a relay named it. Any thread."""
+        """When a packet of this node came last over a relay. Any thread."""
         _neighbour, at_s = self._hints.get(node, (NO_ROUTE, -math.inf))
-        return max(at_s, self._below_s.get(node, -math.inf))
+        return at_s
 
     def expired(self) -> list[int]:
         """Forget the neighbours that were silent for too long; returns them."""
@@ -396,62 +384,6 @@ class BeaconRoutes(IRoutes):
                 if off_m < own_m:
                     nearer_ones.append((off_m, Way(neighbour.node, neighbour.heard_s)))
         return [way for _off_m, way in sorted(nearer_ones)]
-
-    # The nodes below ---------------------------------------------------------------------------
-
-    def below(self) -> set[int]:
-        """The nodes that this one leads to, as its children announce them.
-
-        A node that has left is mostly still near, and its new way is not known further up yet.
-        """
-        below_s, now_s, period_s = self._below_s, self.now_s, 0.0
-        for child in self.neighbours.values():
-            period_s = max(period_s, child.beacon.interval_s)
-            if child.beacon.parent == self._node_id:
-                below_s[child.node] = now_s
-                below_s.update(dict.fromkeys(child.announced_s, now_s))
-        for node in (self._node_id, *self.ancestors, self.parent):
-            below_s.pop(node, None)
-        for node in [n for n, at_s in below_s.items() if now_s - at_s > LINGERS * period_s]:
-            del below_s[node]
-        return set(below_s)
-
-    def to_announce(self, most: int) -> Below:
-        """The next part of the nodes below, and those that came to it, in at most so many bytes."""
-        below, after = self.below(), self._announced_last
-        if most < 1:
-            return NOT_LISTED
-        self._announced &= below
-        self._new = self._new & below | below - self._announced
-        turn = sorted(below, key=lambda node: (node - after - 1) % 256)
-        new = sorted(self._new)[: max(0, most - 1)]
-        listed = ids_that_fit(turn, most)
-        if new and len(new) >= len(self._new.intersection(listed)):
-            turn = [node for node in turn if node not in new]
-            listed = ids_that_fit(turn, most - len(new))
-        else:  # none, or many at once, such as a whole subtree
-            new = []
-        self._new.difference_update(new, listed)
-        if listed:
-            self._announced_last = listed[-1]
-        if len(listed) == len(turn):
-            after = self._announced_last  # once round
-        self._announced.update(listed, new)
-        return Below(after, listed, tuple(new))
-
-    @property
-    def has_news(self) -> bool:
-        """Whether a node has come from elsewhere and is not announced yet."""
-        return bool(self._new)
-
-    def to_show(self, most: int) -> tuple[int, ...]:
-        """The next part of the neighbours with whom the link will last, at most so many."""
-        lasting = [n for n, one in self.neighbours.items() if one.usable and not self.risk(one)]
-        lasting.sort(key=lambda node: (node - self._shown_last - 1) % 256)
-        if most < 1 or not lasting:
-            return ()
-        self._shown_last = lasting[:most][-1]
-        return tuple(lasting[:most])
 
     # IRoutes -----------------------------------------------------------------------------------
 

@@ -1,4 +1,4 @@
-"""BeaconRoutes: the parent, the nodes below and the ways to try."""
+"""BeaconRoutes: the parent and the ways to try."""
 
 from __future__ import annotations
 
@@ -180,53 +180,12 @@ def test_a_sign_of_life_is_as_good_as_a_beacon(routes):
     assert routes.expired() == []
 
 
-def test_children_and_what_they_announce_are_below(routes):
-    routes.heard(1, beacon(hops=3, parent=9, below=Below(30, (20, 30))))
-    routes.heard(2, beacon(hops=3, parent=8, below=Below(40, (40,))))
-    assert routes.below() == {1, 20, 30}
-
-
-def test_a_node_that_its_child_lists_no_longer_is_soon_not_below(routes):
-    routes.heard(1, beacon(hops=3, parent=9, below=Below(30, (20, 30))))
-    routes.below()
-    routes.heard(1, beacon(hops=3, parent=9, below=Below(30, (30,))))
-    routes.now_s = 0.9
-    assert routes.below() == {1, 20, 30}
-    routes.now_s = 1.1
-    assert 20 not in routes.below()
-
-
 def test_a_neighbour_that_lists_nobody_leads_to_nobody_unless_its_beacon_had_no_room(routes):
     routes.heard(1, beacon(hops=3, parent=8, below=Below(20, (20,))))
     routes.heard(1, beacon(hops=3, parent=8, below=NOT_LISTED))
     assert ways(routes, 20) == [1]
     routes.heard(1, beacon(hops=3, parent=8, below=NONE_BELOW))
     assert ways(routes, 20) == []
-
-
-def test_a_beacon_without_room_says_so(routes):
-    routes.heard(1, beacon(hops=3, parent=9))
-    assert routes.to_announce(0) == NOT_LISTED
-    assert routes.to_announce(4).new == (1,)
-
-
-def test_announcements_go_round_and_new_nodes_do_not_wait(routes):
-    ids = tuple(range(20, 28))
-    routes.heard(1, beacon(hops=3, parent=9, below=Below(27, ids)))
-    listed = set()
-    for _ in range(6):
-        part = routes.to_announce(4)
-        listed.update(part.listed, part.new)
-    assert listed == {1, *ids}
-    routes.heard(1, beacon(hops=3, parent=9, below=Below(99, (*ids, 99))))
-    assert 99 in routes.to_announce(4).new
-
-
-def test_a_whole_subtree_that_comes_at_once_is_announced_in_one_list(routes):
-    ids = tuple(range(20, 60))
-    routes.heard(20, beacon(hops=3, parent=9, below=Below(59, ids[1:])))
-    assert routes.to_announce(8) == Below(59, ids)
-    assert not routes.has_news
 
 
 def test_a_packet_down_follows_the_child_that_announced_the_node_last(routes):
@@ -245,17 +204,6 @@ def test_a_node_that_came_back_to_an_earlier_relay_is_looked_for_there(routes):
     assert ways(routes, 20) == [1, 2]
 
 
-def test_a_child_that_returns_is_announced_as_new_once_more(routes):
-    routes.heard(1, beacon(hops=3, parent=9))
-    routes.to_announce(4)
-    assert not routes.has_news
-    routes.heard(1, beacon(hops=3, parent=8))
-    routes.heard(1, beacon(hops=3, parent=9))
-    assert routes.has_news
-    assert routes.to_announce(4).new == (1,)
-    assert routes.to_announce(4).listed == (1,)
-
-
 def test_a_neighbour_that_hears_a_node_leads_to_it_until_that_is_two_intervals_old(routes):
     routes.heard(1, beacon(hops=3, parent=9, below=Below(50, (50,))))
     routes.heard(2, beacon(hops=4, parent=7, near=(50,)))
@@ -263,13 +211,6 @@ def test_a_neighbour_that_hears_a_node_leads_to_it_until_that_is_two_intervals_o
     routes.now_s = 2.1
     routes.heard(2, beacon(hops=4, parent=7))
     assert ways(routes, 50) == [1]
-
-
-def test_neighbours_are_shown_in_turn(routes):
-    for node in (3, 5, 7):
-        routes.heard(node, beacon(hops=3, parent=8))
-    assert [routes.to_show(2) for _ in range(3)] == [(3, 5), (7, 3), (5, 7)]
-    assert routes.to_show(0) == ()
 
 
 def test_a_packet_for_an_unknown_node_goes_up_only_if_it_came_from_below(routes):

@@ -1,0 +1,108 @@
+"""Connection: what the router of a node with beacons is told about its gateway."""
+
+from __future__ import annotations
+
+import math
+
+from drone_mesh.communication.beacon.own_motion import OwnMotion
+from drone_mesh.communication.beacon.packets import newer
+from drone_mesh.communication.beacon.routes import BeaconRoutes
+from drone_mesh.communication.control_plane import IControlHost
+from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.observer import MeshEventKind, in_hops
+from drone_mesh.communication.parts import NodeBasics
+from drone_mesh.communication.router_states import RepairState, RouterEvent, RouterStates
+
+CHECK_S = 1.0  # our choice: how often a router without a gateway considers its repair
+
+
+class Connection:
+    """Whether this router is connected, and where its next hop is, told when that changes."""
+
+    def __init__(
+        self,
+        basics: NodeBasics,
+        host: IControlHost,
+        states: RouterStates,
+        routes: BeaconRoutes,
+        motion: OwnMotion,
+    ) -> None:
+        self._basics, self._host, self._states = basics, host, states
+        self._routes, self._motion = routes, motion
+        self._check_s = -math.inf
+        self._was_connected = False
+        self._told = False  # the repair, of this connection
+        self._unproven: int | None = None  # the gateway's newest number when the parent was chosen
+
+    @property
+    def due_s(self) -> float:
+        """When to call `check` next."""
+        return math.inf if self._states.connected else self._check_s
+
+    def check(self) -> None:
+        """Without a gateway, the repair may be due."""
+        now_s = self._routes.now_s
+        if not self._states.connected and now_s >= self._check_s:
+            self._check_s = now_s + CHECK_S
+            if self._may_repair():
+                self._host.on_unconnected_check(now_s)
+
+    def has_new_parent(self) -> None:
+        """It shows itself as one once the gateway's next beacon has come through it."""
+        self._unproven = self._routes.newest_number
+
+    def show(self) -> bool:
+        """Tell the node whether a gateway is reached. Returns whether that is new."""
+        states, parent = self._states, self._routes.parent
+        connected = parent != NO_ROUTE and not self._routes.offline
+        if self._unproven is not None and newer(self._routes.number, self._unproven) > 0:
+            self._unproven = None
+        flies = states.repair is RepairState.FLYING  # over links that it leaves behind
+        places, here = self._basics.places, self._routes.motion
+        if parent != NO_ROUTE and not flies:
+            places.connected_here(None if here is None else here.place, self._routes.hops)
+        is_proven = self._unproven is None or places.good is None
+        if parent != NO_ROUTE and is_proven and not flies:
+            neighbour = self._routes.neighbours[parent]
+            if neighbour.motion is not None:
+                place, seen_s = neighbour.motion.place, neighbour.reported_s
+                places.update_next_hop(parent, place, seen_s)
+        if connected == self._was_connected:
+            return False
+        self._was_connected = connected
+        if connected:
+            states.happened(RouterEvent.GATEWAY_ANSWERED)
+            self._basics.report(
+                MeshEventKind.CONNECTED, self._routes.gateway, in_hops(self._routes.hops)
+            )
+            self._told = False
+            self.tell_repair()
+        else:
+            states.happened(RouterEvent.ROUTE_LOST)
+            self._basics.report(MeshEventKind.DISCONNECTED, self._routes.gateway)
+            self._check_s = self._routes.now_s
+        return connected
+
+    def tell_repair(self) -> None:
+        """Tell the repair of a connection; during some of its flights it wants to hear of none."""
+        if self._was_connected and not self._told:
+            self._told = self._host.may_connect(self._routes.parent, True)
+            if self._told:
+                self._host.on_connected()
+
+    def end(self, event: RouterEvent) -> None:
+        """A flight or an election begins or ends: the connection is what the beacons say."""
+        self._states.happened(event)
+        reached = self._routes.parent != NO_ROUTE and not self._routes.offline
+        if reached and event is not RouterEvent.ANTENNA_OFF:
+            self._states.happened(RouterEvent.GATEWAY_ANSWERED)
+
+    def _may_repair(self) -> bool:
+        """Whether a lost connection counts: not in flight, whoever flies the drone."""
+        if self._states.repair is RepairState.FLYING:
+            return False
+        if not self._motion.stands(self._routes.now_s):
+            return False
+        if self._routes.parent != NO_ROUTE:
+            return False  # its gateway is in reach and has no internet: a flight repairs nothing
+        return self._basics.antenna.on() and self._host.may_connect(NO_ROUTE, False)

@@ -1,0 +1,64 @@
+"""Verdicts: which neighbour takes a packet, or whether it waits for one."""
+
+from __future__ import annotations
+
+import math
+
+from drone_mesh.communication.beacon.routes import BeaconRoutes
+from drone_mesh.communication.beacon.search import HOPS_AROUND, MOST_HOPS, Searches
+from drone_mesh.communication.courier import DROP, HOLD, Transit
+from drone_mesh.communication.deadlines import Deadlines, Due
+from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.packet_types import MessageType
+
+HELD_S = 2.5  # our choice: a packet without a next hop waits this long
+RETRY_S = 0.15  # our choice: so often it asks again, beside each beacon that arrives
+MOST_WAYS = 3  # our choice: to which one node sends a packet down; after that it searches
+SEARCHES_S = 0.6  # our choice: a relay without a way searches for so long, then returns a packet
+NOT_HELD = (MessageType.MOVEMENT_NEGOTIATION, MessageType.FOUND)  # soon sent again
+
+
+class Verdicts:
+    """Decides about each packet that this node sends or forwards."""
+
+    def __init__(self, routes: BeaconRoutes, searches: Searches, deadlines: Deadlines) -> None:
+        self._routes, self._searches, self._deadlines = routes, searches, deadlines
+        self.retry_s = -math.inf  # when held packets are looked at again
+
+    def of(self, transit: Transit) -> int:
+        """The next hop of a packet, HOLD or DROP."""
+        routes = self._routes
+        routes.now_s = now_s = self._deadlines.now_s
+        is_up = transit.addressee == routes.gateway
+        ways = routes.next_hops(transit.addressee, transit.came_from)
+        for to, shown_s in ways if is_up or len(transit.sent_s) < MOST_WAYS else ways[:1]:
+            if to == transit.came_from or shown_s <= transit.sent_s.get(to, -math.inf):
+                continue
+            failed_s = transit.failed_s.get(to)
+            if failed_s is None or routes.neighbours[to].alive_s > failed_s:
+                return to
+        if now_s - transit.seen_s >= HELD_S or transit.kind in NOT_HELD:
+            return DROP
+        if not is_up:
+            is_own = transit.came_from == NO_ROUTE
+            if not is_own and now_s - transit.seen_s >= SEARCHES_S and self._may_return(transit):
+                return transit.came_from
+            self._searches.search(transit.addressee, MOST_HOPS if is_own else HOPS_AROUND)
+        if self.retry_s <= now_s:
+            self.retries()
+        due_s = min(self.retry_s, self._deadlines.get(Due.ROUTING))
+        self._deadlines.set(Due.ROUTING, due_s)
+        return HOLD
+
+    def retries(self) -> None:
+        """All held packets ask again now."""
+        self.retry_s = self._deadlines.now_s + RETRY_S
+
+    def _may_return(self, transit: Transit) -> bool:
+        """Whether the sender of a packet, who may know another way, can get it back."""
+        to = transit.came_from
+        return (
+            to in self._routes.neighbours
+            and to not in transit.sent_s
+            and to not in transit.failed_s
+        )
