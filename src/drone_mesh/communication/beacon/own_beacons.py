@@ -1,4 +1,4 @@
-"""OwnBeacons: what the next beacon of this node says (docs/wire.md, "Beacons")."""
+"""OwnBeacons: what the next beacon of this node says (docs/protocol.md, "Beacons")."""
 
 from __future__ import annotations
 
