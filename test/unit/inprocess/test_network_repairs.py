@@ -20,6 +20,7 @@ from scenarios import (
     run_until,
 )
 
+from drone_mesh.communication.seals.keys import MeshKey
 from drone_mesh.inprocess import Network
 from drone_mesh.mobility import Area, Mobility, tracks_of
 
@@ -112,6 +113,28 @@ def test_all_nodes_learn_that_a_node_is_missing_and_that_it_is_back():
     network.power(4, True)
     network.run_for(12.0)
     assert network.order(4, x=24.0, y=1.0)
+
+
+@pytest.mark.parametrize(("key", "asks_s"), [(None, 0.6), (MeshKey(bytes(range(16))), 2.0)])
+def test_on_a_shared_channel_a_key_gives_neighbours_time_for_a_handshake_before_they_answer(
+    key, asks_s
+):
+    """A drone that has landed asks twice who is there; without an answer it stays where it is."""
+    network = Network(seed=1, radio="shared", key=key)
+    network.add_gateway(0, 0.0, 0.0)
+    network.add_router(1, 7.0, 0.0)
+    network.add_router(2, 14.0, 0.0)
+    network.run_for(60.0)
+    network.power(1, False)
+    component = network.nodes[2].component
+
+    def on_ground():
+        return component.get_repair_status().landed
+
+    assert run_until(network, on_ground, within_s=120.0, step_s=0.05)
+    landed_s = network.now_s()
+    run_until(network, lambda: not component.get_repair_status().landed, within_s=10.0, step_s=0.05)
+    assert network.now_s() - landed_s == pytest.approx(asks_s, abs=0.1)
 
 
 # The layouts of the original's experiments ---------------------------------------------------
