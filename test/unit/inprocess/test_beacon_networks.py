@@ -13,6 +13,7 @@ from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.seals.keys import MeshKey
 from drone_mesh.communication.timing import MeshTiming
+from drone_mesh.drone.location import Location
 from drone_mesh.inprocess import Network
 from drone_mesh.mobility import Area, Mobility, tracks_of
 
@@ -163,6 +164,24 @@ def test_wrong_positions_cost_little():
     echoes, served = arrivals(network, 30)
     assert echoes >= 0.9
     assert served >= 0.97
+
+
+@pytest.mark.parametrize(("believed_m", "repaired_m"), [(-0.3, 0.0), (6.6, 7.0)])
+def test_a_repair_ends_at_whole_metres_of_height_and_not_under_the_ground(believed_m, repaired_m):
+    """Others hear no other heights in a LOCATION, and altitudes of drones on the ground err."""
+    network = Network(seed=1, routing="beacon")
+    network.add_gateway(0, 0.0, 0.0)
+    network.add_router(1, 6.0, 0.0)
+    network.add_router(2, 12.0, 0.0)
+    for node in (network.nodes[0], network.nodes[1]):
+        at = node.drone.get_location()._replace(height=believed_m)
+        node.component.control._motion._locate = lambda at=at: at
+    network.run_for(30.0)
+    network.power(1, False)
+    goals = []
+    network.nodes[2].drone.set_goal = lambda *goal: goals.append(Location(*goal))
+    assert network.run_until(lambda: bool(goals), within_s=60.0)
+    assert goals[0].height == repaired_m
 
 
 def test_with_a_key_beacons_are_sealed_and_everything_arrives():

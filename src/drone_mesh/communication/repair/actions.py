@@ -230,10 +230,19 @@ class RepairActions(abc.ABC):
         return NeighbourView(heard.place, self.now_s - heard.heard_s, hops)
 
 
+def at_whole_metres(place: Location) -> Location:
+    """Where a repair ends instead of at `place`.
+
+    A LOCATION has whole metres of height only: from elsewhere others would not know how near this
+    drone is. A beacon has tenths, and a drone on the ground may see itself below it.
+    """
+    return place._replace(height=round(place.height))
+
+
 def _may_be_flown_to(place: Location) -> bool:
     """Whether a drone may fly there: a LOCATION may contain any numbers."""
     try:
-        check_goal(*place)
+        check_goal(*at_whole_metres(place))
     except GoalRefused:
         return False
     return True

@@ -12,7 +12,7 @@ from drone_mesh.communication.control_plane import IControlPlane
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.parts import NodeParts
-from drone_mesh.communication.repair.actions import RepairActions, Step
+from drone_mesh.communication.repair.actions import RepairActions, Step, at_whole_metres
 from drone_mesh.communication.repair.election import NO_BID, TOOK_OFF, TOOK_OFF_HOME
 from drone_mesh.communication.repair.flight import ASK_AGAIN_S, ASK_SEALED_S, RepairFlight
 from drone_mesh.communication.repair.interfaces import IRepairStrategy
@@ -279,8 +279,7 @@ class ConnectionRepair(RepairActions):
     def goal_of(self, step: Step) -> Location:  # noqa: D102
         if step.owner == self.node_id:
             return step.place
-        # A LOCATION has whole metres of height: elsewhere others would not know how near it is
-        place = step.place._replace(height=round(step.place.height))
+        place = at_whole_metres(step.place)
         rivals = self._rivals(step)
         if self.silent or rivals:
             known = [place, *self._taken.all(), *self._tried_spots]
