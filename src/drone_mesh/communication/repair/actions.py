@@ -25,6 +25,8 @@ from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused
 
+LOWEST_M = -10.0  # our choice: a place further below the origin is a mistake
+
 
 class Step(NamedTuple):
     """A possible flight of a drone."""
@@ -231,18 +233,25 @@ class RepairActions(abc.ABC):
 
 
 def at_whole_metres(place: Location) -> Location:
-    """Where a repair ends instead of at `place`.
+    """Where a repair ends instead of at `place`, but for `above_ground`.
 
-    A LOCATION has whole metres of height only: from elsewhere others would not know how near this
-    drone is. A beacon has tenths, and a drone on the ground may see itself below it.
+    A LOCATION has whole metres of height only, and a beacon tenths: from elsewhere others would not
+    know how near this drone is.
     """
     return place._replace(height=round(place.height))
 
 
+def above_ground(place: Location) -> Location:
+    """Not lower than the origin: altitudes err by metres, and a field may slope."""
+    return place._replace(height=max(0, place.height))
+
+
 def _may_be_flown_to(place: Location) -> bool:
     """Whether a drone may fly there: a LOCATION may contain any numbers."""
+    if place.height < LOWEST_M:
+        return False
     try:
-        check_goal(*at_whole_metres(place))
+        check_goal(*above_ground(at_whole_metres(place)))
     except GoalRefused:
         return False
     return True

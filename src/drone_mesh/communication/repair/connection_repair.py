@@ -12,7 +12,12 @@ from drone_mesh.communication.control_plane import IControlPlane
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.parts import NodeParts
-from drone_mesh.communication.repair.actions import RepairActions, Step, at_whole_metres
+from drone_mesh.communication.repair.actions import (
+    RepairActions,
+    Step,
+    above_ground,
+    at_whole_metres,
+)
 from drone_mesh.communication.repair.election import NO_BID, TOOK_OFF, TOOK_OFF_HOME
 from drone_mesh.communication.repair.flight import ASK_AGAIN_S, ASK_SEALED_S, RepairFlight
 from drone_mesh.communication.repair.interfaces import IRepairStrategy
@@ -279,13 +284,13 @@ class ConnectionRepair(RepairActions):
     def goal_of(self, step: Step) -> Location:  # noqa: D102
         if step.owner == self.node_id:
             return step.place
-        place = at_whole_metres(step.place)
-        rivals = self._rivals(step)
+        place, rivals = at_whole_metres(step.place), self._rivals(step)
         if self.silent or rivals:
             known = [place, *self._taken.all(), *self._tried_spots]
             block = BLOCK if self.silent else small_block(self.node_id, rivals)
-            return own_spot(place, self.node_id, self.clearance_m, known, block)
-        return self._taken.at_or_beside(place, self._landing(step), self._tried_spots)
+            return above_ground(own_spot(place, self.node_id, self.clearance_m, known, block))
+        landing = self._landing(step)
+        return above_ground(self._taken.at_or_beside(place, landing, self._tried_spots))
 
     def _rivals(self, step: Step) -> list[int]:
         """Drones that this one cannot hear, and that may fly there, too: it is in their range."""

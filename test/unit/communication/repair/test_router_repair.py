@@ -45,7 +45,7 @@ def own_bid(to: int, score: float) -> bytes:
     return (bytes((1, 1, BID, to, to)) + struct.pack("<f", score)).ljust(32, b"\0")
 
 
-UNDERGROUND = "02 02 01 01 01 00 00 00 41 00 00 00 00 ff ff"  # node 2: height -1 m
+UNDERGROUND = "02 02 01 01 01 00 00 00 41 00 00 00 00 f5 ff"  # node 2: height -11 m
 
 
 def lone_rig(options=None, timing=None):
@@ -326,7 +326,7 @@ def test_another_order_during_the_flight_replaces_the_first():
         "00 60 9c 45",  # latitude 5004
         "00 00 00 00 00 60 9c c5",  # longitude -5004
         "00 00 00 00 00 00 00 00 f5 01",  # height 501
-        "00 00 00 00 00 00 00 00 ff ff",  # height -1
+        "00 00 00 00 00 00 00 00 f5 ff",  # height -1
     ],
 )
 def test_an_order_out_of_bounds_is_refused_and_counted(place):
@@ -487,7 +487,7 @@ def test_a_router_that_knows_no_place_at_all_stays():
 
 
 @pytest.mark.parametrize(
-    "place", ["00 60 9c 45", "ff ff 7f 7f ff ff 7f 7f", "00 00 00 00 00 00 00 00 ff ff"]
+    "place", ["00 60 9c 45", "ff ff 7f 7f ff ff 7f 7f", "00 00 00 00 00 00 00 00 f5 ff"]
 )
 def test_a_place_where_no_drone_may_go_is_nowhere_to_fly(place):
     """Any node can claim any place."""
@@ -583,6 +583,16 @@ def test_a_drone_that_knows_no_place_and_is_where_it_was_connected_last_stays_an
     rig.wait_until(60.0)
     assert rig.engine.goals == []
     assert "is where it was connected last, and knows no other place" in rig.repair_in_words()
+
+
+def test_the_place_of_a_next_hop_a_few_metres_below_the_origin_is_flown_to_and_not_below_it():
+    """A field slopes, and altitudes err by metres."""
+    rig = lone_rig()
+    rig.antenna.dead = set()
+    rig.hear("02 02 01 01 01 00 00 00 41 00 00 00 00 fd ff")  # latitude 8, height -3 m
+    rig.antenna.dead = {2}
+    rig.wait_until(46.0)
+    assert rig.engine.goals == [BESIDE_NEIGHBOUR]
 
 
 def test_a_next_hop_with_an_impossible_place_does_not_hide_that_of_the_gateway():
