@@ -326,7 +326,7 @@ def test_another_order_during_the_flight_replaces_the_first():
         "00 60 9c 45",  # latitude 5004
         "00 00 00 00 00 60 9c c5",  # longitude -5004
         "00 00 00 00 00 00 00 00 f5 01",  # height 501
-        "00 00 00 00 00 00 00 00 f5 ff",  # height -1
+        "00 00 00 00 00 00 00 00 ff ff",  # height -1
     ],
 )
 def test_an_order_out_of_bounds_is_refused_and_counted(place):
