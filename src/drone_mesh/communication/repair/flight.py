@@ -6,7 +6,7 @@ from typing import Callable
 
 from drone_mesh.communication.parts import NodeParts
 from drone_mesh.communication.place_requests import ask_all_for_places
-from drone_mesh.communication.repair.actions import Step
+from drone_mesh.communication.repair.actions import Step, above_ground, at_whole_metres
 from drone_mesh.communication.repair.options import RepairOptions
 from drone_mesh.communication.repair.spots import Landing
 from drone_mesh.communication.repair.taken_places import TakenPlaces
@@ -43,10 +43,11 @@ class RepairFlight:
         self.group = parts.neighbours.ids()  # the neighbours that it leaves behind
         self.stops_when_connected = False
         self.asks_left = 0  # on the ground
-        self._wanted = step.place
         self._taken = taken
         self._landing = landing
         self._parts = parts
+        whole = above_ground(at_whole_metres(step.place))
+        self._wanted = step.place if self.leads_back else whole  # or beside it
         self._introduce = introduce
         self._clearance_m = options.clearance_m
         self._leg_m = LEG * options.range_m
