@@ -42,8 +42,8 @@ def own_spot(
     block_m = block * pitch_m
     floor, on_floor = divmod(node if block == BLOCK else node % block**2, block**2)
     row, column = divmod(on_floor, block)
-    south = (place.latitude / pitch_m - row) // BLOCK * block_m + row * pitch_m
-    west = (place.longitude / pitch_m - column) // BLOCK * block_m + column * pitch_m
+    south = (place.latitude / pitch_m - row) // block * block_m + row * pitch_m
+    west = (place.longitude / pitch_m - column) // block * block_m + column * pitch_m
     height = place.height + floor * math.ceil(clearance_m)
     spots = sorted(
         (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import struct
 
@@ -1169,12 +1170,13 @@ def test_drones_whose_ids_differ_modulo_nine_have_their_own_spots_in_small_block
     assert small_block(1, [2, other]) == block
 
 
-@pytest.mark.parametrize("node", range(9))
-def test_spots_in_blocks_of_nine_are_near_and_clear_of_those_of_other_ids(node):
-    place = Location(8.3, -2.9, 0.0)
-    spots = [own_spot(place, other, 1.0, block=3) for other in range(9)]
-    assert spots[node].distance_m(place) < 2.4
-    assert all(spots[node].distance_m(spots[other]) >= 1.0 for other in range(9) if other != node)
+@pytest.mark.parametrize("x_m", [-2003.7, -2.9, 0.0, 8.3, 4100.2])
+@pytest.mark.parametrize(("block", "ids", "within_m"), [(3, 9, 2.4), (8, 64, 6.3)])
+def test_the_spots_of_all_ids_are_near_a_place_and_clear_of_each_other(x_m, block, ids, within_m):
+    place = Location(x_m, x_m - 40.0, 0.0)
+    spots = [own_spot(place, node, 1.0, block=block) for node in range(ids)]
+    assert max(spot.distance_m(place) for spot in spots) < within_m
+    assert all(one.distance_m(other) >= 1.0 for one, other in itertools.combinations(spots, 2))
 
 
 def test_a_node_that_is_heard_again_gives_the_mesh_time_to_recover():
