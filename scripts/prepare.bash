@@ -168,18 +168,10 @@ prepare_checks() {
   npm_install
 }
 
-# What all tests need. pip mostly waits for the network, apt-get for the disk.
+# What all tests need. pip comes after apt-get, whose Python packages it finds in the environment.
 prepare_tests() {
-  make_venv
-  set -m  # a process group of its own, which can be ended as a whole
-  (prepare_unit_tests) </dev/null &
-  set +m
-  local pip=$!
-  # shellcheck disable=SC2064  # the number of now
-  trap "kill -- -$pip 2>/dev/null" EXIT
   apt_install "${ros_packages[@]}" "${screen_packages[@]}"
-  wait "$pip" || exit
-  trap - EXIT
+  prepare_unit_tests
   map_library
 }
 
@@ -187,5 +179,4 @@ prepare_tests() {
 prepare_rest() {
   prepare_checks
   pip_install requirements/{browser,docs}.txt
-  build
 }

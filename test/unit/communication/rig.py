@@ -12,6 +12,7 @@ from drone_mesh.communication.interfaces import IInternetConnection, IWirelessCo
 from drone_mesh.communication.medium import UNDISTURBED
 from drone_mesh.communication.router import MeshnetworkRouter
 from drone_mesh.communication.routing.child_table_tree import ChildTableTree
+from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import LocationUnknown
@@ -101,6 +102,7 @@ class RigEngine(IDroneEngine):
         return self.ended
 
     def set_goal(self, latitude, longitude, height):
+        check_goal(latitude, longitude, height)
         self.goals.append(Location(latitude, longitude, height))
 
     def get_location(self):

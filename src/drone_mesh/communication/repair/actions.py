@@ -18,14 +18,11 @@ from drone_mesh.communication.messages import (
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.parts import NodeParts
 from drone_mesh.communication.place_requests import ask_all_for_places, ask_for_place
+from drone_mesh.communication.repair.heights import may_be_flown_to
 from drone_mesh.communication.repair.options import RepairOptions
 from drone_mesh.communication.repair.spots import NEAR, PITCH
 from drone_mesh.communication.router_states import RepairState, RouterEvent, RouterStates
-from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.location import Location
-from drone_mesh.errors import GoalRefused
-
-LOWEST_M = -10.0  # our choice: a place further below the origin is a mistake
 
 
 class Step(NamedTuple):
@@ -132,7 +129,7 @@ class RepairActions(abc.ABC):
         return [
             Step(place, owner, home=owner == gateway != NO_ROUTE)
             for place, owner in candidates
-            if place is not None and _may_be_flown_to(place)
+            if place is not None and may_be_flown_to(place)
         ]
 
     @property
@@ -230,28 +227,3 @@ class RepairActions(abc.ABC):
         if heard is None:
             return NeighbourView(None, math.inf, hops)
         return NeighbourView(heard.place, self.now_s - heard.heard_s, hops)
-
-
-def at_whole_metres(place: Location) -> Location:
-    """Where a repair ends instead of at `place`, but for `above_ground`.
-
-    A LOCATION has whole metres of height only, and a beacon tenths: from elsewhere others would not
-    know how near this drone is.
-    """
-    return place._replace(height=round(place.height))
-
-
-def above_ground(place: Location) -> Location:
-    """Not lower than the origin: altitudes err by metres, and a field may slope."""
-    return place._replace(height=max(0, place.height))
-
-
-def _may_be_flown_to(place: Location) -> bool:
-    """Whether a drone may fly there: a LOCATION may contain any numbers."""
-    if place.height < LOWEST_M:
-        return False
-    try:
-        check_goal(*above_ground(at_whole_metres(place)))
-    except GoalRefused:
-        return False
-    return True

@@ -12,23 +12,13 @@ from drone_mesh.communication.control_plane import IControlPlane
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.parts import NodeParts
-from drone_mesh.communication.repair.actions import (
-    RepairActions,
-    Step,
-    above_ground,
-    at_whole_metres,
-)
+from drone_mesh.communication.repair.actions import RepairActions, Step
 from drone_mesh.communication.repair.election import NO_BID, TOOK_OFF, TOOK_OFF_HOME
 from drone_mesh.communication.repair.flight import ASK_AGAIN_S, ASK_SEALED_S, RepairFlight
+from drone_mesh.communication.repair.heights import above_ground, at_whole_metres
 from drone_mesh.communication.repair.interfaces import IRepairStrategy
 from drone_mesh.communication.repair.options import RepairOptions
-from drone_mesh.communication.repair.spots import (
-    BLOCK,
-    PITCH,
-    Landing,
-    own_spot,
-    small_block,
-)
+from drone_mesh.communication.repair.spots import PITCH, Landing, own_spot, spot_beside_rivals
 from drone_mesh.communication.repair.status import NOTHING_TO_REPAIR, RepairStatus
 from drone_mesh.communication.repair.taken_places import TakenPlaces
 from drone_mesh.communication.router_states import RepairState, RouterEvent, RouterStates
@@ -283,19 +273,21 @@ class ConnectionRepair(RepairActions):
 
     def goal_of(self, step: Step) -> Location:  # noqa: D102
         if step.owner == self.node_id:
-            return step.place
-        place, rivals = at_whole_metres(step.place), self._rivals(step)
+            return above_ground(step.place)
+        place, landing = at_whole_metres(step.place), self._landing(step)
+        rivals = self._rivals(step)
         if self.silent or rivals:
             known = [place, *self._taken.all(), *self._tried_spots]
-            block = BLOCK if self.silent else small_block(self.node_id, rivals)
-            return above_ground(own_spot(place, self.node_id, self.clearance_m, known, block))
-        landing = self._landing(step)
-        return above_ground(self._taken.at_or_beside(place, landing, self._tried_spots))
+            if self.silent:
+                return own_spot(place, self.node_id, self.clearance_m, known)
+            return spot_beside_rivals(place, self.node_id, rivals, landing, self._options, known)
+        return self._taken.at_or_beside(place, landing, self._tried_spots)
 
     def _rivals(self, step: Step) -> list[int]:
         """Drones that this one cannot hear, and that may fly there, too: it is in their range."""
         neighbours = self._parts.neighbours
-        places = {node: neighbours.place_of(node) for node in neighbours.out_of_reach()}
+        others = neighbours.out_of_reach() - {step.owner}
+        places = {node: neighbours.place_of(node) for node in others}
         return [
             node
             for node, heard in places.items()

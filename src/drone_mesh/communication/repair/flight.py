@@ -6,7 +6,8 @@ from typing import Callable
 
 from drone_mesh.communication.parts import NodeParts
 from drone_mesh.communication.place_requests import ask_all_for_places
-from drone_mesh.communication.repair.actions import Step, above_ground, at_whole_metres
+from drone_mesh.communication.repair.actions import Step
+from drone_mesh.communication.repair.heights import above_ground, at_whole_metres
 from drone_mesh.communication.repair.options import RepairOptions
 from drone_mesh.communication.repair.spots import Landing
 from drone_mesh.communication.repair.taken_places import TakenPlaces
@@ -43,11 +44,10 @@ class RepairFlight:
         self.group = parts.neighbours.ids()  # the neighbours that it leaves behind
         self.stops_when_connected = False
         self.asks_left = 0  # on the ground
+        self._wanted = at_whole_metres(step.place)  # or beside it
         self._taken = taken
         self._landing = landing
         self._parts = parts
-        whole = above_ground(at_whole_metres(step.place))
-        self._wanted = step.place if self.leads_back else whole  # or beside it
         self._introduce = introduce
         self._clearance_m = options.clearance_m
         self._leg_m = LEG * options.range_m
@@ -89,13 +89,13 @@ class RepairFlight:
         """Another node reports its place; keep clear of it."""
         if node == self._step.owner and place.distance_m(self._step.place) < self._clearance_m:
             self.stop_when_connected()
-        if place.distance_m(self.goal) < self._clearance_m:
+        if above_ground(place).distance_m(self.goal) < self._clearance_m:
             self.stop_when_connected()
         self.on_taken(place)
 
     def on_taken(self, place: Location) -> None:
         """Another drone is at `place`, or may be there in silence; keep clear of it."""
-        near = place.distance_m(self.goal) < self._clearance_m
+        near = above_ground(place).distance_m(self.goal) < self._clearance_m
         if near and not self._taken.is_free(self.goal):
             self._diversions += 1
             self._go_to(self._spot())
@@ -140,7 +140,7 @@ class RepairFlight:
         longest_m = self._leg_m + LANDED_WITHIN_M
         if self.stops_when_connected and here is not None and here.distance_m(goal) > longest_m:
             goal = here.towards(goal, self._leg_m)
-        self._parts.pilot.step_back_to(goal)
+        self._parts.pilot.step_back_to(above_ground(goal))
 
     def _leg_is_short(self, here: Location | None) -> bool:
         """Whether this was not the last leg, and the drone makes progress."""

@@ -10,7 +10,7 @@ from drone_mesh.communication.repair.options import LostPlace, RepairOptions
 from drone_mesh.drone.location import Location
 
 BLOCK = 8  # spots along each side of a block
-SMALL_BLOCK = 3  # our choice: of two drones nine out of ten have their own spots in it
+BLOCKS = (2, 4, BLOCK)  # each divides the next one
 FLOORS = 4  # BLOCK * BLOCK * FLOORS spots: one for each of the 256 ids
 WITHIN_REACH = 0.9  # our choice, of the range: how far behind a node that moved a drone stays
 PITCH = 1.1  # distance of spots in clearances, with a margin for rounding
@@ -26,42 +26,67 @@ class Landing(NamedTuple):
 
 
 def own_spot(
-    place: Location,
-    node: int,
-    clearance_m: float,
-    occupied: Iterable[Location] = (),
-    block: int = BLOCK,
+    place: Location, node: int, clearance_m: float, occupied: Iterable[Location] = ()
 ) -> Location:
-    """The spot nearest to `place` that belongs to `node` and is clear of `occupied`.
+    """The spot nearest to `place` that belongs to `node` alone and is clear of `occupied`.
 
     Space is a lattice of spots that are clear of each other, divided among the ids 0..255 in blocks
-    of 8 x 8 x 4. So drones that cannot hear each other never land at the same spot. In smaller
-    blocks, which have one floor, spots are nearer, but ids share them: see small_block.
+    of 8 x 8 x 4. So drones that cannot hear each other never land at the same spot.
     """
+    spots = sorted(_own_spots(place, node, clearance_m, BLOCK), key=place.distance_m)
+    return _first_clear(spots, clearance_m, occupied)
+
+
+def spot_beside_rivals(
+    place: Location,
+    node: int,
+    rivals: Iterable[int],
+    landing: Landing,
+    options: RepairOptions,
+    occupied: Iterable[Location],
+) -> Location:
+    """A spot near `place` that belongs to `node` and to none of `rivals`, and keeps most links.
+
+    As `own_spot`, in the smallest blocks of 2 x 2, 4 x 4 or 8 x 8 x 4 that separate their ids. The
+    spots of an id in large blocks are among its spots in smaller ones, so drones that choose
+    different blocks have different spots, too.
+    """
+    others = [_class_of(other, block) for block in BLOCKS for other in rivals]
+    block = next((b for b in BLOCKS if _class_of(node, b) not in others), BLOCK)
+    spots = sorted(
+        _own_spots(place, node, options.clearance_m, block),
+        key=lambda spot: (_too_long(spot, landing.links, options), place.distance_m(spot)),
+    )
+    return _first_clear(spots, options.clearance_m, occupied)
+
+
+def _class_of(node: int, block: int) -> tuple[int, ...]:
+    """Which spots of each block, as many along each side, are those of `node`."""
+    floor, on_floor = divmod(node, BLOCK * BLOCK)
+    row, column = divmod(on_floor, BLOCK)
+    return block, row % block, column % block, floor if block == BLOCK else 0
+
+
+def _own_spots(place: Location, node: int, clearance_m: float, block: int) -> list[Location]:
     pitch_m = PITCH * clearance_m
     block_m = block * pitch_m
-    floor, on_floor = divmod(node if block == BLOCK else node % block**2, block**2)
-    row, column = divmod(on_floor, block)
+    _block, row, column, floor = _class_of(node, block)
     south = (place.latitude / pitch_m - row) // block * block_m + row * pitch_m
     west = (place.longitude / pitch_m - column) // block * block_m + column * pitch_m
     height = place.height + floor * math.ceil(clearance_m)
-    spots = sorted(
-        (
-            Location(south + i * block_m, west + j * block_m, height)
-            for i in range(-1, 3)
-            for j in range(-1, 3)
-        ),
-        key=place.distance_m,
-    )
+    return [
+        Location(south + i * block_m, west + j * block_m, height)
+        for i in range(-1, 3)
+        for j in range(-1, 3)
+    ]
+
+
+def _first_clear(
+    spots: Sequence[Location], clearance_m: float, occupied: Iterable[Location]
+) -> Location:
     occupied = list(occupied)
     free = (s for s in spots if all(s.distance_m(other) >= clearance_m for other in occupied))
     return next(free, spots[0])
-
-
-def small_block(node: int, others: Iterable[int]) -> int:
-    """The smallest block of `own_spot` in which `node` shares its spots with none of `others`."""
-    shared = any(node % SMALL_BLOCK**2 == other % SMALL_BLOCK**2 for other in others)
-    return BLOCK if shared else SMALL_BLOCK
 
 
 def free_spot(
@@ -114,8 +139,12 @@ def _loses(
 ) -> tuple[int, float]:
     """How many of these links are too long for a drone at `spot`, and by how much one grows."""
     away_m = [(spot.distance_m(other), place.distance_m(other)) for other in links]
-    too_long = sum(metres >= options.range_m for metres, _before in away_m)
-    return too_long, round(max(metres - before for metres, before in away_m), 1)
+    longer_m = round(max(metres - before for metres, before in away_m), 1)
+    return _too_long(spot, links, options), longer_m
+
+
+def _too_long(spot: Location, links: Sequence[Location], options: RepairOptions) -> int:
+    return sum(spot.distance_m(other) >= options.range_m for other in links)
 
 
 def _bearing(place: Location, origin: Location) -> float:

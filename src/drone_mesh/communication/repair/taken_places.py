@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import Sequence
 
 from drone_mesh.communication.parts import NodeParts
+from drone_mesh.communication.repair.heights import above_ground
 from drone_mesh.communication.repair.options import LostPlace, RepairOptions
 from drone_mesh.communication.repair.spots import Landing, free_spot
 from drone_mesh.drone.location import Location
@@ -26,10 +27,10 @@ class TakenPlaces:
         """Where each other node was last heard, and the gateway's place."""
         now_s, me = self._parts.now_s, self._parts.node_id
         gateway = self._parts.places.gateway  # it may be there, although it is off now
-        kept_free = [] if gateway is None else [gateway]
+        kept_free = [] if gateway is None else [above_ground(gateway)]
         exact = self._options.lost_place is LostPlace.EXACT
         return kept_free + [
-            heard.place
+            above_ground(heard.place)
             for node, heard in self._parts.neighbours.places().items()
             if node != me and not (exact and now_s - heard.heard_s > FRESH_S)
         ]

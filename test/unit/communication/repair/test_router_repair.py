@@ -12,7 +12,7 @@ from rig import FROM_0, Rig, packet
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.repair.election import HOME_FAILED, TOOK_OFF, TOOK_OFF_HOME
 from drone_mesh.communication.repair.options import LostPlace, RepairOptions
-from drone_mesh.communication.repair.spots import own_spot, small_block
+from drone_mesh.communication.repair.spots import Landing, own_spot, spot_beside_rivals
 from drone_mesh.communication.repair.strategies.thesis import Thesis
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.location import Location
@@ -586,14 +586,56 @@ def test_a_drone_that_knows_no_place_and_is_where_it_was_connected_last_stays_an
     assert "is where it was connected last, and knows no other place" in rig.repair_in_words()
 
 
-def test_the_place_of_a_next_hop_a_few_metres_below_the_origin_is_flown_to_and_not_below_it():
+TWO_AT_8 = "02 02 01 01 01 00 00 00 41 00 00 00 00"  # node 2: latitude 8; a height follows
+
+
+@pytest.mark.parametrize("height", ["fd ff", "ff ff", "00 00"])  # -3, -1 and 0 m
+def test_the_place_of_a_next_hop_a_few_metres_below_the_origin_is_flown_to_and_not_below_it(height):
     """A field slopes, and altitudes err by metres."""
     rig = lone_rig()
     rig.antenna.dead = set()
-    rig.hear("02 02 01 01 01 00 00 00 41 00 00 00 00 fd ff")  # latitude 8, height -3 m
+    rig.hear(f"{TWO_AT_8} {height}")
     rig.antenna.dead = {2}
     rig.wait_until(46.0)
     assert rig.engine.goals == [BESIDE_NEIGHBOUR]
+
+
+@pytest.mark.parametrize("other", ["fe ff", "00 00"])  # -2 and 0 m
+@pytest.mark.parametrize("height", ["fd ff", "00 00"])
+def test_two_silent_drones_on_a_slope_both_keep_their_places(height, other):
+    """5 was last heard where this drone would land otherwise."""
+    rig = lone_rig()
+    rig.antenna.dead = set()
+    rig.hear(f"{TWO_AT_8} {height}", f"05 02 01 01 01 00 00 00 41 cd cc 8c bf {other}")
+    rig.antenna.dead = {2}
+    rig.wait_until(46.0)
+    (goal,) = rig.engine.goals
+    assert goal.distance_m(Location(8.0, -1.1, 0.0)) >= 1.0
+    assert goal.distance_m(NEIGHBOUR_PLACE) >= 1.0
+
+
+def test_above_a_silent_drone_below_the_origin_is_a_metre_above_the_origin():
+    rig = lone_rig(RepairOptions(lost_place=LostPlace.ABOVE))
+    rig.antenna.dead = set()
+    rig.hear(f"{TWO_AT_8} fd ff")
+    rig.antenna.dead = {2}
+    rig.wait_until(46.0)
+    assert rig.engine.goals == [NEIGHBOUR_PLACE._replace(height=1)]
+
+
+@pytest.mark.parametrize("height", [-0.3, -4.0])
+def test_a_drone_that_sees_itself_below_the_ground_flies_to_goals_on_it_and_back(height):
+    rig = lone_rig()
+    rig.engine.place = rig.engine.place._replace(height=height)
+    rig.wait_until(46.0)
+    fly(rig, rig.engine.goals[-1])
+    rig.wait(3.0)
+    fly(rig, rig.engine.goals[-1])
+    rig.wait_until(130.0)
+    step_back, start, home = rig.engine.goals[:3]
+    assert step_back == BESIDE_NEIGHBOUR
+    assert start == Location(12.0, 0.0, 0.0)
+    assert home.height == 0.0
 
 
 def test_a_next_hop_with_an_impossible_place_does_not_hide_that_of_the_gateway():
@@ -1165,18 +1207,47 @@ def test_it_flies_to_a_spot_near_the_place_that_belongs_to_it_alone():
     assert goal == own_spot(NEIGHBOUR_PLACE, 1, 1.0, [NEIGHBOUR_PLACE, Location(4.0, 0.0, 0.0)])
 
 
-@pytest.mark.parametrize(("other", "block"), [(3, 3), (10, 8)])
-def test_drones_whose_ids_differ_modulo_nine_have_their_own_spots_in_small_blocks(other, block):
-    assert small_block(1, [2, other]) == block
-
-
 @pytest.mark.parametrize("x_m", [-2003.7, -2.9, 0.0, 8.3, 4100.2])
-@pytest.mark.parametrize(("block", "ids", "within_m"), [(3, 9, 2.4), (8, 64, 6.3)])
-def test_the_spots_of_all_ids_are_near_a_place_and_clear_of_each_other(x_m, block, ids, within_m):
+def test_the_spots_of_all_ids_are_near_a_place_and_clear_of_each_other(x_m):
     place = Location(x_m, x_m - 40.0, 0.0)
-    spots = [own_spot(place, node, 1.0, block=block) for node in range(ids)]
-    assert max(spot.distance_m(place) for spot in spots) < within_m
+    spots = [own_spot(place, node, 1.0) for node in range(64)]
+    assert max(spot.distance_m(place) for spot in spots) < 6.3
     assert all(one.distance_m(other) >= 1.0 for one, other in itertools.combinations(spots, 2))
+
+
+def beside_rivals(place, node, rivals, links=()):
+    """Where `node` lands beside a lost node at `place` that may still be there."""
+    landing = Landing(Location(0.0, 0.0, 0.0), links)
+    return spot_beside_rivals(place, node, rivals, landing, RepairOptions(), [place])
+
+
+@pytest.mark.parametrize("ids", [(1, 2), (1, 2, 11), (1, 9, 65), (3, 19, 35, 67), (0, 2, 4, 16)])
+@pytest.mark.parametrize("x_m", [-2003.7, 0.0, 8.3, 4100.2])
+def test_drones_that_cannot_hear_each_other_take_different_spots_beside_a_lost_one(ids, x_m):
+    """Also if one of them has more rivals, or is in a silence, and so takes larger blocks."""
+    place = Location(x_m, 14.0, 0.0)
+    first, *others = (
+        [
+            beside_rivals(place, node, {*ids, *more} - {node})
+            for more in ([], [5, 30, 101], [node + 128])
+        ]
+        + [own_spot(place, node, 1.0, [place])]
+        for node in ids
+    )
+    assert all(spot.distance_m(place) >= 1.0 for spots in (first, *others) for spot in spots)
+    for spots in others:
+        assert all(one.distance_m(two) >= 1.0 for one in first for two in spots)
+
+
+def test_the_spots_beside_one_rival_are_mostly_nearer_than_in_a_silence():
+    place = Location(8.3, 14.0, 0.0)
+    assert beside_rivals(place, 1, [2]).distance_m(place) < 2.5
+
+
+def test_a_drone_beside_rivals_takes_the_spot_that_keeps_the_links_of_the_lost_node():
+    links = [Location(0.0, 0.0, 0.0), Location(16.0, 0.0, 0.0)]
+    spot = beside_rivals(Location(8.0, 0.0, 0.0), 10, [3], links)
+    assert all(spot.distance_m(other) < 9.0 for other in links)
 
 
 def test_a_node_that_is_heard_again_gives_the_mesh_time_to_recover():
