@@ -11,6 +11,7 @@ import os
 import re
 import signal
 import subprocess
+import sys
 import tempfile
 import time
 import unittest
@@ -25,6 +26,17 @@ ROSLAUNCHS_OWN = re.compile(
     r"Traceback [^\n]*\n( [^\n]*\n)+AttributeError: [^\n]*'isAlive'\n"
 )
 NODES = ("wireless_signal_simulator", "drone_manager", "drone_factory", "fly_actions")
+
+
+ASKS = """
+import rospy
+from drone_mesh.ros.graph.command_line import start_node
+
+start_node("", "asks")
+print("asks", flush=True)
+while not rospy.is_shutdown():
+    rospy.get_param("/run_id")
+"""
 
 
 def processes_of(port: int) -> list[str]:
@@ -85,6 +97,19 @@ class CtrlCTest(unittest.TestCase):
 
     def test_while_emulated_radios_are_in_each_others_way(self) -> None:
         self.run_and_interrupt(("started 18 nodes",), "radio:=nrf24")
+
+    def test_while_a_node_asks_the_master(self) -> None:
+        """rospy's own handler would wait for the call that it interrupts, for ever."""
+        with subprocess.Popen(
+            [sys.executable, "-c", ASKS], stdout=subprocess.PIPE, text=True
+        ) as asks:
+            try:
+                assert asks.stdout is not None
+                self.assertEqual(asks.stdout.readline(), "asks\n")
+                asks.send_signal(signal.SIGINT)
+                self.assertEqual(asks.wait(timeout=15), 0)
+            finally:
+                asks.kill()
 
 
 if __name__ == "__main__":
