@@ -39,7 +39,7 @@ def test_no_drone_rests_at_the_place_of_one_that_was_silent_or_lost_a_link(numbe
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [2259, 2369])
 def test_with_beacons_no_drone_rests_beside_one_whose_place_it_hears_rounded_or_not_at_all(number):
-    """Once two drones without a link took one place; twice a drone stopped at 6.6 m, heard as 7."""
+    """In one, two drones without a link took one place; in the other, one went to 6.6 m."""
     incidents = ["silent_for_a_while", "links_cut", "cut_vertex_killed", "many_killed"]
     content = {
         "sequence": {"density": [5, 6.5], "incidents": incidents},

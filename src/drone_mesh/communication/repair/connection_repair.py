@@ -275,11 +275,11 @@ class ConnectionRepair(RepairActions):
         if step.owner == self.node_id:
             return above_ground(step.place)
         place, landing = at_whole_metres(step.place), self._landing(step)
+        known = [place, *self._taken.all(), *self._tried_spots]
+        if self.silent:
+            return own_spot(place, self.node_id, self.clearance_m, known)
         rivals = self._rivals(step)
-        if self.silent or rivals:
-            known = [place, *self._taken.all(), *self._tried_spots]
-            if self.silent:
-                return own_spot(place, self.node_id, self.clearance_m, known)
+        if rivals:
             return spot_beside_rivals(place, self.node_id, rivals, landing, self._options, known)
         return self._taken.at_or_beside(place, landing, self._tried_spots)
 

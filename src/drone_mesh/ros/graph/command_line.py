@@ -79,7 +79,7 @@ def _shut_down_beside(number: int, _frame: object) -> None:
     """Handle a signal in a thread of its own, for which the interpreter waits at its end.
 
     rospy's own handler calls the master while the interrupted thread may hold the lock of the
-    connection to it: of 159 nodes that were interrupted while they started, five hung for ever.
+    connection to it. Then the node, mostly one that starts, would hang for ever.
     """
     threading.Thread(
         target=rospy.signal_shutdown, args=(f"signal {number}",), name="shutdown"

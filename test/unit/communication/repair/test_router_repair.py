@@ -459,14 +459,18 @@ def test_a_router_that_knows_no_other_place_flies_to_the_gateway():
     assert rig.engine.goals[:1] == [A_LEG_FROM_12]
 
 
-def test_after_one_step_back_the_next_one_is_to_the_gateway():
-    rig = lone_rig()
+def goals_of_one_that_hears_nobody(rig):
+    """Beside the lost node, back to where it stood, and towards the gateway."""
     rig.wait_until(46.0)
     fly(rig, rig.engine.goals[-1])
     rig.wait(3.0)
     fly(rig, rig.engine.goals[-1])
     rig.wait_until(130.0)
-    step_back, start, home = rig.engine.goals[:3]
+    return rig.engine.goals[:3]
+
+
+def test_after_one_step_back_the_next_one_is_to_the_gateway():
+    step_back, start, home = goals_of_one_that_hears_nobody(lone_rig())
     assert step_back == BESIDE_NEIGHBOUR
     assert start == Location(12.0, 0.0, 0.0)  # it hears no node where it is now
     assert home == A_LEG_FROM_12
@@ -627,12 +631,7 @@ def test_above_a_silent_drone_below_the_origin_is_a_metre_above_the_origin():
 def test_a_drone_that_sees_itself_below_the_ground_flies_to_goals_on_it_and_back(height):
     rig = lone_rig()
     rig.engine.place = rig.engine.place._replace(height=height)
-    rig.wait_until(46.0)
-    fly(rig, rig.engine.goals[-1])
-    rig.wait(3.0)
-    fly(rig, rig.engine.goals[-1])
-    rig.wait_until(130.0)
-    step_back, start, home = rig.engine.goals[:3]
+    step_back, start, home = goals_of_one_that_hears_nobody(rig)
     assert step_back == BESIDE_NEIGHBOUR
     assert start == Location(12.0, 0.0, 0.0)
     assert home.height == 0.0
