@@ -113,13 +113,11 @@ def test_the_map_lies_under_the_drones_and_moves_with_them(start_console, visit,
     assert all(url.startswith(page.page.url) for url in page.requests if "data:" not in url)
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("size", [(1400, 880), (390, 780)], ids=["desk", "phone"])
-def test_axe_finds_no_violation_on_a_map(start_console, visit, tile_file, scheme, size):
+def test_axe_finds_no_violation_on_a_map(start_console, visit, tile_file, size):
     page = visit(
         start_console("--origin", ORIGIN, "--tiles", tile_file).url,
         viewport={"width": size[0], "height": size[1]},
-        color_scheme=scheme,
     )
     page.wait_for_drones(len(PLACES))
     page.wait_for("the map", lambda: lies_on_the_origin(page))
