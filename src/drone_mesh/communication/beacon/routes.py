@@ -313,32 +313,36 @@ class BeaconRoutes(IRoutes):
 
     # Any way -----------------------------------------------------------------------------------
 
-    def next_hops(self, node: int, came_from: int) -> list[Way]:
-        """The neighbours to try for a packet to `node`, the best first."""
+    def next_hops(self, node: int, came_from: int) -> Iterator[Way]:
+        """The neighbours to try for a packet to `node`, the best first; mostly one is enough."""
         if node == self.gateway and not self.is_root:
-            ranks = sorted(map(self._rank, self._candidates()))
-            return [Way(neighbour, -heard) for _cost, _other, heard, neighbour in ranks]
-        found: dict[int, Way] = {}  # in order
-        direct, last = self.neighbours.get(node), []
-        if direct is not None:
-            way = Way(node, direct.alive_s)
-            if direct.usable and self.risk(direct) < GONE:
-                found[node] = way
-            else:
-                last.append(way)
-        for way in self._next_to(node):
-            found.setdefault(way.neighbour, way)
+            for _cost, _other, heard, neighbour in sorted(map(self._rank, self._candidates())):
+                yield Way(neighbour, -heard)
+            return
+        named: set[int] = set()
+        for way in self._ways_down(node, came_from):
+            if way.neighbour not in named:
+                named.add(way.neighbour)
+                yield way
+
+    def _ways_down(self, node: int, came_from: int) -> Iterator[Way]:
+        """The same for a node that is no gateway, and some of them more than once."""
+        direct = self.neighbours.get(node)
+        is_doubtful = direct is None or not direct.usable or self.risk(direct) >= GONE
+        if direct is not None and not is_doubtful:
+            yield Way(node, direct.alive_s)
+        yield from self._next_to(node)
         hint, at_s = self._hints.get(node, (NO_ROUTE, -math.inf))
         if hint in self.neighbours and self.now_s - at_s < HINT_S:
-            found.setdefault(hint, Way(hint, at_s))
+            yield Way(hint, at_s)
         for _rank, way in sorted(self._announcements(node)):
-            found.setdefault(way.neighbour, way)
+            yield way
         parent = self.neighbours.get(self.parent)
         if parent is not None and self._comes_from_below(came_from):
-            found.setdefault(parent.node, Way(parent.node, parent.heard_s))
-        for way in (*self._nearer(node), *last):
-            found.setdefault(way.neighbour, way)
-        return list(found.values())
+            yield Way(parent.node, parent.heard_s)
+        yield from self._nearer(node)
+        if direct is not None and is_doubtful:
+            yield Way(node, direct.alive_s)
 
     def _next_to(self, node: int) -> list[Way]:
         """The neighbours that hear `node` themselves, the one that showed it last first."""
@@ -389,8 +393,8 @@ class BeaconRoutes(IRoutes):
 
     def get_direction_to_node(self, node: int) -> int:
         """The best next hop for a packet of this node, or NO_ROUTE."""
-        ways = self.next_hops(node, NO_ROUTE)
-        return ways[0].neighbour if ways else NO_ROUTE
+        way = next(self.next_hops(node, NO_ROUTE), None)
+        return NO_ROUTE if way is None else way.neighbour
 
     def may_reach(self, node: int) -> bool:
         """A packet waits for a next hop, as long as there is anybody to search through."""

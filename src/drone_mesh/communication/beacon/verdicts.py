@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 from drone_mesh.communication.beacon.routes import BeaconRoutes
@@ -31,7 +32,8 @@ class Verdicts:
         routes.now_s = now_s = self._deadlines.now_s
         is_up = transit.addressee == routes.gateway
         ways = routes.next_hops(transit.addressee, transit.came_from)
-        for to, shown_s in ways if is_up or len(transit.sent_s) < MOST_WAYS else ways[:1]:
+        most = None if is_up or len(transit.sent_s) < MOST_WAYS else 1
+        for to, shown_s in itertools.islice(ways, most):
             if to == transit.came_from or shown_s <= transit.sent_s.get(to, -math.inf):
                 continue
             failed_s = transit.failed_s.get(to)
