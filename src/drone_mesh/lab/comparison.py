@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Sequence
 
-from drone_mesh.errors import ConfigurationError
 from drone_mesh.lab.results import load_results
 from drone_mesh.lab.statistics import holm, mean_interval, paired_difference
 
@@ -18,10 +17,7 @@ def print_comparison(folder: Path, a: str, b: str, metrics: Sequence[str]) -> No
     results = load_results(folder)
     cell_a, cell_b = results.find_cell(a), results.find_cell(b)
     chosen = list(metrics) or results.metrics
-    columns = set(next(iter(results.rows.values()), {}))
-    for metric in chosen:
-        if metric not in columns:
-            raise ConfigurationError(f"{folder}: runs.csv has no column {metric}")
+    results.check_columns(chosen)
     print(f"A: {results.loaded.cells[cell_a].label}")
     print(f"B: {results.loaded.cells[cell_b].label}")
     print(f"{'metric':20} {'seeds':>5}  {'A':26} {'B':26} {'B - A, paired':28} {'p (Holm)':>9}")

@@ -17,8 +17,10 @@ from drone_mesh.lab import extensions, movement, places
 from drone_mesh.lab.dotted_path import NoSuchPlace, put
 from drone_mesh.lab.experiment_source import Source, nearest_name
 from drone_mesh.lab.expression import ExpressionError, Where
+from drone_mesh.lab.metrics import METRICS
 from drone_mesh.lab.parts import Part
 from drone_mesh.lab.scenario import Scenario
+from drone_mesh.lab.scenario_checks import check_scenario
 from drone_mesh.yaml_file import KeyPath, read_mapping
 
 NAME_PATTERN = r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$"  # used as the name of a folder
@@ -185,7 +187,11 @@ def _cells(experiment: Experiment, source: Source) -> Iterator[Cell]:
             raise source.error(("where",), f"where: {error}") from None
     for combination in itertools.product(*axes):
         point = {axis: value for part in combination for axis, value in part.items()}
-        if where is None or where.holds(point):
+        try:
+            is_wanted = where is None or where.holds(point)
+        except ExpressionError as error:
+            raise source.error(("where",), f"where: {error}") from None
+        if is_wanted:
             yield Cell(point, _scenario(experiment, point, named, source))
 
 
@@ -213,8 +219,7 @@ def _scenario(
             extensions.check_technique(key, getattr(scenario, key), scenario.model)
         except ConfigurationError as error:
             raise source.error(named.get(key, ("base", key)), f"{key}: {error}") from None
-    _check_ids(scenario, source)
-    _check_begins(scenario, source)
+    check_scenario(scenario, source)
     return scenario
 
 
@@ -234,61 +239,21 @@ def _read_files(content: Dict[str, Any], source: Source) -> None:
             raise source.error(("base", part, "path"), f"{part}.path: {error}") from None
 
 
-def _check_ids(scenario: Scenario, source: Source) -> None:
-    if scenario.layout.kind in ("casus", "file"):
-        return
-    layout_has = f"the layout has 0..{scenario.layout.drones - 1}"
-    for node, *_knot in scenario.mobility.knots or ():
-        if node >= scenario.layout.drones:
-            raise source.error(
-                ("base", "mobility", "path"),
-                f"mobility.path: the trace names drone {node:g}; {layout_has}",
-            )
-    for index, fault in enumerate(scenario.faults):
-        one = getattr(fault.what, "id", None)
-        for node in (
-            *(getattr(fault.what, "ids", None) or ()),
-            *(getattr(fault.what, "between", None) or ()),
-            *(() if one is None else (one,)),
-        ):
-            if node >= scenario.layout.drones:
-                raise source.error(
-                    ("base", "faults", index, fault.action),
-                    f"faults.{index}.{fault.action}: no drone {node}; {layout_has}",
-                )
-
-
-def _check_begins(scenario: Scenario, source: Source) -> None:
-    """Refuse what begins after the end of the run: nothing would show that it never happened."""
-    if scenario.sequence is not None:  # it has faults and an end of its own
-        return
-    begins: List[Tuple[KeyPath, Optional[float]]] = [
-        (("faults", index, fault.action), fault.at_s) for index, fault in enumerate(scenario.faults)
-    ]
-    if scenario.probes.per_s:
-        begins.append((("probes", "from_s"), scenario.probes.from_s + scenario.probes.within_s))
-    if scenario.mobility.knots:
-        begins.append((("mobility", "path"), min(t for _id, t, *_place in scenario.mobility.knots)))
-    for place, begin_s in begins:
-        if begin_s is not None and begin_s >= scenario.duration_s:
-            raise source.error(
-                ("base", *place),
-                f"{'.'.join(map(str, place))}: begins at {begin_s:g} s, after the end of the run "
-                f"(duration_s {scenario.duration_s:g})",
-            )
-
-
 def _check_metrics(experiment: Experiment, source: Source) -> None:
     wanted: List[Tuple[KeyPath, str]] = [
         (("metrics", index), name) for index, name in enumerate(experiment.metrics)
     ]
     if experiment.stop is not None:
         wanted.append((("stop", "metric"), experiment.stop.metric))
+    columns: Dict[str, str] = {}
     for place, name in wanted:
         try:
             extensions.check_metric(name)
         except ConfigurationError as error:
             raise source.error(place, str(error)) from None
+        column = extensions.own_column(name) if ":" in name else name
+        if columns.setdefault(column, name) != name or (":" in name and column in METRICS):
+            raise source.error(place, f"metric {name}: another one is also called {column}")
     if experiment.stop is not None and (
         (experiment.stop.half_width is None) == (experiment.stop.relative_half_width is None)
     ):

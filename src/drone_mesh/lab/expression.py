@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from typing import Any, Mapping, Sequence
 
 _ALLOWED = (
@@ -25,12 +26,21 @@ class Where:
         try:
             tree = ast.parse(text, mode="eval")
         except (SyntaxError, ValueError) as error:
-            raise ExpressionError(f"{text!r} is not an expression") from error
+            hint = ""
+            if re.search(r"\w\.\d+\.", text):  # as in faults.0.kill.share
+                hint = "; name the action, not the number of a fault, as in faults.kill.share"
+            raise ExpressionError(f"{text!r} is not an expression{hint}") from error
         self._code = compile(_OverAxes(axes).visit(tree), "where", "eval")
 
     def holds(self, values: Mapping[str, Any]) -> bool:
-        """Whether a cell with these axis values is part of the experiment."""
-        return bool(eval(self._code, {"__builtins__": {}}, dict(values)))  # without any call in it
+        """Whether a cell with these axis values is part of the experiment.
+
+        Raises ExpressionError for values that it cannot compare or compute with.
+        """
+        try:
+            return bool(eval(self._code, {"__builtins__": {}}, dict(values)))  # without any call
+        except (TypeError, ArithmeticError) as error:
+            raise ExpressionError(f"{error}, with {dict(values)}") from error
 
 
 class _OverAxes(ast.NodeTransformer):

@@ -67,6 +67,14 @@ class Link(Part):
     number: Annotated[int, Field(ge=1, le=10_000)] = 1
     for_s: Optional[Above0] = None  # default: to the end
 
+    @model_validator(mode="after")
+    def _is_one_link_or_a_number(self) -> "Link":
+        if self.between is not None and "number" in self.model_fields_set:
+            raise ValueError("give either between or number")
+        if self.between is not None and len(set(self.between)) == 1:
+            raise ValueError("a link is between two drones")
+        return self
+
 
 class Jam(Part):
     """Noise in a circle: packets from or to a drone within it are lost.

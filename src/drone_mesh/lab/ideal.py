@@ -226,6 +226,7 @@ def _measured(draw: Draw, repair: Flown) -> tuple[dict[str, float], str]:
     near, parts = _parts(places, range_m)
     healed = parts.max() == 0
     shifts = np.linalg.norm(places - start[draw.alive], axis=1)
+    observed_s = (round(scenario.duration_s / STEP_S) - 1) * STEP_S
     values = dict.fromkeys(METRICS, math.nan)
     values.update(
         healed=float(healed),
@@ -233,12 +234,12 @@ def _measured(draw: Draw, repair: Flown) -> tuple[dict[str, float], str]:
         cut_off=float((first_parts != first_parts[draw.home]).sum()),
         victims=float(len(draw.victims)),
         t_total_s=end_s if healed else math.nan,
-        t_capped_s=end_s,
+        t_capped_s=end_s if healed else observed_s,
         t_detect_s=0.0 if healed else math.nan,
         t_decide_s=0.0 if healed else math.nan,
         t_fly_s=end_s if healed else math.nan,
         t_reroute_s=0.0 if healed else math.nan,
-        observed_s=(round(scenario.duration_s / STEP_S) - 1) * STEP_S,
+        observed_s=observed_s,
         connected_share=float((parts == parts[draw.home]).mean()),
         distance_total_m=float(flown.sum()),
         distance_max_m=float(flown.max()),

@@ -42,9 +42,9 @@ def draw_places(
     Random positions avoid the obstacles; "connected" includes the obstacles' effect on links.
     """
     if layout.kind == "file":
-        return [StartPoint(int(i), x, y, bool(g)) for i, x, y, g in layout.places or ()]
+        return of_file(layout)
     if layout.kind == "casus":
-        return _casus(layout)
+        return casus(layout)
     if layout.kind == "line":
         places = _line(layout)
     elif layout.kind == "grid":
@@ -86,7 +86,12 @@ def rows_of_file(path: Path) -> list[list[float]]:
     return [places[node_id] for node_id in sorted(places)]
 
 
-def _casus(layout: Layout) -> list[StartPoint]:
+def of_file(layout: Layout) -> list[StartPoint]:
+    """The drones of a file."""
+    return [StartPoint(int(i), x, y, bool(g)) for i, x, y, g in layout.places or ()]
+
+
+def casus(layout: Layout) -> list[StartPoint]:
     """The drones of a DroneManager layout at their positions, and its gateway."""
     try:
         orders = Layouts.shipped().orders(layout.case)

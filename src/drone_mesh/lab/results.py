@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Mapping, NamedTuple, Sequence
 
@@ -20,6 +21,7 @@ from drone_mesh.lab.store import (
 )
 
 CELLS_SHOWN = 4  # in an error
+_OUTSIDE_BRACKETS = re.compile(r",(?![^\[]*\])")  # commas, but not those of a list
 DEFAULT_METRICS = ("healed", "t_total_s", "uptime", "distance_total_m", "packets")
 
 Row = Mapping[str, str]
@@ -45,8 +47,9 @@ class Results(NamedTuple):
     def only(self, text: str, metrics: Sequence[str] = ()) -> Results:
         """The cells that match axis=value[,axis=value...], with these metrics if there are any.
 
-        Raises ConfigurationError if none matches.
+        Raises ConfigurationError if none matches, or for an unknown metric.
         """
+        self.check_columns(metrics)
         fit = self._matching(text)
         if not fit:
             raise ConfigurationError(f"{self.folder}: no cell matches {text}")
@@ -59,10 +62,17 @@ class Results(NamedTuple):
             by_cell={place: self.drawn(index) for place, index in enumerate(fit)},
         )
 
+    def check_columns(self, metrics: Sequence[str]) -> None:
+        """Raise ConfigurationError for a metric that runs.csv does not have."""
+        columns = next(iter(self.rows.values()), {})
+        for metric in metrics:
+            if metric not in columns:
+                raise ConfigurationError(f"{self.folder}: runs.csv has no column {metric}")
+
     def _matching(self, text: str) -> list[int]:
         """The cells that match axis=value[,axis=value...]."""
         wanted: dict[str, str] = {}
-        for part in filter(None, text.split(",")):
+        for part in filter(None, _OUTSIDE_BRACKETS.split(text)):
             axis, equals, value = part.partition("=")
             if not equals or axis not in self.loaded.axes:
                 axes = ", ".join(self.loaded.axes) or "no axes"

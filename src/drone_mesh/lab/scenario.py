@@ -268,4 +268,20 @@ class Scenario(Part):
             for fault in self.faults:
                 if fault.action in ("cut_link", "loss"):
                     raise ValueError(f"fault {fault.action} is for the disc radio")
+            if self.sequence is not None:
+                raise ValueError("a sequence is for the disc radio")
+        return self
+
+    @model_validator(mode="after")
+    def _measures_one_load(self) -> "Scenario":
+        actions = [fault.action for fault in self.faults if fault.action in ("send", "load")]
+        if "load" in actions and len(actions) > 1:
+            raise ValueError("a load says from when on messages count: no other load or send fits")
+        return self
+
+    @model_validator(mode="after")
+    def _has_batteries_that_flights_empty(self) -> "Scenario":
+        is_piloted = self.mobility.kind != "none" and not self.mobility.told
+        if is_piloted and any(f.battery and f.battery.fly_m is not None for f in self.faults):
+            raise ValueError("battery.fly_m counts no flights of pilots (mobility): use live_min")
         return self

@@ -66,7 +66,7 @@ class Simulation:
         )
         churns = any(fault.churn is not None for fault in scenario.faults)
         self._is_watched = bool(churns or scenario.probes.per_s or scenario.mobility.kind != "none")
-        self._links = LinkWatch(scenario.probes.from_s)
+        self._links = LinkWatch(scenario.probes.from_s if scenario.probes.per_s else 0.0)
         self._samples: list[NetworkSample] = []
         self._start_places = self._places()
         self._start: Topology | None = None

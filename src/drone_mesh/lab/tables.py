@@ -26,7 +26,7 @@ WORST_SHOWN = 8
 
 _LATEX = {
     "\\": r"\textbackslash ", "%": r"\%", "_": r"\_", "&": r"\&", "#": r"\#",
-    "<": r"\textless ", ">": r"\textgreater ",
+    "{": r"\{", "}": r"\}", "$": r"\$", "<": r"\textless ", ">": r"\textgreater ",
 }  # fmt: skip
 
 
@@ -125,12 +125,12 @@ def healing_table(results: Results) -> Table | None:
     """Share healed by certain times, and the censored time to heal; None without faults."""
     cells = []
     for index, cell in enumerate(results.loaded.cells):
-        counted = results.of_cell(index).values()
-        times = [(number(row, "t_total_s"), number(row, "observed_s")) for row in counted]
-        if any(observed_s is not None for _, observed_s in times):
-            healed = [math.inf if total_s is None else total_s for total_s, _ in times]
-            end_s = min(observed_s or 0.0 for _, observed_s in times)
-            cells.append((cell, healed, end_s, survival_of(results.of_cell(index))))
+        runs = {r: row for r, row in results.of_cell(index).items() if row["observed_s"]}
+        if runs:  # in the others nothing was to be healed
+            totals = [number(row, "t_total_s") for row in runs.values()]
+            healed = [math.inf if total_s is None else total_s for total_s in totals]
+            end_s = min(float(row["observed_s"]) for row in runs.values())
+            cells.append((cell, healed, end_s, survival_of(runs)))
     if not cells:
         return None
     columns = [by_s for by_s in HEALED_BY_S if any(by_s <= end_s for _, _, end_s, _ in cells)]

@@ -300,10 +300,11 @@ class Timeline:
     def _send(self, fault: Fault, _rng: random.Random) -> list[int]:
         what, gateway = fault.what, gateways_of(self._network)[0]
         senders = [what.ids[number % len(what.ids)] for number in range(what.number)]
-        self.messages_since_s = self._network.clock.now_s
+        self.messages_since_s = self.messages_since_s or self._network.clock.now_s
         for node in senders:
-            ticket = self._network.send(node, gateway, bytes(what.size), reliable=what.reliable)
-            self.messages.append(HandedIn(node, ticket))
+            with contextlib.suppress(QueueFull):  # the mesh was not offered it
+                ticket = self._network.send(node, gateway, bytes(what.size), reliable=what.reliable)
+                self.messages.append(HandedIn(node, ticket))
         return sorted(set(senders))
 
     def _load(self, fault: Fault, rng: random.Random) -> list[int]:
@@ -320,13 +321,13 @@ class Timeline:
     def _send_one(self, what: tuple[float, bytes]) -> None:
         draw, payload = what
         fit = self._routers(alive=True)
+        if not fit:
+            return
         node, gateway = fit[int(draw * len(fit))], gateways_of(self._network)[0]
-        try:
+        with contextlib.suppress(QueueFull):  # the mesh was not offered it
             ticket = self._network.send(node, gateway, payload)
-        except QueueFull:
-            return  # the mesh was not offered it
-        if self._network.clock.now_s >= self.messages_since_s:
-            self.messages.append(HandedIn(node, ticket))
+            if self._network.clock.now_s >= self.messages_since_s:
+                self.messages.append(HandedIn(node, ticket))
 
     def _wind(self, fault: Fault, _rng: random.Random) -> list[int]:
         drones = [node.drone for node in self._network.nodes.values()]

@@ -61,7 +61,7 @@ class _Ns2Node:
     def knots(self) -> Iterator[Knot]:
         x, y, z = (self.start.get(axis, 0.0) for axis in "XYZ")
         yield 0.0, x, y, z
-        orders = sorted(self.orders)
+        orders = sorted(self.orders, key=lambda order: order[0])
         ends_s = [at_s for at_s, *_rest in orders[1:]] + [math.inf]
         for (at_s, to_x, to_y, speed_m_s), replaced_s in zip(orders, ends_s):
             yield at_s, x, y, z

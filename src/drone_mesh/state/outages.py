@@ -60,10 +60,10 @@ def find_outages(events: Iterable[EventRecord]) -> list[Outage]:
         elif event.kind == _CONNECTED:
             if outage is not None:
                 done.append(replace(open_of.pop(node), connected_s=event.stamp_s))
+        elif event.kind == _LANDED and (outage is None or outage.decided_s is None):
+            _land_afterwards(done, event)
         elif outage is not None:
             open_of[node] = _with_phase(outage, event)
-        elif event.kind == _LANDED:
-            _land_afterwards(done, event)
     return sorted([*done, *open_of.values()], key=lambda outage: (outage.lost_s, outage.node))
 
 
@@ -79,7 +79,10 @@ def _new_outage(event: EventRecord, power_offs: Sequence[tuple[float, int]]) -> 
 
 
 def _land_afterwards(done: list[Outage], event: EventRecord) -> None:
-    """Record a landing after the outage: a drone may be connected before it notices its landing."""
+    """Record a landing after the outage: a drone may be connected before it notices its landing.
+
+    That may cut it off again, for a moment.
+    """
     for index in range(len(done) - 1, -1, -1):
         outage = done[index]
         if outage.node == event.node:
@@ -94,7 +97,7 @@ def _with_phase(outage: Outage, event: EventRecord) -> Outage:
     if event.kind == _FLIGHT_DECIDED:
         fallback = event.peers[0] if event.peers else None
         return replace(outage, decided_s=event.stamp_s, fallback=fallback, landed_s=None)
-    if event.kind == _LANDED and outage.decided_s is not None:
+    if event.kind == _LANDED:
         return replace(outage, landed_s=event.stamp_s)
     return outage
 

@@ -117,6 +117,18 @@ def test_a_default_that_is_written_out_is_the_same_run(tmp_path: Path) -> None:
         ("at_s: 2", "at: 2", 7, "unknown key base.faults.0.at; did you mean at_s?"),
         ("share: 0.1}", "share: 0.1, number: 3}", 8, "give exactly one of share, number"),
         ("share: 0.1}", "ids: [9]}", 8, "base.faults.0.kill: give exactly one"),
+        ("revive: {number: 1}", "revive: {ids: [9]}", 10, "no drone 9; the layout has 0..4"),
+        ("revive: {number: 1}", "gateway_off: {id: 1}", 10, "drone 1 is no gateway; use kill"),
+        ("revive: {number: 1}", "layouts: {cases: [77]}", 10, "unknown case 77"),
+        ("kind: grid, drones: 5", "kind: casus, case: 99", 4, "layout.case: unknown case 99"),
+        ("revive: {number: 1}", "cut_link: {between: [3, 3]}", 10, "a link is between two drones"),
+        ("revive: {number: 1}", "cut_link: {between: [1, 2], number: 2}", 10, "give either"),
+        (
+            "  faults:",
+            "  sequence: {}\n  radio: {kind: shared}\n  faults:",
+            3,
+            "for the disc radio",
+        ),
         (
             "kill: {share: 0.1}",
             "kil: {share: 0.1}",
@@ -161,6 +173,11 @@ def test_each_mistake_is_one_line_with_file_line_and_key(
         ("where: radio.los > 1", 14, "where: no axis radio.los"),
         ("where: __import__('os')", 14, "where: use axes, numbers"),
         ("where: radio.loss > 5", 14, "where excludes every cell"),
+        ("where: radio.loss > 'a'", 14, "where: '>' not supported between instances of"),
+        ("where: 1 / radio.loss > 2", 14, "where: division by zero, with {'faults.kill.share'"),
+        ("where: faults.0.kill.share > 0.2", 14, "as in faults.kill.share"),
+        ("metrics: ['own_metrics:healed']", 14, "metric own_metrics:healed: another one is also"),
+        ("metrics: ['own_metrics:f', 'more_metrics:f']", 14, "metric more_metrics:f: another"),
         ("compare: {over: radio.los, baseline: 0}", 14, "did you mean radio.loss?"),
         ("compare: {over: radio.loss, baseline: 7}", 14, "7 is not a value of radio.loss"),
         ("stop: {metric: healed, max_seeds: 9}", 14, "give either half_width or"),
@@ -172,6 +189,9 @@ def test_each_mistake_is_one_line_with_file_line_and_key(
 def test_what_belongs_to_the_whole_file_is_checked_as_well(
     tmp_path: Path, added: str, line: int, words: str
 ) -> None:
+    for name in ("own_metrics", "more_metrics"):
+        functions = "healed = f = lambda record: 1.0\n"
+        (tmp_path / f"{name}.py").write_text(functions, encoding="utf-8")
     path = write(tmp_path, f"{GOOD}{added}\n")
     with pytest.raises(ConfigurationError) as caught:
         load_experiment(path)

@@ -144,8 +144,23 @@ def test_plot_writes_a_figure_that_is_light_or_dark_as_its_viewer_prefers(
     assert "var(--ink)" in svg
     assert main(["plot", str(results_folder), "phase", str(out)]) == 1
     assert "no figure phase; there are " in capsys.readouterr().err
+    assert main(["plot", str(results_folder), "drones", str(out), "--metric", "heald"]) == 1
+    assert "runs.csv has no column heald" in capsys.readouterr().err
     assert main(["plot", str(results_folder), "phases", str(tmp_path / "no" / "x.svg")]) == 1
     assert "cannot write" in capsys.readouterr().err
+
+
+def test_a_cell_whose_value_is_a_list_can_be_named(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    speeds = "mobility.kind: [random_waypoint]\n  mobility.speed_m_s: [1.0, [0.5, 1.0]]"
+    text = HEALING.replace("layout.drones: [5, 6]", speeds)
+    (tmp_path / "speeds.yaml").write_text(text.replace("seeds: 4", "seeds: 2"))
+    out = tmp_path / "results"
+    assert main(["run", str(tmp_path / "speeds.yaml"), "--out", str(out), "--workers", "0"]) == 0
+    cells = [f"connection_lost_after_s={s},mobility.speed_m_s=[0.5,1.0]" for s in (30, 5)]
+    assert main(["compare", str(out), *(f"timing.{cell}" for cell in cells)]) == 0
+    assert "speed_m_s=[0.5,1.0]" in capsys.readouterr().out
 
 
 def test_tables_prints_the_tables_of_the_report_as_markdown(

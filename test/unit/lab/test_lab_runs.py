@@ -267,6 +267,46 @@ def test_orders_are_counted_with_those_that_arrived() -> None:
     assert measure_all(run(faults=[cut, *faults], layout=pair))["order_delivery"] == 0.0
 
 
+def test_each_departure_is_that_of_one_order() -> None:
+    away = {"between": [0, 1], "for_s": 2}
+    faults = [
+        {"at_s": 9, "cut_link": away},
+        {"at_s": 10, "order": {"id": 1, "to": [6, 0]}},  # lost
+        {"at_s": 15, "order": {"id": 1, "to": [6, 1]}},
+    ]
+    measured = measure_all(run(faults=faults, layout={"kind": "line", "drones": 2}, duration_s=40))
+    assert measured["orders"] == 2
+    assert measured["order_delivery"] == 0.5
+
+
+def test_all_messages_of_several_bursts_count() -> None:
+    bursts = [
+        {"at_s": at_s, "send": {"ids": [1], "number": 10, "size": 16, "reliable": False}}
+        for at_s in (20, 30)
+    ]
+    measured = measure_all(run(faults=bursts, layout={"kind": "line", "drones": 2}))
+    assert measured["data_delivered"] == 1.0
+    assert measured["taken_rate"] == measured["arrival_rate"] == pytest.approx(20 / 20)
+
+
+def test_messages_that_a_queue_has_no_room_for_were_not_offered() -> None:
+    burst = {"at_s": 20, "send": {"ids": [1], "number": 1000, "size": 16}}
+    record = run(faults=[burst], layout={"kind": "line", "drones": 2})
+    assert 0 < len(record.messages) < 1000
+
+
+def test_a_load_waits_for_routers_that_live() -> None:
+    faults = [{"at_s": 20, "load": {"per_s": 5}}, kill(25, share=1.0)]
+    record = run(faults=faults, layout={"kind": "line", "drones": 3})
+    assert 0 < len(record.messages) < 60
+
+
+def test_links_of_a_mesh_without_probes_are_watched_from_the_start() -> None:
+    moving = {"kind": "random_waypoint", "speed_m_s": 2.0}
+    measured = measure_all(run(mobility=moving, duration_s=15))
+    assert measured["link_changes"] > 0
+
+
 def test_wind_slows_the_flights_that_begin_in_it() -> None:
     order = {"at_s": 11, "order": {"id": 4, "to": [24, 6]}}
     calm = run(faults=[order])

@@ -97,6 +97,16 @@ def test_ns2_nodes_fly_to_their_destinations_until_a_new_one_comes(tmp_path):
     assert knots[1] == [(0.0, 0.0, 0.0, 0.0)]
 
 
+def test_of_two_ns2_destinations_at_one_time_the_later_line_counts(tmp_path):
+    knots = read(
+        tmp_path,
+        "$node_(0) set X_ 0.0\n"
+        '$ns_ at 2.0 "$node_(0) setdest 9.0 0.0 1.0"\n'
+        '$ns_ at 2.0 "$node_(0) setdest 3.0 0.0 1.0"\n',
+    )
+    assert knots[0][-1] == (5.0, 3.0, 0.0, 0.0)
+
+
 def test_csv_rows_may_come_in_any_order(tmp_path):
     knots = read(tmp_path, "t,id,x,y,z\n1.0,4,3,3,0\n0.0,4,1,2,0\n0.5,2,9,9,1\n")
     assert knots == {2: [(0.5, 9.0, 9.0, 1.0)], 4: [(0.0, 1.0, 2.0, 0.0), (1.0, 3.0, 3.0, 0.0)]}

@@ -43,6 +43,18 @@ def test_a_drone_may_be_connected_before_it_notices_that_it_has_landed():
     assert (repair.landed_s, repair.connected_s) == (154.0, 153.5)
 
 
+def test_a_drone_that_connects_in_flight_may_be_cut_off_for_a_moment_as_it_lands():
+    landing = story(
+        (152.0, 3, "connected", 0),
+        (153.0, 3, "disconnected", 0),
+        (153.0, 3, "landed"),
+        (153.1, 3, "connected", 0),
+    )
+    *_, repair, moment = find_outages([*REPAIR[:-2], *landing])
+    assert (repair.decided_s, repair.connected_s, repair.landed_s) == (150.0, 152.0, 153.0)
+    assert (moment.lost_s, moment.decided_s, moment.landed_s) == (153.0, None, None)
+
+
 def test_a_landing_long_after_the_repair_does_not_belong_to_it():
     *_, repair = find_outages([*REPAIR, *story((300.0, 3, "landed"))])
     assert repair.landed_s == 153.0

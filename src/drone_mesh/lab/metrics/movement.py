@@ -24,7 +24,7 @@ def _flown(run: RunRecord) -> dict[int, float]:
 @metrics(
     "m",
     better="less",
-    distance_total_m="distance over ground flown by all drones",
+    distance_total_m="distance over ground of all flights for repairs and orders, not of pilots",
     distance_max_m="the longest distance that one drone flew",
     distance_mean_m="mean distance of the drones that moved; 0 when none did",
 )
@@ -39,7 +39,7 @@ def moved(run: RunRecord) -> float:
     return len(_flown(run))
 
 
-@metric("", "take-offs", better="less")
+@metric("", "take-offs for repairs and orders, not with pilots", better="less")
 def flights(run: RunRecord) -> float:
     return sum(leg.is_start for leg in run.legs)
 

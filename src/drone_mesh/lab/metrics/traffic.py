@@ -157,21 +157,26 @@ def jain_index(values: Sequence[float]) -> float:
 
 
 def _order_delays(run: RunRecord) -> list[float | None]:
-    departures: dict[int, list[float]] = {}
+    """From each order to the departure that it caused, if there was one in time.
+
+    A drone can have several orders under way: each departure belongs to the first that can have
+    caused it.
+    """
+    departures: dict[int, list[float]] = defaultdict(list)
     for event in run.events:
         if event.kind == MeshEventKind.FLIGHT_ORDERED.value:
-            departures.setdefault(event.node, []).append(event.stamp_s)
-    return [
-        next(
-            (
-                stamp_s - order.at_s
-                for stamp_s in departures.get(order.node, ())
-                if 0.0 <= stamp_s - order.at_s <= DELIVERED_WITHIN_S
-            ),
-            None,
-        )
-        for order in run.orders
-    ]
+            departures[event.node].append(event.stamp_s)
+    delays: list[float | None] = []
+    for order in run.orders:
+        left = departures[order.node]
+        in_time = (s for s in left if 0.0 <= s - order.at_s <= DELIVERED_WITHIN_S)
+        stamp_s = next(in_time, None) if order.taken else None
+        if stamp_s is None:
+            delays.append(None)
+        else:
+            left.remove(stamp_s)
+            delays.append(stamp_s - order.at_s)
+    return delays
 
 
 def _note_traffic() -> None:

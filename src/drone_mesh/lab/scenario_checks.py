@@ -1,0 +1,101 @@
+"""Refuses scenarios in which something would never happen, or that would end each run."""
+
+from __future__ import annotations
+
+from typing import Iterable
+
+from drone_mesh.lab import places
+from drone_mesh.lab.experiment_source import Source
+from drone_mesh.lab.faults import Fault
+from drone_mesh.lab.scenario import Layout, Scenario
+from drone_mesh.layouts import Layouts, UnknownCase
+from drone_mesh.yaml_file import KeyPath
+
+
+def check_scenario(scenario: Scenario, source: Source) -> None:
+    """Raise ConfigurationError that points into the file."""
+    _check_cases(scenario, source)
+    _check_ids(scenario, source)
+    _check_begins(scenario, source)
+
+
+def _check_cases(scenario: Scenario, source: Source) -> None:
+    cases: list[tuple[KeyPath, int]] = []
+    if scenario.layout.kind == "casus":
+        cases.append((("layout", "case"), scenario.layout.case))
+    for index, fault in enumerate(scenario.faults):
+        if fault.layouts is not None:
+            listed: KeyPath = ("faults", index, "layouts", "cases")
+            cases += [(listed, case) for case in fault.layouts.cases]
+    shipped = Layouts.shipped()
+    for place, case in cases:
+        try:
+            shipped.orders(case)
+        except UnknownCase as error:
+            raise source.error(("base", *place), f"{_dotted(place)}: {error}") from None
+
+
+def _check_ids(scenario: Scenario, source: Source) -> None:
+    ids, gateways = _ids_of(scenario.layout)
+    layout_has = f"the layout has {_in_words(ids)}"
+    for node in sorted({int(node) for node, *_knot in scenario.mobility.knots or ()} - ids):
+        raise source.error(
+            ("base", "mobility", "path"),
+            f"mobility.path: the trace names drone {node}; {layout_has}",
+        )
+    for index, fault in enumerate(scenario.faults):
+        place = ("faults", index, fault.action)
+        for node in sorted(_ids_named_by(fault) - ids):
+            raise source.error(("base", *place), f"{_dotted(place)}: no drone {node}; {layout_has}")
+        if fault.gateway_off is not None and fault.gateway_off.id not in (gateways or ids):
+            raise source.error(
+                ("base", *place),
+                f"{_dotted(place)}: drone {fault.gateway_off.id} is no gateway; use kill",
+            )
+
+
+def _ids_of(layout: Layout) -> tuple[set[int], set[int]]:
+    """The drones of a layout, and those that are gateways; none: the seed decides."""
+    if layout.kind == "casus":
+        points = places.casus(layout)
+    elif layout.kind == "file":
+        points = places.of_file(layout)
+    else:
+        gateways = range(layout.gateways) if layout.ids == "in_order" else ()
+        return set(range(layout.drones)), set(gateways)
+    return {p.node_id for p in points}, {p.node_id for p in points if p.gateway}
+
+
+def _ids_named_by(fault: Fault) -> set[int]:
+    one: int | None = getattr(fault.what, "id", None)
+    several = (getattr(fault.what, key, None) or () for key in ("ids", "between"))
+    return {node for some in several for node in some} | (set() if one is None else {one})
+
+
+def _in_words(ids: Iterable[int]) -> str:
+    least, most = min(ids), max(ids)
+    return f"{least}..{most}" if len(set(ids)) == most - least + 1 else f"{sorted(ids)}"
+
+
+def _dotted(place: KeyPath) -> str:
+    return ".".join(map(str, place))
+
+
+def _check_begins(scenario: Scenario, source: Source) -> None:
+    """Refuse what begins after the end of the run: nothing would show that it never happened."""
+    if scenario.sequence is not None:  # it has faults and an end of its own
+        return
+    begins: list[tuple[KeyPath, float | None]] = [
+        (("faults", index, fault.action), fault.at_s) for index, fault in enumerate(scenario.faults)
+    ]
+    if scenario.probes.per_s:
+        begins.append((("probes", "from_s"), scenario.probes.from_s + scenario.probes.within_s))
+    if scenario.mobility.knots:
+        begins.append((("mobility", "path"), min(t for _id, t, *_place in scenario.mobility.knots)))
+    for place, begin_s in begins:
+        if begin_s is not None and begin_s >= scenario.duration_s:
+            raise source.error(
+                ("base", *place),
+                f"{_dotted(place)}: begins at {begin_s:g} s, after the end of the run "
+                f"(duration_s {scenario.duration_s:g})",
+            )
