@@ -16,6 +16,8 @@ def read_secret_file(path: Path) -> str:
     """The text of a file that only its owner can access. Raises ConfigurationError.
 
     The owner is the user who runs this program, or root. Devices and pipes are refused unread.
+    A credential of systemd (systemd.exec(5)) belongs to root, and an access list lets this user
+    read it; that shows as a permission of the group.
     """
     try:
         # A pipe without a writer would otherwise block the program here.
@@ -50,7 +52,14 @@ def _check(path: Path, status: os.stat_result) -> None:
             f"run: chown {os.geteuid()} {path}"
         )
     mode = stat.S_IMODE(status.st_mode)
-    if mode & _FOR_OTHERS:
+    if mode & (_FOR_OTHERS & ~stat.S_IRGRP if _is_credential(path, status) else _FOR_OTHERS):
         raise ConfigurationError(
             f"{path}: other users can access it (mode {mode:04o}); run: chmod 600 {path}"
         )
+
+
+def _is_credential(path: Path, status: os.stat_result) -> bool:
+    folder = os.environ.get("CREDENTIALS_DIRECTORY")
+    if not folder or status.st_uid != _ROOT:
+        return False
+    return path.resolve().parent == Path(folder).resolve()

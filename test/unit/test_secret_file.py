@@ -50,3 +50,19 @@ def test_an_empty_file_has_no_secret(file):
     file.write_text(" \n")
     with pytest.raises(ConfigurationError, match="the file contains no token"):
         read_secret(file, "token")
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can own the file")
+def test_a_credential_of_systemd_may_be_read_by_an_access_list(file, monkeypatch):
+    file.chmod(0o440)
+    with pytest.raises(ConfigurationError, match="other users can access it"):
+        read_secret(file, "token")
+    monkeypatch.setenv("CREDENTIALS_DIRECTORY", str(file.parent))
+    assert read_secret(file, "token") == "0123456789abcdef"
+    file.chmod(0o460)
+    with pytest.raises(ConfigurationError, match="other users can access it"):
+        read_secret(file, "token")
+    file.chmod(0o440)
+    monkeypatch.setenv("CREDENTIALS_DIRECTORY", str(file.parent / "credentials"))
+    with pytest.raises(ConfigurationError, match="other users can access it"):
+        read_secret(file, "token")

@@ -1,4 +1,7 @@
-"""raspberry_router ... check-drone: the autopilot's parameters as docs/flying.md wants them."""
+"""raspberry_router ... check-drone: the autopilot's parameters as docs/flying.md wants them.
+
+Also what the autopilot's home says about --origin.
+"""
 
 from __future__ import annotations
 
@@ -18,6 +21,7 @@ def check_drone(options: Options) -> int:
     if not options.flight.drone.startswith(MAVLINK):
         raise ConfigurationError("check-drone needs --drone mavlink:ADDRESS")
     from drone_mesh.drone.mavlink.commander import Commander
+    from drone_mesh.drone.mavlink.flight_area import FlightArea
     from drone_mesh.drone.mavlink.link import MavlinkLink
     from drone_mesh.drone.mavlink.parameter_check import ParameterCheck
     from drone_mesh.drone.mavlink.telemetry import Telemetry
@@ -57,4 +61,8 @@ def check_drone(options: Options) -> int:
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     for row in rows:
         print("  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip())
+    origin = options.flight.origin
+    doubts = FlightArea(telemetry, origin, options.flight.limits).doubts() if origin else ""
+    if doubts:
+        print(doubts)
     return 0 if all(finding.is_safe for finding in parameters.findings) else 1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import math
 import platform
 import random
 import sys
@@ -11,7 +12,7 @@ import time
 from pathlib import Path
 from typing import Callable, Iterator, Sequence
 
-from drone_mesh.arguments import decimal, whole
+from drone_mesh.arguments import MOST, decimal, whole
 from drone_mesh.channel.runtime import Runtime, SystemRuntime
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.drone.location import Location
@@ -208,7 +209,7 @@ def _parser() -> argparse.ArgumentParser:
     add_channel_options(parser)
     parser.add_argument(
         "--emulated",
-        type=decimal(0, FARTHEST_M),
+        type=decimal(0.1, FARTHEST_M),
         default=0.0,
         metavar="METRES",
         help=f"without hardware: use an emulated radio, with node {PARTNER_ID} at this distance",
@@ -257,8 +258,8 @@ def _parser() -> argparse.ArgumentParser:
     ear = add_tool("listen", "print packets to all nodes and to --id, decoded")
     ear.add_argument(
         "--seconds",
-        type=float,
-        default=float("inf"),
+        type=decimal(0.1, MOST),
+        default=math.inf,
         help="time to listen (default: until Ctrl-C)",
     )
     ear.add_argument(

@@ -214,6 +214,17 @@ def test_handing_the_drone_back_does_not_resume_the_flight(autopilot: Autopilot)
     assert rig.status().why_not_fly == ""
 
 
+def test_the_target_of_a_ground_station_is_not_overruled_while_the_drone_holds() -> None:
+    rig = _on_its_way(ARDUPILOT)
+    rig.reach(Phase.HOLDING)
+    rig.run(5.0)
+    rig.down.sent.clear()
+    rig.run(20.0)
+    assert rig.targets() == []
+    rig.goal(0.0, 0.0, 8.0)
+    rig.reach(Phase.FLYING, within_s=1.0)
+
+
 def test_an_autopilot_that_refuses_to_arm_ends_the_flight() -> None:
     rig = Rig()
     rig.vehicle.faults.refuses_to_arm = True
@@ -252,6 +263,21 @@ def test_a_home_far_from_the_origin_is_refused() -> None:
     rig.vehicle.home = type(rig.vehicle.home)(51.9, 4.5, 0.0)  # Rotterdam, not Utrecht
     rig.ready()
     assert rig.status().why_not_fly == "its home is more than 5 km from --origin"
+
+
+@pytest.mark.parametrize(
+    ("altitude_m", "words"),
+    [(49.0, "46 m above --origin"), (-43.0, "46 m below --origin"), (11.0, "")],
+)
+def test_a_home_at_another_height_than_the_origin_is_doubted_once(
+    altitude_m: float, words: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    rig = Rig()  # its origin is at 3 m
+    rig.vehicle.home = type(rig.vehicle.home)(52.0907, 5.1214, altitude_m)
+    rig.ready().run(10.0)
+    doubts = [r.message for r in caplog.records if "--origin" in r.message]
+    assert len(doubts) == (1 if words else 0)
+    assert all(words in message for message in doubts)
 
 
 def test_a_plane_or_a_ground_station_is_not_taken_for_a_drone() -> None:

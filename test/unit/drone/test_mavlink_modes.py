@@ -6,6 +6,7 @@ by choosing GUIDED or OFFBOARD. A repair never takes it; an order only with --or
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from typing import Callable
 
@@ -188,6 +189,12 @@ def test_a_plane_is_flown_in_no_mode_at_all(kind: int, mode: int) -> None:
     assert {m.get_type() for m in rig.down.sent} == {"HEARTBEAT"}
 
 
+def _kill(rig: Rig) -> None:
+    """The pilot's kill switch: it falls."""
+    rig.vehicle.body.armed = False
+    rig.vehicle.body.place = rig.place._replace(height=0.0)
+
+
 # The ways in ---------------------------------------------------------------------------------
 
 
@@ -307,6 +314,78 @@ def test_a_failsafe_during_an_ordered_landing_makes_it_the_autopilot_s_landing(
     rig.run_until("it has landed", lambda: not rig.vehicle.body.armed)
     rig.run(2.0)
     assert "flown by its pilot" in rig.status().why_not_repair
+
+
+def _holds(autopilot: Autopilot) -> Rig:
+    rig = in_flight(autopilot)
+    rig.reach(Phase.HOLDING)
+    return rig
+
+
+def _takes_off(autopilot: Autopilot) -> Rig:
+    rig = Rig(autopilot)
+    rig.vehicle.faults.spool_up_s = 5.0
+    rig.ready()
+    rig.goal(50.0, 0.0, 8.0)
+    rig.run_until("it is armed", lambda: rig.status().armed, within_s=20.0)
+    return rig
+
+
+@BOTH
+@pytest.mark.parametrize("prepared", [in_flight, _holds, _takes_off])
+def test_a_drone_that_its_pilot_disarmed_stays_down_until_he_gives_it_back(
+    autopilot: Autopilot, prepared: Callable[[Autopilot], Rig]
+) -> None:
+    rig = prepared(autopilot)
+    rig.down.sent.clear()
+    _kill(rig)
+    rig.run(2.0)
+    rig.down.sent.clear()
+    for _ in range(4):
+        rig.run(10.0)
+        for why in (rig.status().why_not_fly, rig.status().why_not_repair):
+            assert re.fullmatch("disarmed: its pilot has to arm, or choose .* again", why)
+        assert refuses(rig, rig.repair)
+        assert refuses(rig, rig.goal)
+    assert rig.commands() == []
+    assert rig.targets() == []
+    rig.vehicle.choose_mode(Mode.HOLD)
+    rig.run(2.0)
+    assert refuses(rig, rig.goal)
+    assert rig.place.height == 0.0
+    rig.vehicle.arm()
+    rig.vehicle.choose_mode(Mode.PILOT)
+    lift(rig.vehicle, 8.0)
+    rig.run(3.0)  # PX4 accepts OFFBOARD only while targets arrive
+    rig.vehicle.choose_mode(Mode.FOLLOW)
+    rig.run_until("it can fly", lambda: not rig.status().why_not_repair, within_s=3.0)
+
+
+def test_a_disarmed_drone_is_given_back_by_choosing_guided_again() -> None:
+    rig = in_flight(ARDUPILOT)
+    _kill(rig)
+    rig.run(2.0)
+    rig.vehicle.choose_mode(Mode.PILOT)
+    rig.run(2.0)
+    assert refuses(rig, rig.goal)
+    rig.vehicle.choose_mode(Mode.FOLLOW)
+    rig.run(2.0)
+    rig.goal(50.0, 0.0, 8.0)
+    rig.reach(Phase.HOLDING)
+
+
+@BOTH
+def test_a_drone_that_its_pilot_disarmed_in_the_air_during_an_ordered_landing_stays_down(
+    autopilot: Autopilot,
+) -> None:
+    rig = in_flight(autopilot)
+    rig.goal(30.0, 0.0, 0.0, lands=True)
+    rig.reach(Phase.LANDING)
+    rig.run_until("it sinks", lambda: rig.place.height < 7.0)
+    _kill(rig)
+    rig.run(5.0)
+    assert rig.status().why_not_repair.startswith("disarmed: its pilot has to arm")
+    assert refuses(rig, rig.goal)
 
 
 @BOTH

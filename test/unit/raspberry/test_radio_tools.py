@@ -240,9 +240,9 @@ def test_it_releases_spi_and_both_pins_when_it_ends(rig, monkeypatch, capsys):
     assert sorted(closed) == ["ce", "irq", "spi"]
 
 
-@pytest.mark.parametrize("metres", ["nan", "-5", "1e9"])
+@pytest.mark.parametrize("metres", ["nan", "-5", "0", "1e9"])
 def test_a_distance_that_is_none_is_refused(capsys, metres):
     with pytest.raises(SystemExit) as ended:
         main([f"--emulated={metres}", "scan"])
     assert ended.value.code == 2
-    assert "must be a number 0..100000" in capsys.readouterr().err
+    assert "must be a number 0.1..100000" in capsys.readouterr().err

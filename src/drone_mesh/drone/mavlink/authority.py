@@ -2,12 +2,14 @@
 
 The human pilot always has priority. This program flies only while the autopilot is in the mode
 meant for it. It leaves a mode that somebody else chose only for an order, and only if the operator
-permits that; a repair never does.
+permits that; a repair never does. A drone that somebody else disarmed stays down until its pilot
+gives it back.
 """
 
 from __future__ import annotations
 
 from drone_mesh.drone.mavlink.autopilots import Autopilot
+from drone_mesh.drone.mavlink.disarming import Disarming
 from drone_mesh.drone.mavlink.flight_area import FlightArea
 from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions
 from drone_mesh.drone.mavlink.mode_choice import Chooser, ModeChoice
@@ -16,7 +18,7 @@ from drone_mesh.drone.mavlink.telemetry import Telemetry
 
 
 class Authority:
-    """Decides from the telemetry; changes nothing."""
+    """Decides from the telemetry; sends nothing."""
 
     def __init__(
         self,
@@ -26,10 +28,19 @@ class Authority:
         permissions: Permissions,
     ) -> None:
         self.choice = ModeChoice(telemetry)
+        self._disarming = Disarming(telemetry)
         self._telemetry = telemetry
         self._area = area
         self._limits = limits
         self._permissions = permissions
+
+    def on_heartbeat(self, now_s: float, phase: Phase) -> None:
+        """The telemetry has a new heartbeat."""
+        self.choice.on_heartbeat(now_s)
+        autopilot = self._telemetry.autopilot
+        assert autopilot is not None  # otherwise the heartbeat is not the drone's
+        lands = phase is Phase.LANDING or self._was_ordered_to_land(autopilot)
+        self._disarming.on_heartbeat(now_s, lands)
 
     def trouble(self, now_s: float) -> str:
         """Why no flight is possible now, under any control; empty if one is."""
@@ -76,6 +87,9 @@ class Authority:
         mode = self._why_not_leave(now_s, autopilot, bool(on_ground), for_repair)
         if mode:
             return mode
+        if self._disarming.by_others:
+            own = autopilot.mode_name(autopilot.own_mode)
+            return f"disarmed: its pilot has to arm, or choose {own} again"
         if not telemetry.armed and not may.may_arm:
             return "not armed: the pilot has to arm, or --may-arm"
         if on_ground and not may.may_take_off:
@@ -90,8 +104,7 @@ class Authority:
         if mode == autopilot.own_mode:
             return ""
         name, own = autopilot.mode_name(mode), autopilot.mode_name(autopilot.own_mode)
-        landed = mode == autopilot.land_mode and choice.by is Chooser.ENGINE and on_ground
-        if not landed:
+        if not (on_ground and self._was_ordered_to_land(autopilot)):
             pause_s = None if for_repair else may.orders_may_take_back_s
             is_taken = choice.by is Chooser.OTHERS and pause_s is None
             if mode != autopilot.hold_mode or is_taken:
@@ -111,10 +124,10 @@ class Authority:
         autopilot = telemetry.autopilot
         if trouble or autopilot is None:
             return trouble
+        if self._disarming.by_others and phase is not Phase.LANDING:
+            return "disarmed"
         mode = telemetry.mode
         if mode == autopilot.own_mode:
-            if phase in (Phase.TAKING_OFF, Phase.FLYING) and not telemetry.armed:
-                return "disarmed"
             return ""
         if phase is Phase.CHANGING_MODE and not self.choice.was_made_after(since_s):
             on_ground = bool(telemetry.on_ground(now_s))
@@ -123,3 +136,6 @@ class Authority:
         if phase is Phase.LANDING and mode == autopilot.land_mode:
             return ""
         return f"{autopilot.mode_name(mode)} was chosen: the pilot flies"
+
+    def _was_ordered_to_land(self, autopilot: Autopilot) -> bool:
+        return self._telemetry.mode == autopilot.land_mode and self.choice.by is Chooser.ENGINE

@@ -10,6 +10,8 @@ from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.limits import FlightLimits
 from drone_mesh.drone.mavlink.telemetry import Telemetry
 
+HOME_OFF_M = 10.0  # our choice: more than a GPS is wrong by, on a field without hills
+
 
 class FlightArea:
     """Reads the telemetry; changes nothing."""
@@ -34,6 +36,17 @@ class FlightArea:
         location = self._origin.to_frame(place)
         reach_m = max(abs(location.latitude), abs(location.longitude))
         return reach_m <= MAX_COORDINATE_M and abs(location.height) <= MAX_HEIGHT_M
+
+    def doubts(self) -> str:
+        """Why --origin may have a wrong altitude; empty: nothing says so."""
+        home = self.home()
+        if home is None or abs(home.height) <= HOME_OFF_M:
+            return ""
+        where = "above" if home.height > 0.0 else "below"
+        return (
+            f"its home is {abs(home.height):.0f} m {where} --origin: unless the ground is, correct "
+            "the altitude of --origin, in metres above sea level"
+        )
 
     def within(self, place: Location) -> Location:
         """The nearest position within the limits; no target is outside, wherever the drone is."""

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import errno
 import select
 import socket
 from typing import Protocol
 
 import serial
 
+from drone_mesh.arguments import is_up_to
 from drone_mesh.errors import ConfigurationError
 
 DEFAULT_BAUD = 57600  # of telemetry ports, of both autopilots
 MOST_BYTES = 4096  # of one reading
+HIGHEST_BAUD = 4_000_000  # of termios
+SENT_WITHIN_S = 0.5  # our choice: a telemetry port sends a message within 50 ms
 CONNECTED_WITHIN_S = 5.0  # our choice; also the time for sending
 
 
@@ -32,11 +36,18 @@ class Line(Protocol):
 
 
 class SerialLine:
-    """A serial port."""
+    """A serial port, which no other program may use: each would read a part of what arrives."""
 
     def __init__(self, device: str, baud: int) -> None:
         """Raises OSError."""
-        self._port = serial.serial_for_url(device, baudrate=baud)
+        try:
+            self._port = serial.Serial(
+                device, baudrate=baud, exclusive=True, write_timeout=SENT_WITHIN_S
+            )
+        except serial.SerialException as error:
+            if error.errno == errno.EAGAIN:
+                raise OSError("another program uses the port; is a node running?") from error
+            raise
 
     def receive(self, timeout_s: float) -> bytes:
         self._port.timeout = timeout_s
@@ -133,13 +144,13 @@ def parse_address(text: str) -> tuple[str, str, int]:
     kind, _, rest = text.partition(":")
     if kind in ("udpin", "udpout", "tcp"):
         host, _, port = rest.rpartition(":")
-        if host and port.isdecimal() and 1 <= int(port) <= 65535:
+        if host and is_up_to(port, 65535) and int(port) > 0:
             return kind, host, int(port)
     elif text.startswith("/"):
         device, comma, baud = text.partition(",")
         if not comma:
             return "serial", device, DEFAULT_BAUD
-        if baud.isdecimal() and int(baud) > 0:
+        if is_up_to(baud, HIGHEST_BAUD) and int(baud) > 0:
             return "serial", device, int(baud)
     raise ConfigurationError(
         f"invalid MAVLink address {text!r}: use /dev/NAME,BAUD or udpin:HOST:PORT, "

@@ -26,6 +26,7 @@ from drone_mesh.errors import GoalRefused
 
 TARGET_PERIOD_S = 0.2  # 5 Hz: PX4 needs at least 2 Hz
 TARGETS_BEFORE_MODE_S = 1.0  # PX4 needs targets for a second before it enters OFFBOARD
+HOLD_TARGETS_S = 3.0  # our choice: 15 targets at the end of a flight, of which a line may lose some
 TAKE_OFF_M = 3.0  # our choice: above home, before the route begins
 TAKEN_OFF_WITHIN_M = 1.0  # our choice
 TAKE_OFF_WITHIN_S = 40.0  # our choice: the motors spool up first, and a climb may be slow
@@ -68,6 +69,7 @@ class MavlinkPilot:
         self._moved: tuple[Location, float] | None = None  # where it last moved, and when
         self._target_due_s = -math.inf
         self._last_tick_s = -math.inf
+        self._doubted = False  # a warning about --origin was logged
         self._slept_s = -math.inf  # no heartbeat was heard since the caller awoke then
 
     def on_message(self, message: Message, now_s: float) -> None:
@@ -75,7 +77,7 @@ class MavlinkPilot:
         if not self._telemetry.on_message(message, now_s):
             return
         if message.get_type() == "HEARTBEAT":
-            self._authority.choice.on_heartbeat(now_s)
+            self._authority.on_heartbeat(now_s, self._phase)
         elif message.get_type() == "COMMAND_ACK":
             self._commander.on_ack(message, now_s)
             self._on_ack(message)
@@ -83,6 +85,8 @@ class MavlinkPilot:
             self._commander.on_text(message)
         elif message.get_type() == "PARAM_VALUE":
             self._parameters.on_value(message)
+        elif message.get_type() == "HOME_POSITION":
+            self._doubt_origin()
 
     def set_goal(self, goal: Location, lands: bool, now_s: float, for_repair: bool = False) -> None:
         """Fly there. Raises GoalRefused for a position outside the limits, or if it cannot fly.
@@ -160,6 +164,13 @@ class MavlinkPilot:
             goal=self._goal,
         )
 
+    def _doubt_origin(self) -> None:
+        """Log once what the autopilot's home says about --origin."""
+        doubts = self._area.doubts()
+        if doubts and not self._doubted:
+            self._doubted = True
+            _log.warning("node %d: %s", self._node_id, doubts)
+
     def _let_go(self, reason: str, now_s: float) -> None:
         """End the flight. The drone holds its position, or does what its autopilot chose."""
         telemetry = self._telemetry
@@ -200,7 +211,7 @@ class MavlinkPilot:
         elif self._phase is Phase.FLYING:
             self._fly_on(passed_s, now_s)
         elif self._phase is Phase.HOLDING:
-            self._send_target(self._hold, now_s)
+            self._hold_on(now_s)
         elif self._phase is Phase.LANDING:
             self._land(now_s)
 
@@ -305,6 +316,14 @@ class MavlinkPilot:
             self._hold = route.end
             self._enter(Phase.HOLDING, now_s)
             _log.info("node %d: the drone has arrived and hovers", self._node_id)
+
+    def _hold_on(self, now_s: float) -> None:
+        """PX4 needs targets to stay in OFFBOARD; in GUIDED its pilot may send one of his own."""
+        autopilot = self._telemetry.autopilot
+        assert autopilot is not None  # otherwise it has let go
+        is_new = now_s - self._phase_since_s < HOLD_TARGETS_S
+        if is_new or autopilot.wants_targets_beforehand:
+            self._send_target(self._hold, now_s)
 
     def _watch_progress(self, here: Location, now_s: float) -> None:
         """An autopilot drops targets beyond its fence without a word, and one may have crashed."""
