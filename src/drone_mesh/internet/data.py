@@ -13,6 +13,7 @@ from fastapi import APIRouter, Path, Query, Request, Response
 from fastapi.responses import StreamingResponse
 from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
 from typing_extensions import Annotated
 
 from drone_mesh.communication.data.packets import MAX_DATA_PORT
@@ -78,6 +79,8 @@ def data_requests(users: UsersDesk) -> APIRouter:
             raise HTTPException(503, str(error)) from error
         except MessageRefused as error:
             raise HTTPException(422, str(error)) from error
+        except ClientDisconnect as error:
+            raise HTTPException(400, "the body is not complete") from error
         if ticket.state is TicketState.GIVEN_UP:
             raise HTTPException(503, str(ticket))
         if wait > 0 and not ticket.final:
@@ -118,16 +121,22 @@ async def _over(sending: Sending, wait_s: float) -> None:
 
 async def _events(users: UsersDesk, port: Optional[int]) -> AsyncIterator[str]:
     loop = asyncio.get_running_loop()
-    messages: asyncio.Queue[ReceivedMessage] = asyncio.Queue()
+    messages: asyncio.Queue[ReceivedMessage] = asyncio.Queue(MOST_UNREAD)
+
+    def put(message: ReceivedMessage) -> None:
+        if messages.full():
+            end()  # the client has stopped reading: while it does, nothing else runs here
+        else:
+            messages.put_nowait(message)
 
     def receive(message: ReceivedMessage) -> None:
         if port in (None, message.port):
-            loop.call_soon_threadsafe(messages.put_nowait, message)
+            loop.call_soon_threadsafe(put, message)
 
     end = users.subscribe(receive)
     try:
         yield ": messages of users\n\n"
-        while messages.qsize() < MOST_UNREAD:
+        while not messages.full():
             try:
                 message = await asyncio.wait_for(messages.get(), SIGN_OF_LIFE_S)
             except asyncio.TimeoutError:

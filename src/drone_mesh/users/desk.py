@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import threading
+import time
 from collections import deque
 from concurrent import futures
 from typing import Callable
@@ -11,11 +12,12 @@ from typing import Callable
 from drone_mesh.communication.data.echo import EchoAnswer
 from drone_mesh.communication.data.ticket import Ticket, TicketState
 from drone_mesh.communication.data.transport import ReceivedMessage, Receiver, Transport
-from drone_mesh.errors import MessageRefused
+from drone_mesh.errors import MessageRefused, QueueFull
 from drone_mesh.execution import Submit
 
 HANDOVER_S = 5.0  # our choice: a node accepts a message within this time
 LONGEST_WAIT_S = 300.0  # our choice: a reliable message is given up before
+STEP_S = 0.1  # our choice: how soon a wait notices that it has to end
 MOST_UNREAD = 256  # messages that may wait for a slow listener; the oldest is dropped
 
 
@@ -43,13 +45,16 @@ class Sending:
     def ticket(self, within_s: float | None = None) -> Ticket:
         """The ticket; raises MessageRefused with the reason if there is none.
 
-        Blocks for up to `within_s` (HANDOVER_S).
+        Blocks for up to `within_s` (HANDOVER_S); raises QueueFull if the node has not taken the
+        message by then, and never will.
         """
         try:
             return self.taken.result(HANDOVER_S if within_s is None else within_s)
         except futures.TimeoutError:
-            reason = "the node is too busy to take a message, or it has stopped"
-            raise MessageRefused(reason) from None
+            if not self.taken.cancel():
+                return self.taken.result(HANDOVER_S)  # it is being taken just now
+            reason = "the node is too busy to take a message, or it has stopped; it was not sent"
+            raise QueueFull(reason) from None
 
     def wait(self, seconds: float) -> bool:
         """Whether the message was delivered (without acknowledgement: sent) within `seconds`."""
@@ -68,6 +73,8 @@ class Sending:
     def hand_in(self, transport: Transport, now_s: float) -> None:
         """Pass the message to the node's transport; called on the node's thread."""
         to, payload, port, reliable = self._arguments
+        if not self.taken.set_running_or_notify_cancel():
+            return
         try:
             ticket = transport.send(to, payload, now_s, port=port, reliable=reliable)
         except MessageRefused as error:
@@ -153,12 +160,15 @@ class UsersDesk:
         listener.close = self.subscribe(listener.put)
         return listener
 
-    def echo(self, to: int, timeout_s: float) -> EchoAnswer | None:
-        """Request an echo and wait for it; None: no answer.
+    def echo(
+        self, to: int, timeout_s: float, stopping: Callable[[], bool] = lambda: False
+    ) -> EchoAnswer | None:
+        """Request an echo and wait for it, or for `stopping`; None: no answer.
 
         Raises MessageRefused if there is no route to it, or if a key is the likely reason that no
         answer came.
         """
+        check_wait(timeout_s)
         transport = self._require()
         answer: futures.Future[EchoAnswer] = futures.Future()
         hint = ""
@@ -173,12 +183,17 @@ class UsersDesk:
                 answer.set_exception(error)
 
         self._submit(ask)
-        try:
-            return answer.result(timeout_s)
-        except futures.TimeoutError:
-            if hint:
-                raise MessageRefused(f"no answer within {timeout_s:g} s{hint}") from None
-            return None
+        until_s = time.monotonic() + timeout_s
+        while not (answer.done() or stopping()):
+            left_s = until_s - time.monotonic()
+            if left_s <= 0.0:
+                break
+            futures.wait([answer], min(left_s, STEP_S))
+        if answer.done():
+            return answer.result()
+        if hint:
+            raise MessageRefused(f"no answer within {timeout_s:g} s{hint}")
+        return None
 
     def _require(self) -> Transport:
         if self._transport is None:

@@ -135,7 +135,8 @@ class _Client(socketserver.StreamRequestHandler):
             arrived = self._wait(sending.wait, wait_s)
             self._say({"arrived": arrived, "ticket": sending.in_words(wait_s)})
         elif what == "echo":
-            answer = desk.echo(int(request["to"]), float(request.get("wait", 5.0)))
+            wait_s = float(request.get("wait", 5.0))
+            answer = desk.echo(int(request["to"]), wait_s, lambda: self.server.stopping)
             if answer is None:
                 self._say({"answered": False})
             else:
@@ -163,15 +164,22 @@ class _Client(socketserver.StreamRequestHandler):
         return False
 
     def _listen(self, port: int | None) -> None:
+        node = self.server.desk.node_id
         listener = self.server.desk.listen(port)
+        warned = False
         try:
-            self._say({"listening": self.server.desk.node_id})
+            self._say({"listening": node})
             while not (self.server.stopping or self._is_gone()):
                 message = listener.next(_POLL_S)
                 if message is not None:
                     self._say(in_json(message))
+                if listener.dropped and not warned:
+                    warned = True
+                    _log.warning("node %d: a listener reads too slowly and loses messages", node)
         finally:
             listener.close()
+            if warned:
+                _log.warning("node %d: that listener lost %d messages", node, listener.dropped)
 
     def _is_gone(self) -> bool:
         """Whether the client has closed the connection."""

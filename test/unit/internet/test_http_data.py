@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
 import base64
 import json
 
 import pytest
 from conftest import TOKEN, MeshWithHttp
 
+from drone_mesh.communication.data.transport import ReceivedMessage
 from drone_mesh.internet import data
 from drone_mesh.users import desk
 from drone_mesh.users.desk import UsersDesk
@@ -76,10 +78,34 @@ def test_what_cannot_be_sent_is_refused_with_the_reason(users_mesh, path, payloa
 def test_a_node_that_takes_no_message_in_time_does_not_stop_the_server(users_mesh, monkeypatch):
     monkeypatch.setattr(data, "HANDOVER_S", 0.1)
     monkeypatch.setattr(desk, "HANDOVER_S", 3600.0)  # what a wait in the event loop would take
-    monkeypatch.setattr(users_mesh.desk, "_submit", lambda _work: None)
+    late = []
+    submit, received = users_mesh.desk._submit, users_mesh.network.received[3]
+    received.clear()
+    monkeypatch.setattr(users_mesh.desk, "_submit", late.append)
     answer = users_mesh.client.post("/nodes/3/data", content=b"lost", timeout=30.0)
-    assert answer.status_code == 422
+    assert answer.status_code == 503
     assert "the node is too busy to take a message" in answer.text
+    monkeypatch.undo()
+    submit(late[0])  # the node has time again
+    users_mesh.client.post("/nodes/3/data?wait=30", content=b"next").raise_for_status()
+    assert [message.payload for message in received] == [b"next"]
+
+
+def test_a_client_that_stops_reading_is_no_longer_listened_for():
+    mesh_desk = desk.UsersDesk(0, lambda work: work(0.0))
+
+    async def read_one_then_stop() -> int:
+        events = data._events(mesh_desk, None)
+        await events.__anext__()
+        for number in range(3 * data.MOST_UNREAD):
+            message = ReceivedMessage(2, 0, bytes((number & 0xFF,)), False, True, 0.0)
+            for receiver in list(mesh_desk._receivers):
+                receiver(message)
+            await asyncio.sleep(0)
+        assert mesh_desk._receivers == []
+        return len([event async for event in events])
+
+    assert asyncio.run(read_one_then_stop()) == 0
 
 
 def test_messages_for_the_gateway_come_as_events(users_mesh):

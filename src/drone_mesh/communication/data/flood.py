@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 from collections import OrderedDict
+from typing import NamedTuple
 
 from drone_mesh.communication import messages
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.ticket import TO_ALL
 from drone_mesh.communication.parts import NodeParts
 
-REMEMBERED_S = 5.0  # our choice: sending 256 messages takes longer, so no number recurs
-MOST_REMEMBERED = 1024  # messages of all senders together
+REMEMBERED_S = 5.0  # our choice: longer than a fragment takes through the mesh
+MOST_REMEMBERED = 1024  # numbers of all senders together
+
+
+class _Seen(NamedTuple):
+    """What has arrived under one number of a sender, which comes again after 256 messages."""
+
+    first_s: float
+    heads: tuple[tuple[int, ...], ...] = ()  # fingerprints of its messages, in fragment 0
+    indices: int = 0  # of further fragments of the latest one, as bits
 
 
 class Flood:
@@ -18,8 +27,7 @@ class Flood:
 
     def __init__(self, parts: NodeParts) -> None:
         self._parts = parts
-        # By sender and message: its fragments that arrived, as bits, and when the first one did
-        self._seen: OrderedDict[tuple[int, int], tuple[int, float]] = OrderedDict()
+        self._seen: OrderedDict[tuple[int, int], _Seen] = OrderedDict()  # by sender and number
 
     def send(self, fragment: bytes) -> None:
         """Broadcast a fragment of this node."""
@@ -40,12 +48,20 @@ class Flood:
         creator, _from, kind, _to, _forward = messages.header(fragment)
         number, index = messages.body(fragment)[0], kind - packets.FRAGMENTS.start
         key, now_s = (creator, number), self._parts.now_s
-        indices, first_s = self._seen.get(key, (0, now_s))
-        if now_s - first_s >= REMEMBERED_S:  # the number now belongs to another message
-            indices, first_s = 0, now_s
-        if indices >> index & 1:
+        seen = self._seen.get(key)
+        if seen is None or now_s - seen.first_s >= REMEMBERED_S:
+            seen = _Seen(now_s)
+        if index == 0:
+            head = packets.head_of(messages.body(fragment)).fingerprint
+            if head in seen.heads:
+                return False
+            indices = 0 if seen.heads else seen.indices
+            seen = _Seen(seen.first_s, (*seen.heads, head), indices)
+        elif seen.indices >> index & 1:
             return False
-        self._seen[key] = indices | 1 << index, first_s
+        else:
+            seen = seen._replace(indices=seen.indices | 1 << index)
+        self._seen[key] = seen
         while len(self._seen) > MOST_REMEMBERED:
             self._seen.popitem(last=False)
         return True

@@ -54,7 +54,8 @@ class Inbox:
         if now_s < self.ack_due_s < math.inf:
             self.ack_due_s = min(now_s + self._ack_delay_s, self._ack_latest_s)
         number, reassembly = body[0], self._reassembly
-        if reassembly.is_done(number):
+        reassembly.heard(number, now_s)
+        if reassembly.is_done(index, body):
             self._repeat_ack(number, now_s)
             return []
         whole = reassembly.add(index, body, now_s)
@@ -62,7 +63,7 @@ class Inbox:
             if reassembly.lacks_only_earlier(number, index):
                 self._repeat_ack(number, now_s)
             return []
-        reassembly.done(number)
+        reassembly.done(whole.head, now_s)
         if whole.head.reliable:
             self._completed(whole, index, now_s)
         return self._order(whole).take(whole, now_s)
@@ -76,6 +77,8 @@ class Inbox:
         """The sender asks for an ACK: it is due now."""
         if poll.nonce == packets.NO_ANSWER:
             return
+        if poll.session == self._session:
+            self._reassembly.heard(poll.number, now_s)
         self._asked = poll
         self.ack_due_s = min(self.ack_due_s, now_s)
 

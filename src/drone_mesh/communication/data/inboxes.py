@@ -14,10 +14,11 @@ from drone_mesh.communication.data.inbox import Inbox
 from drone_mesh.communication.data.packets import Ack, Poll
 from drone_mesh.communication.data.reassembly import Whole
 from drone_mesh.communication.data.ticket import TO_ALL
+from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.communication.parts import NodeParts
 
 TIDY_PERIOD_S = 5.0  # our choice: how often old fragments are dropped
-MOST_INBOXES = 128  # senders whose messages are reassembled at once, the latest ones
+MOST_INBOXES = 2 * MAX_NODE_ID  # every other node, with its messages to this one and to all
 
 OnArrived = Callable[[int, bool, Whole], None]
 """A message is complete: its sender, whether it was sent to all nodes, and the message."""

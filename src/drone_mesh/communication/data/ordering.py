@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections import deque
+
+from drone_mesh.communication.data.packets import MOST_BEHIND
 from drone_mesh.communication.data.reassembly import Whole
 
 HOLD_S = 300.0  # our choice: longer than a sender retries (LIFETIME_S of outgoing.py)
@@ -17,11 +20,15 @@ class PortOrder:
     """The messages of one sender to one port, with one kind of delivery.
 
     Memory: as many messages as a sender may have under way, MOST_BEHIND + 1.
+
+    A reliable message that arrives after the sender seemed to have given it up is delivered late:
+    its sender may have been told that it is here, and `behind` is not sealed (docs/security.md).
     """
 
     def __init__(self) -> None:
         self._next: int | None = None  # the place of the message to deliver next
         self._held: dict[int, tuple[Whole, float]] = {}  # complete, but earlier ones are missing
+        self._given_up: deque[int] = deque(maxlen=MOST_BEHIND)  # places that were not waited for
 
     def take(self, whole: Whole, now_s: float) -> list[Whole]:
         """Add a complete message; returns what can be delivered now. Ignores duplicates."""
@@ -34,9 +41,18 @@ class PortOrder:
         oldest = (order - whole.head.behind) & 0xFFFF
         if self._next is None:
             self._next = oldest
+            self._given_up.extend((oldest - n) & 0xFFFF for n in range(MOST_BEHIND, 0, -1))
+        if order in self._given_up and ahead(order, self._next) < 0:
+            self._given_up.remove(order)
+            return [whole]
         if ahead(order, self._next) < 0 or order in self._held:
             return []
         self._held[order] = whole, now_s
+        missing = ahead(oldest, self._next)
+        for back in range(min(missing, MOST_BEHIND), 0, -1):
+            place = (oldest - back) & 0xFFFF
+            if place not in self._held:
+                self._given_up.append(place)
         return self._ready_up_to(oldest)
 
     def overdue(self, now_s: float) -> list[Whole]:

@@ -158,7 +158,7 @@ class Outboxes:
         for to, outbox in self._outboxes.items():
             if to not in (gateway, TO_ALL):
                 waiting += outbox.take(TO_GATEWAY)
-        for message in waiting:
+        for message in sorted(waiting, key=lambda message: message.ticket.number):
             self._outbox(gateway).add(message)
 
     def _give_up_without_gateway(self) -> None:

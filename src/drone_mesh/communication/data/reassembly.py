@@ -11,6 +11,7 @@ from drone_mesh.communication.data.packets import COMPLETE, Head
 EXPIRES_S = 60.0  # our choice: an incomplete message is dropped after this time without fragments
 MOST_PARTIAL = 24  # incomplete messages of one sender, which has at most 16 under way
 _LIVE = 64  # numbers: older messages are no longer under way
+DONE_S = 300.0  # our choice: longer than a sender retries (LIFETIME_S of outgoing.py)
 
 
 Open = Callable[[bytes, bytes], Optional[bytes]]
@@ -22,6 +23,13 @@ class Whole(NamedTuple):
 
     head: Head
     payload: bytes
+
+
+class _Done(NamedTuple):
+    """A message that was complete. Its number comes again after 256 messages."""
+
+    fingerprint: tuple[int, ...]
+    since_s: float
 
 
 class _Partial:
@@ -42,7 +50,7 @@ class Reassembly:
         self._room = room
         self._open = open_message
         self._partial: OrderedDict[int, _Partial] = OrderedDict()  # by number, oldest first
-        self._done: OrderedDict[int, None] = OrderedDict()  # numbers of the latest complete ones
+        self._done: OrderedDict[int, _Done] = OrderedDict()  # the latest complete ones, by number
 
     def add(self, index: int, body: bytes, now_s: float) -> Whole | None:
         """Add a fragment; returns the message if it is complete. Drops damaged messages."""
@@ -84,18 +92,33 @@ class Reassembly:
         """The number of incomplete messages."""
         return len(self._partial)
 
-    def is_done(self, number: int) -> bool:
-        """Whether this message is complete, so that further fragments are duplicates."""
-        return number in self._done
+    def is_done(self, index: int, body: bytes) -> bool:
+        """Whether a fragment belongs to a complete message, so that it is a duplicate.
 
-    def done(self, number: int) -> None:
-        """The message is complete; forget messages older than the live numbers."""
-        self._done.pop(number, None)
-        self._done[number] = None
-        while len(self._done) > _LIVE:
-            self._done.popitem(last=False)
+        Call `heard` before.
+        """
+        done = self._done.get(body[0])
+        if done is None:
+            return False
+        if index == 0 and packets.head_of(body).fingerprint != done.fingerprint:
+            del self._done[body[0]]
+            return False
+        return True
+
+    def heard(self, number: int, now_s: float) -> None:
+        """The sender uses this number: forget messages that it cannot have under way any more."""
         for other in [n for n in self._partial if _LIVE <= (number - n) & 255 < 192]:
             del self._partial[other]
+        for other, done in list(self._done.items()):
+            if _LIVE <= (number - other) & 255 < 192 or now_s - done.since_s >= DONE_S:
+                del self._done[other]
+
+    def done(self, head: Head, now_s: float) -> None:
+        """The message is complete."""
+        self._done.pop(head.number, None)
+        self._done[head.number] = _Done(head.fingerprint, now_s)
+        while len(self._done) > _LIVE:
+            self._done.popitem(last=False)
 
     def has(self, number: int) -> int:
         """The fragments of a message that have arrived, as bits; COMPLETE for a complete one."""

@@ -27,6 +27,17 @@ def test_a_message_that_the_sender_gave_up_is_not_waited_for():
     assert taken(order, message(10, behind=1)) == [[9, 10]]
 
 
+def test_a_message_that_seemed_given_up_and_comes_all_the_same_is_delivered_once():
+    order = PortOrder()
+    assert taken(order, message(7), message(10), message(8), message(11)) == [[7], [10], [8], [11]]
+    assert taken(order, message(8), message(9), message(9)) == [[], [9], []]
+
+
+def test_a_message_before_the_first_that_arrived_is_delivered_once():
+    order = PortOrder()
+    assert taken(order, message(1), message(0), message(0), message(2)) == [[1], [0], [], [2]]
+
+
 def test_the_order_continues_across_the_wrap():
     order = PortOrder()
     assert taken(order, message(65535), message(1, 1), message(0)) == [[65535], [], [0, 1]]

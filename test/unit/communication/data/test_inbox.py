@@ -11,7 +11,7 @@ from drone_mesh.communication.data.flood import Flood
 from drone_mesh.communication.data.inbox import Inbox
 from drone_mesh.communication.data.ordering import PortOrder
 from drone_mesh.communication.data.outgoing import LIFETIME_S
-from drone_mesh.communication.data.packets import Head
+from drone_mesh.communication.data.packets import Head, Poll
 from drone_mesh.communication.data.reassembly import Whole
 from drone_mesh.communication.medium import UNDISTURBED
 
@@ -26,18 +26,31 @@ class Receiver:
         self.acks = []
         self.inbox = Inbox(
             ROOM,
-            lambda ack: self.acks.append(round(self.now_s, 3)),
+            self._acknowledge,
             lambda _place, sealed: sealed,
             UNDISTURBED,
         )
         self.now_s = 0.0
+        self.latest = None
 
-    def first(self, number, now_s, session=OLD, size=4):
+    def _acknowledge(self, ack):
+        self.acks.append(round(self.now_s, 3))
+        self.latest = ack
+
+    def poll(self, number, now_s):
+        """The sender asks for a message; returns whether it is complete."""
+        self.run(now_s)
+        self.inbox.poll(Poll(OLD, 1, number), now_s)
+        self.run(now_s)
+        done = self.latest.done >> ((self.latest.newest - number) & 0xFF) & 1
+        return (self.latest.has == packets.COMPLETE, bool(done))
+
+    def first(self, number, now_s, session=OLD, size=4, order=None):
         """The first fragment of a message arrives; returns what was delivered."""
         self.run(now_s)
-        payload = bytes(size)
-        check = packets.checksum(session, 5, number, payload)
-        head = Head(number, session, 5, size, True, 0, number, check)
+        payload, order = bytes(size), number if order is None else order
+        check = packets.checksum(session, 5, order, payload)
+        head = Head(number, session, 5, size, True, 0, order, check)
         body = packets.first_body(head, payload, ROOM)
         return [whole.head.number for whole in self.inbox.fragment(0, body, now_s)]
 
@@ -89,6 +102,25 @@ def test_an_incomplete_message_is_kept_for_a_minute(after_s, delivered):
     assert receiver.second(3, after_s) == delivered
 
 
+def test_a_number_that_comes_again_belongs_to_a_new_message():
+    receiver = Receiver()
+    assert receiver.first(7, 0.0) == [7]
+    assert receiver.first(7, 20.0, order=263) == [7]  # the 256 before were lost
+    assert receiver.first(7, 20.1, order=263) == []
+
+
+@pytest.mark.parametrize(
+    ("heard", "after_s", "complete"),
+    [([], 10.0, True), ([], 301.0, False), ([100], 10.0, False), ([40], 10.0, True)],
+)
+def test_a_message_is_complete_for_as_long_as_its_sender_can_ask_for_it(heard, after_s, complete):
+    receiver = Receiver()
+    receiver.first(7, 0.0)
+    for number in heard:
+        receiver.first(number, 1.0, size=20)  # its second half is lost
+    assert receiver.poll(7, after_s) == (complete, complete)
+
+
 @pytest.mark.parametrize(("after_s", "is_new"), [(4.0, False), (6.0, True)])
 def test_a_flooded_fragment_counts_as_known_for_five_seconds(after_s, is_new):
     repeated = []
@@ -100,6 +132,18 @@ def test_a_flooded_fragment_counts_as_known_for_five_seconds(after_s, is_new):
     parts.now_s = after_s
     assert flood.repeat(fragment) is is_new
     assert len(repeated) == 1 + is_new
+
+
+def test_a_flooded_number_that_comes_again_at_once_belongs_to_a_new_message():
+    antenna = SimpleNamespace(broadcast_message=lambda _fragment: None)
+    flood = Flood(SimpleNamespace(node_id=1, now_s=0.0, antenna=antenna))
+    fragments = []
+    for order in (7, 263):
+        check = packets.checksum(OLD, 5, order, b"")
+        head = Head(7, OLD, 5, 0, False, 0, order, check)
+        body = packets.first_body(head, b"", ROOM)
+        fragments.append((bytes((2, 2, 128, 254, 254)) + body).ljust(32, b"\0"))
+    assert [flood.repeat(fragment) for fragment in fragments * 3] == [True] * 2 + [False] * 4
 
 
 def test_a_message_waits_for_earlier_ones_for_longer_than_their_sender_tries_and_not_for_ever():
