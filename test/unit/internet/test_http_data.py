@@ -5,7 +5,9 @@ from __future__ import annotations
 import asyncio
 import base64
 import json
+import socket
 
+import httpx
 import pytest
 from conftest import TOKEN, MeshWithHttp
 
@@ -87,6 +89,16 @@ def test_a_node_that_takes_no_message_in_time_does_not_stop_the_server(users_mes
     assert "the node is too busy to take a message" in answer.text
     monkeypatch.undo()
     submit(late[0])  # the node has time again
+    users_mesh.client.post("/nodes/3/data?wait=30", content=b"next").raise_for_status()
+    assert [message.payload for message in received] == [b"next"]
+
+
+def test_a_body_that_ends_halfway_is_no_message(users_mesh):
+    received = users_mesh.network.received[3]
+    received.clear()
+    address = httpx.URL(users_mesh.client.base_url)
+    with socket.create_connection((address.host, address.port)) as client:
+        client.sendall(b"POST /nodes/3/data HTTP/1.1\r\nHost: x\r\nContent-Length: 9\r\n\r\nhalf")
     users_mesh.client.post("/nodes/3/data?wait=30", content=b"next").raise_for_status()
     assert [message.payload for message in received] == [b"next"]
 

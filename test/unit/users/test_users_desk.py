@@ -51,6 +51,13 @@ def test_an_echo_is_answered_or_refused_with_the_reason(rig):
     assert rig.desks[0].echo(2, 0.01) is None
 
 
+def test_an_echo_is_no_longer_waited_for_when_its_node_stops(rig):
+    rig.network.nodes[2].component.on_msg = lambda payload, now_s: None
+    polls = iter([False, True])
+    assert rig.desks[0].echo(2, 300.0, stopping=lambda: next(polls)) is None
+    assert next(polls, "asked twice") == "asked twice"
+
+
 def test_an_echo_without_an_answer_names_the_neighbour_with_another_key(rig):
     network = rig.network
     network.nodes[2].component.data._echoes.asked = lambda _creator, _body: None

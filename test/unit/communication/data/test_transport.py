@@ -2,9 +2,12 @@ import pytest
 
 from drone_mesh.channel.access_rules import AccessRules
 from drone_mesh.channel.medium_access import MediumAccess
+from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.outgoing import LIFETIME_S
+from drone_mesh.communication.data.packets import Head
 from drone_mesh.communication.data.ticket import TO_ALL, TO_GATEWAY, TicketState
 from drone_mesh.communication.data.transport import MOST_QUEUED
+from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.communication.messages import is_data
 from drone_mesh.communication.packet_types import Priority
 from drone_mesh.errors import MessageRefused, QueueFull
@@ -42,6 +45,38 @@ def test_a_message_for_the_gateway_goes_to_the_one_that_the_node_uses(network):
     network.run_for(1.0)
     assert payloads(network, 0) == [b"up"]
     assert ticket.state is TicketState.DELIVERED
+
+
+def test_messages_for_the_gateway_keep_their_order_when_it_is_another_one():
+    network = Network(seed=5)
+    network.add_gateway(0, 0.0, 0.0)
+    network.add_router(2, 6.0, 0.0)
+    network.add_gateway(1, 12.0, 0.0)
+    network.power(1, False)
+    assert network.run_until(lambda: network.connected(2), 30.0)
+    network.power(0, False)
+    network.send(2, TO_GATEWAY, b"to the first gateway")
+    network.run_for(5.0)
+    network.power(1, True)
+    router = network.nodes[2].component
+    assert network.run_until(lambda: router.get_preferred_gateway() == 1, 60.0)
+    network.send(2, TO_GATEWAY, b"to the second gateway")
+    network.run_for(10.0)
+    assert payloads(network, 1) == [b"to the first gateway", b"to the second gateway"]
+
+
+def test_every_node_may_send_to_this_one_and_to_all_and_no_message_comes_twice(network):
+    payload = b"twice on the air"
+    head = Head(0, 7, 5, len(payload), True, 0, 0, packets.checksum(7, 5, 0, payload))
+    body = packets.first_body(head, payload, 27)
+    senders = range(1, MAX_NODE_ID + 1)
+    for _ in range(2):
+        for sender in senders:
+            for forward in (0, TO_ALL):
+                header = bytes((sender, 1, packets.FRAGMENTS.start, 0, forward))
+                network.inject(0, (header + body).ljust(32, bytes(1)))
+    heard = [(message.sender, message.to_all) for message in network.received[0]]
+    assert sorted(heard) == [(sender, to_all) for sender in senders for to_all in (False, True)]
 
 
 def test_a_message_to_all_reaches_each_node_once(network):
