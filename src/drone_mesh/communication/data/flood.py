@@ -12,9 +12,10 @@ from drone_mesh.communication.parts import NodeParts
 
 REMEMBERED_S = 5.0  # our choice: longer than a fragment takes through the mesh
 MOST_REMEMBERED = 1024  # numbers of all senders together
+MOST_HEADS = 4  # our choice: messages under one number within REMEMBERED_S
 
 
-class _Seen(NamedTuple):
+class _Repeated(NamedTuple):
     """What has arrived under one number of a sender, which comes again after 256 messages."""
 
     first_s: float
@@ -27,7 +28,7 @@ class Flood:
 
     def __init__(self, parts: NodeParts) -> None:
         self._parts = parts
-        self._seen: OrderedDict[tuple[int, int], _Seen] = OrderedDict()  # by sender and number
+        self._seen: OrderedDict[tuple[int, int], _Repeated] = OrderedDict()  # by sender and number
 
     def send(self, fragment: bytes) -> None:
         """Broadcast a fragment of this node."""
@@ -50,13 +51,13 @@ class Flood:
         key, now_s = (creator, number), self._parts.now_s
         seen = self._seen.get(key)
         if seen is None or now_s - seen.first_s >= REMEMBERED_S:
-            seen = _Seen(now_s)
+            seen = _Repeated(now_s)
         if index == 0:
             head = packets.head_of(messages.body(fragment)).fingerprint
-            if head in seen.heads:
+            if head in seen.heads or len(seen.heads) >= MOST_HEADS:
                 return False
             indices = 0 if seen.heads else seen.indices
-            seen = _Seen(seen.first_s, (*seen.heads, head), indices)
+            seen = _Repeated(seen.first_s, (*seen.heads, head), indices)
         elif seen.indices >> index & 1:
             return False
         else:

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import pytest
 
 from drone_mesh.communication.data import packets
-from drone_mesh.communication.data.flood import Flood
+from drone_mesh.communication.data.flood import MOST_HEADS, Flood
 from drone_mesh.communication.data.inbox import Inbox
 from drone_mesh.communication.data.ordering import PortOrder
 from drone_mesh.communication.data.outgoing import LIFETIME_S
@@ -134,16 +134,21 @@ def test_a_flooded_fragment_counts_as_known_for_five_seconds(after_s, is_new):
     assert len(repeated) == 1 + is_new
 
 
-def test_a_flooded_number_that_comes_again_at_once_belongs_to_a_new_message():
+def flooded(order):
+    """The only fragment of message 7 of node 2 to all, `order` places after its first."""
+    check = packets.checksum(OLD, 5, order, b"")
+    body = packets.first_body(Head(7, OLD, 5, 0, False, 0, order, check), b"", ROOM)
+    return (bytes((2, 2, 128, 254, 254)) + body).ljust(32, b"\0")
+
+
+@pytest.mark.parametrize(("orders", "repeated"), [((7, 263), 2), (tuple(range(9)), MOST_HEADS)])
+def test_a_few_messages_under_one_number_are_repeated_once_and_the_others_not_at_all(
+    orders, repeated
+):
     antenna = SimpleNamespace(broadcast_message=lambda _fragment: None)
     flood = Flood(SimpleNamespace(node_id=1, now_s=0.0, antenna=antenna))
-    fragments = []
-    for order in (7, 263):
-        check = packets.checksum(OLD, 5, order, b"")
-        head = Head(7, OLD, 5, 0, False, 0, order, check)
-        body = packets.first_body(head, b"", ROOM)
-        fragments.append((bytes((2, 2, 128, 254, 254)) + body).ljust(32, b"\0"))
-    assert [flood.repeat(fragment) for fragment in fragments * 3] == [True] * 2 + [False] * 4
+    outcomes = [flood.repeat(flooded(order)) for order in orders * 3]
+    assert outcomes == [True] * repeated + [False] * (len(outcomes) - repeated)
 
 
 def test_a_message_waits_for_earlier_ones_for_longer_than_their_sender_tries_and_not_for_ever():
