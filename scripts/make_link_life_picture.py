@@ -12,7 +12,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 PICTURE = Path(__file__).resolve().parents[1] / "docs" / "pictures" / "link_life.png"
-TICKS_S = (10, 20, 50, 100)
+TICKS_S = (10, 20, 50, 100, 200, 500)
 WAYS = (("pdr_up", "to the gateway"), ("pdr_down", "from the gateway"))
 
 
@@ -42,7 +42,7 @@ def main() -> None:
         axes.minorticks_off()
         axes.grid(alpha=0.3)
     figure.axes[0].set_ylabel("messages that arrive, %")
-    figure.axes[0].legend(loc="lower right")
+    figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside right center")
     figure.savefig(PICTURE, dpi=110)
 
 
