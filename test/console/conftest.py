@@ -134,7 +134,8 @@ def start_console(nursery: Nursery) -> Iterator[Callable[..., ConsoleProcess]]:
 
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Browser]:
-    path = os.environ.get("CHROMIUM") or shutil.which("chromium")
+    installed = shutil.which("chromium-headless-shell") or shutil.which("chromium")
+    path = os.environ.get("CHROMIUM") or installed
     assert path, "no chromium: apt-get install chromium, or set CHROMIUM to where one is"
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=path, args=CHROMIUM_FLAGS)
