@@ -273,6 +273,12 @@ class Scenario(Part):
         return self
 
     @model_validator(mode="after")
+    def _suits_its_model(self) -> "Scenario":
+        if self.model == "ideal" and self.mobility.kind != "none":
+            raise ValueError("model ideal: only repairs move drones there, mobility does not")
+        return self
+
+    @model_validator(mode="after")
     def _measures_one_load(self) -> "Scenario":
         actions = [fault.action for fault in self.faults if fault.action in ("send", "load")]
         if "load" in actions and len(actions) > 1:

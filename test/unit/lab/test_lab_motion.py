@@ -202,6 +202,11 @@ def test_motion_that_cannot_be_is_refused(mobility: dict[str, Any], words: str) 
         Scenario.model_validate({"mobility": mobility})
 
 
+def test_without_packets_only_repairs_move_drones() -> None:
+    with pytest.raises(ValueError, match="model ideal: only repairs move drones there"):
+        Scenario.model_validate({"model": "ideal", "mobility": {"kind": "oval"}})
+
+
 def test_an_axis_may_compare_motion_with_rest() -> None:
     numbers = {"speed_m_s": 0.5, "radius_m": 2.0}
     for kind in ("none", "oval"):
