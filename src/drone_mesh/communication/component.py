@@ -22,7 +22,7 @@ from drone_mesh.communication.interfaces import (
 from drone_mesh.communication.mesh_node import MeshNode
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.packet_types import (
-    TYPES_WITH_FLOATS,
+    FLOATS,
     TYPES_WITH_PLACES,
     MessageType,
     receivers,
@@ -124,7 +124,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
         if to != me:
             self._drop("a packet for another node", payload)
             return
-        if kind in TYPES_WITH_FLOATS and not messages.is_finite(payload):
+        if kind in FLOATS and not messages.is_finite(payload):
             self._drop("a packet with a number that is not finite", payload)
             return
         if self._neighbours.heard(from_, now_s):
@@ -241,7 +241,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
     def receive_last_place(self, payload: bytes, _creator: int, _from: int) -> None:
         """Where another node was last heard."""
         last = LastPlace.from_payload(payload)
-        if last is not None and last.node != self._node_id:
+        if last.node != self._node_id:
             self._on_last_place(last)
 
     def receive_gateway_place(self, payload: bytes, _creator: int, _from: int) -> None:

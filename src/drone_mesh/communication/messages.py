@@ -21,7 +21,7 @@ from drone_mesh.communication.interfaces import BROADCAST, PAYLOAD_BYTES
 from drone_mesh.communication.packet_types import (
     ABOUT,
     DATA_TYPES,
-    TYPES_WITH_FLOATS,
+    FLOATS,
     UNANSWERED,
     UNJITTERED,
     MessageType,
@@ -196,7 +196,6 @@ _EXTENSIONS = {  # the bytes after a body that a routing technique may use
     int(MessageType.PRESENT): range(HEADER_BYTES + IntroduceMessage.BODY.size, _FRAME_DIGEST_AT),
     int(MessageType.HEARTBEAT): range(HEADER_BYTES + HeartbeatMessage.BODY.size, PAYLOAD_BYTES),
 }
-_FLOATS = {kind: struct.Struct("<" + "f" * many) for kind, many in TYPES_WITH_FLOATS.items()}
 
 
 class GatewayPlace(NamedTuple):
@@ -450,8 +449,8 @@ def identity(payload: bytes) -> bytes:
 
 
 def is_finite(payload: bytes) -> bool:
-    """Whether all floats of a packet are finite; its type is one of TYPES_WITH_FLOATS."""
-    numbers = _FLOATS[payload[TYPE_AT]].unpack_from(payload, HEADER_BYTES)
+    """Whether all floats of a packet are finite; its type is one of FLOATS."""
+    numbers = FLOATS[payload[TYPE_AT]].unpack_from(payload, HEADER_BYTES)
     return math.isfinite(sum(numbers))
 
 

@@ -67,10 +67,14 @@ class PacketType(NamedTuple):
         return struct.Struct("<" + "".join(_CODES.get(form) or f"{form[6:-1]}s" for form in forms))
 
     @property
-    def floats(self) -> int:
-        """How many floats the body starts with. A packet with one that is not finite is bad."""
-        fields = self.body.split(", ")
-        return next((n for n, one in enumerate(fields) if one[:7] != "float32"), len(fields))
+    def floats(self) -> struct.Struct | None:
+        """Unpacks the floats of the body. A packet with one that is not finite is bad."""
+        if "float32" not in self.body:
+            return None
+        forms = [_CODES[field.split()[0]] for field in self.body.split(", ")]
+        return struct.Struct(
+            "<" + "".join(f if f == "f" else f"{struct.calcsize(f)}x" for f in forms)
+        )
 
     @property
     def has_place(self) -> bool:
@@ -175,8 +179,8 @@ ABOUT = tuple(about for about, _handler in _ABOUT_AND_HANDLER.values())
 HANDLER_NAMES = tuple(handler for _about, handler in _ABOUT_AND_HANDLER.values())
 """The method that handles packets with this number; empty: no node handles them."""
 
-TYPES_WITH_FLOATS = {number: ABOUT[number].floats for number in range(256) if ABOUT[number].floats}
-"""The numbers of the types whose bodies start with floats, and how many."""
+FLOATS = {number: about.floats for number, about in enumerate(ABOUT) if about.floats is not None}
+"""What unpacks the floats of bodies, by the numbers of the types that have any."""
 
 UNANSWERED = frozenset(number for number in range(256) if not ABOUT[number].answered)
 

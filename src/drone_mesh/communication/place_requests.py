@@ -55,11 +55,9 @@ class LastPlace(NamedTuple):
         return messages.packet(MessageType.LAST_PLACE, creator, creator, to, to, body)
 
     @classmethod
-    def from_payload(cls, payload: bytes) -> LastPlace | None:
-        """Decode; None if its place is not finite."""
+    def from_payload(cls, payload: bytes) -> LastPlace:
+        """Decode."""
         age, node, *place = _BODY.unpack_from(payload, messages.HEADER_BYTES)
-        if not all(map(math.isfinite, place)):
-            return None
         return cls(node, Location(*place), float(age))
 
 

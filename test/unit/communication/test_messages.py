@@ -23,7 +23,7 @@ from drone_mesh.communication.messages import (
     MovementNegotiationMessage,
     next_hop,
 )
-from drone_mesh.communication.packet_types import TYPES_WITH_FLOATS, MessageType
+from drone_mesh.communication.packet_types import FLOATS, MessageType
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import PacketError
 
@@ -292,11 +292,13 @@ def test_nan_and_infinity_can_be_decoded_and_are_recognised(kind, ids, text, sec
     numbers = (
         struct.pack("<ff", 1.0, float(text)) if second else struct.pack("<ff", float(text), 1.0)
     )
-    payload = bytes((ids[0], ids[1], kind, ids[2], ids[3])) + numbers.ljust(27, b"\0")
+    of_another = kind in (MessageType.LAST_PLACE, MessageType.GATEWAY_PLACE)
+    body = bytes(3 if of_another else 0) + numbers
+    payload = bytes((ids[0], ids[1], kind, ids[2], ids[3])) + body.ljust(27, b"\0")
     decoded(payload)
-    has_two = kind in (MessageType.LOCATION, MessageType.MOVE_TO_LOCATION)
+    has_two = of_another or kind in (MessageType.LOCATION, MessageType.MOVE_TO_LOCATION)
     has_one = kind == MessageType.MOVEMENT_NEGOTIATION
-    has_numbers = kind in TYPES_WITH_FLOATS
+    has_numbers = kind in FLOATS
     assert has_numbers == (has_two or has_one)
     finite = not has_numbers or messages.is_finite(payload)
     assert finite == (not (has_two or (has_one and not second)))
