@@ -17,6 +17,7 @@ if [ -e "$noetic" ]; then
     ros-noetic-{rostopic,std-msgs,tf2-msgs,visualization-msgs}
   )
   screen_packages=(iproute2 libgl1 mosquitto libxtst6 tshark xvfb)
+  browsers=()  # Ubuntu has Chromium as a snap only
   rviz_package=ros-noetic-rviz
 else
   ros_packages=(
@@ -29,10 +30,8 @@ else
     python3-actionlib python3-diagnostic-updater
     python3-rospy python3-rostest
   )
-  # Chromium without a window: half of the processor time. Debian 11 does not have it.
-  browser=chromium-headless-shell
-  grep -qx 'VERSION_ID="11"' /etc/os-release && browser=chromium
-  screen_packages=("$browser" iproute2 libgl1 mosquitto libxtst6 tshark xvfb)
+  screen_packages=(iproute2 libgl1 mosquitto libxtst6 tshark xvfb)
+  browsers=(chromium-headless-shell chromium)  # the first takes half of the processor time
   rviz_package=rviz
 fi
 
@@ -174,8 +173,18 @@ prepare_checks() {
 # What all tests need. pip comes after apt-get, whose Python packages it finds in the environment.
 prepare_tests() {
   apt_install "${ros_packages[@]}" "${screen_packages[@]}"
+  install_browser
   prepare_unit_tests
   map_library
+}
+
+# install_browser: the first of browsers that apt knows; Debian 11 does not have the first.
+install_browser() {
+  local package
+  for package in "${browsers[@]}"; do
+    apt-cache show "$package" >/dev/null 2>&1 && break
+  done
+  [ -z "$package" ] || apt_install "$package"
 }
 
 # What the checks and rostests need beside that.
