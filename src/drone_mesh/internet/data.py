@@ -122,9 +122,12 @@ async def _over(sending: Sending, wait_s: float) -> None:
 async def _events(users: UsersDesk, port: Optional[int]) -> AsyncIterator[str]:
     loop = asyncio.get_running_loop()
     messages: asyncio.Queue[ReceivedMessage] = asyncio.Queue(MOST_UNREAD)
+    is_slow = False
 
     def put(message: ReceivedMessage) -> None:
+        nonlocal is_slow
         if messages.full():
+            is_slow = True
             end()  # the client has stopped reading: while it does, nothing else runs here
         else:
             messages.put_nowait(message)
@@ -136,7 +139,7 @@ async def _events(users: UsersDesk, port: Optional[int]) -> AsyncIterator[str]:
     end = users.subscribe(receive)
     try:
         yield ": messages of users\n\n"
-        while not messages.full():
+        while not (is_slow or messages.full()):
             try:
                 message = await asyncio.wait_for(messages.get(), SIGN_OF_LIFE_S)
             except asyncio.TimeoutError:

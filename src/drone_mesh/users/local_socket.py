@@ -26,7 +26,7 @@ from typing import Any, Mapping
 
 from drone_mesh.drone.fleet import ids_in_words
 from drone_mesh.errors import ConfigurationError, MessageRefused
-from drone_mesh.users.desk import UsersDesk, in_json
+from drone_mesh.users.desk import Sending, UsersDesk, check_wait, in_json
 from drone_mesh.users.socket_path import is_served
 
 MOST_REQUEST_BYTES = 4096  # our choice: a message of 1,024 bytes in base64 takes 1,400
@@ -101,6 +101,9 @@ class _Server(socketserver.ThreadingUnixStreamServer):
         """Ignored: clients may disconnect at any time."""
 
 
+_INVALID = (ValueError, TypeError, LookupError, AttributeError, ArithmeticError, RecursionError)
+
+
 class _Client(socketserver.StreamRequestHandler):
     server: _Server
     timeout = REQUEST_WITHIN_S
@@ -112,7 +115,7 @@ class _Client(socketserver.StreamRequestHandler):
             return
         try:
             self._answer(json.loads(self.rfile.readline(MOST_REQUEST_BYTES)))
-        except (ValueError, TypeError, KeyError, AttributeError) as error:
+        except _INVALID as error:
             self._say({"error": f"invalid request: {error}"})
         except MessageRefused as error:
             self._say({"error": str(error)})
@@ -125,14 +128,15 @@ class _Client(socketserver.StreamRequestHandler):
         what, desk = request["do"], self.server.desk
         if what == "send":
             payload = base64.b64decode(request["payload"], validate=True)
+            wait_s = float(request.get("wait", 0.0))
+            check_wait(wait_s)
             sending = desk.send(
                 int(request["to"]),
                 payload,
                 int(request.get("port", 0)),
                 bool(request.get("reliable", True)),
             )
-            wait_s = float(request.get("wait", 0.0))
-            arrived = self._wait(sending.wait, wait_s)
+            arrived = self._wait(sending, wait_s)
             self._say({"arrived": arrived, "ticket": sending.in_words(wait_s)})
         elif what == "echo":
             wait_s = float(request.get("wait", 5.0))
@@ -149,17 +153,20 @@ class _Client(socketserver.StreamRequestHandler):
                     }
                 )
         elif what == "listen":
-            self._listen(request.get("port"))
+            port = request.get("port")
+            self._listen(None if port is None else int(port))
         else:
             raise ValueError(f"unknown request: {what}")
 
-    def _wait(self, wait: Any, seconds: float) -> bool:
+    def _wait(self, sending: Sending, seconds: float) -> bool:
         """Wait in short steps, so that the end of the node ends the wait."""
         if seconds <= 0:
-            return bool(wait(0.0))
+            return sending.wait(0.0)
         while seconds > 0 and not self.server.stopping:
-            if wait(min(seconds, _POLL_S)):
+            if sending.wait(min(seconds, _POLL_S)):
                 return True
+            if sending.over.done():
+                break
             seconds -= _POLL_S
         return False
 
@@ -172,7 +179,7 @@ class _Client(socketserver.StreamRequestHandler):
             while not (self.server.stopping or self._is_gone()):
                 message = listener.next(_POLL_S)
                 if message is not None:
-                    self._say(in_json(message))
+                    self._write(in_json(message))  # a client that does not read is disconnected
                 if listener.dropped and not warned:
                     warned = True
                     _log.warning("node %d: a listener reads too slowly and loses messages", node)
@@ -188,7 +195,10 @@ class _Client(socketserver.StreamRequestHandler):
 
     def _say(self, answer: dict[str, Any]) -> None:
         with contextlib.suppress(OSError):
-            self.wfile.write(json.dumps(answer).encode() + b"\n")
+            self._write(answer)
+
+    def _write(self, answer: dict[str, Any]) -> None:
+        self.wfile.write(json.dumps(answer).encode() + b"\n")
 
 
 def _prepare(path: Path) -> None:

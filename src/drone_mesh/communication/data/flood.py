@@ -63,6 +63,7 @@ class Flood:
         else:
             seen = seen._replace(indices=seen.indices | 1 << index)
         self._seen[key] = seen
+        self._seen.move_to_end(key)
         while len(self._seen) > MOST_REMEMBERED:
             self._seen.popitem(last=False)
         return True

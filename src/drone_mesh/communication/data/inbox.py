@@ -26,11 +26,13 @@ class Inbox:
     def __init__(
         self,
         room: int,
-        acknowledge: Callable[[Ack], None],
+        acknowledge: Callable[[Ack], None] | None,
         open_message: Open,
         medium: Medium,
     ) -> None:
-        """`acknowledge` sends an ACK to the sender; `room`: bytes of a body."""
+        """`acknowledge` sends an ACK to the sender; None: its messages are to all, with numbers of
+        their own, and get no ACK. `room`: bytes of a body.
+        """
         self._ack_delay_s = medium.stretched(ACK_DELAY_S)
         self._ack_within_s = medium.stretched(ACK_LATEST_S)
         self._repeat_s = medium.stretched(REPEAT_S)
@@ -49,8 +51,17 @@ class Inbox:
 
     def fragment(self, index: int, body: bytes, now_s: float) -> list[Whole]:
         """Process a fragment; returns deliverable messages. Raises PacketError if damaged."""
-        if index == 0 and not self._is_current(packets.head_of(body).session, now_s):
-            return []
+        held: list[Whole] = []
+        if index == 0:
+            session = packets.head_of(body).session
+            if self._is_late(session, now_s):
+                return []
+            if session != self._session:
+                held = self._start_over(session, now_s)
+        return held + self._accept(index, body, now_s)
+
+    def _accept(self, index: int, body: bytes, now_s: float) -> list[Whole]:
+        """Process a fragment of the current session; returns deliverable messages."""
         if now_s < self.ack_due_s < math.inf:
             self.ack_due_s = min(now_s + self._ack_delay_s, self._ack_latest_s)
         number, reassembly = body[0], self._reassembly
@@ -64,7 +75,7 @@ class Inbox:
                 self._repeat_ack(number, now_s)
             return []
         reassembly.done(whole.head, now_s)
-        if whole.head.reliable:
+        if whole.head.reliable and self._acknowledge is not None:
             self._completed(whole, index, now_s)
         return self._order(whole).take(whole, now_s)
 
@@ -84,6 +95,7 @@ class Inbox:
 
     def acknowledge(self) -> None:
         """Send the ACK that is due."""
+        assert self._acknowledge is not None  # otherwise none becomes due
         asked = self._asked or Poll(self._session, packets.NO_ANSWER, self._complete)
         self._asked, self._unacknowledged, self.ack_due_s = None, 0, math.inf
         self._acknowledge(self._ack(asked.number, asked.nonce, asked.session))
@@ -97,27 +109,30 @@ class Inbox:
                 overdue += order.overdue(now_s)
         return overdue
 
-    def _is_current(self, session: int, now_s: float) -> bool:
-        """Whether a message belongs to the sender's current session; a new session starts over."""
-        if session == self._session:
-            return True
+    def _is_late(self, session: int, now_s: float) -> bool:
+        """Whether a message belongs to the session before the sender's current one."""
         former, ended_s = self._former
-        if session == former and now_s - ended_s < FORMER_SESSION_S:
-            return False
+        return session == former and now_s - ended_s < FORMER_SESSION_S
+
+    def _start_over(self, session: int, now_s: float) -> list[Whole]:
+        """The sender has restarted: returns the messages that waited for earlier ones."""
+        held = [whole for order in self._ports.values() for whole in order.overdue(math.inf)]
         if self._session != -1:
             self._former = self._session, now_s
         self._session = session
         self._reassembly = Reassembly(self._room, self._open)
         self._ports.clear()
         self._asked, self._unacknowledged, self.ack_due_s = None, 0, math.inf
-        return True
+        return held
 
     def _order(self, whole: Whole) -> PortOrder:
         key = (whole.head.port, whole.head.reliable)
         order = self._ports.pop(key, None) or PortOrder()
         self._ports[key] = order
-        while len(self._ports) > MOST_PORTS:
-            self._ports.popitem(last=False)
+        if len(self._ports) > MOST_PORTS:
+            oldest = next(iter(self._ports))
+            idle = (one for one, its in self._ports.items() if one != key and not its.holds)
+            del self._ports[next(idle, oldest)]  # what waits was acknowledged
         return order
 
     def _completed(self, whole: Whole, index: int, now_s: float) -> None:
@@ -132,7 +147,7 @@ class Inbox:
             self.ack_due_s = min(now_s + self._ack_delay_s, self._ack_latest_s)
 
     def _repeat_ack(self, number: int, now_s: float) -> None:
-        if now_s - self._repeated_s >= self._repeat_s:
+        if self._acknowledge is not None and now_s - self._repeated_s >= self._repeat_s:
             self._repeated_s = now_s
             self._asked = self._asked or Poll(self._session, packets.NO_ANSWER, number)
             self.ack_due_s = min(self.ack_due_s, now_s)

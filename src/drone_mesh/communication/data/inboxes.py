@@ -83,7 +83,7 @@ class Inboxes:
         if inbox is None:
             while len(self._inboxes) >= MOST_INBOXES:
                 self._inboxes.popitem(last=False)
-            acknowledge = functools.partial(self._acknowledge, sender)
+            acknowledge = None if to_all else functools.partial(self._acknowledge, sender)
             receiver = TO_ALL if to_all else self._parts.node_id
             open_message = functools.partial(self._parts.seals.open_message, sender, receiver)
             inbox = self._inboxes[key] = Inbox(

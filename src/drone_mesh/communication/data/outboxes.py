@@ -38,15 +38,20 @@ class Outboxes:
         node: IMeshDebugInfo,
         room: int,
         send_packet: SendPacket,
+        to_self: Callable[[OutgoingMessage], None],
         ended: Callable[[TicketState], None],
         hint: Callable[[], str],
     ) -> None:
-        """`room`, `ended` and `hint` as for Outbox; `node` knows its connection."""
+        """`room`, `ended` and `hint` as for Outbox; `node` knows its connection.
+
+        `to_self` delivers a message for the gateway of a node that is its own gateway.
+        """
         self._parts = parts
         self._node = node
         self._was_lost = False
         self._room = room
         self._send_packet = send_packet
+        self._to_self = to_self
         self._ended = ended
         self._hint = hint
         self._session: int | None = None
@@ -159,7 +164,10 @@ class Outboxes:
             if to not in (gateway, TO_ALL):
                 waiting += outbox.take(TO_GATEWAY)
         for message in sorted(waiting, key=lambda message: message.ticket.number):
-            self._outbox(gateway).add(message)
+            if gateway == self._parts.node_id:
+                self._to_self(message)
+            else:
+                self._outbox(gateway).add(message)
 
     def _give_up_without_gateway(self) -> None:
         now_s = self._parts.now_s

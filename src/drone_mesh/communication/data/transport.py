@@ -65,7 +65,9 @@ class Transport:
         assert room >= packets.LEAST_ROOM, "a seal leaves too little room for users' data"
         self._parts = parts
         self._my_gateway = node.get_preferred_gateway
-        self._outboxes = Outboxes(parts, node, room, self._send_packet, self._ended, self.hint)
+        self._outboxes = Outboxes(
+            parts, node, room, self._send_packet, self._to_self, self._ended, self.hint
+        )
         self._inboxes = Inboxes(parts, room, self._send_packet, self._arrived)
         self._flood = Flood(parts)
         self._echoes = Echoes(self._send_packet, room)
@@ -95,6 +97,7 @@ class Transport:
         )
         me = self._parts.node_id
         if to == me or (to == TO_GATEWAY and self._my_gateway() == me):
+            self._work()  # earlier ones may wait for a gateway, which this node is by now
             self._deliver(ReceivedMessage(me, port, payload, False, reliable, now_s))
             ticket.set_state(TicketState.DELIVERED)
             return ticket
@@ -207,6 +210,16 @@ class Transport:
             self._figures = figures._replace(messages_delivered=figures.messages_delivered + 1)
         elif state is TicketState.GIVEN_UP:
             self._figures = figures._replace(messages_given_up=figures.messages_given_up + 1)
+
+    def _to_self(self, message: OutgoingMessage) -> None:
+        ticket, me = message.ticket, self._parts.node_id
+        self._deliver(
+            ReceivedMessage(
+                me, ticket.port, message.payload, False, ticket.reliable, self._parts.now_s
+            )
+        )
+        ticket.set_state(TicketState.DELIVERED)
+        self._ended(TicketState.DELIVERED)
 
     def _arrived(self, sender: int, to_all: bool, whole: Whole) -> None:
         port, reliable = whole.head.port, whole.head.reliable
