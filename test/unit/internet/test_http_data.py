@@ -120,6 +120,23 @@ def test_a_client_that_stops_reading_is_no_longer_listened_for():
     assert asyncio.run(read_one_then_stop()) == 0
 
 
+def test_a_client_that_waits_while_too_many_messages_come_at_once_is_disconnected():
+    mesh_desk = desk.UsersDesk(0, lambda work: work(0.0))
+
+    async def read_while_they_come() -> int:
+        events = data._events(mesh_desk, None)
+        await events.__anext__()
+        waiting = asyncio.ensure_future(events.__anext__())
+        await asyncio.sleep(0)
+        for _ in range(data.MOST_UNREAD + 1):
+            for receiver in list(mesh_desk._receivers):
+                receiver(ReceivedMessage(2, 0, b"", False, True, 0.0))
+        assert (await waiting).startswith("data: ")
+        return len([event async for event in events])
+
+    assert asyncio.run(asyncio.wait_for(read_while_they_come(), 10.0)) == 0
+
+
 def test_messages_for_the_gateway_come_as_events(users_mesh):
     with users_mesh.client.stream("GET", "/data?port=5") as stream:
         lines = (line for line in stream.iter_lines() if line)

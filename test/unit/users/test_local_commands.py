@@ -9,11 +9,12 @@ import re
 import socket
 import sys
 import threading
+import time
 
 import pytest
 
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.users import commands
+from drone_mesh.users import commands, local_socket
 from drone_mesh.users.local_client import LocalClient
 from drone_mesh.users.local_socket import LocalSocket, warn_of_unreachable
 from drone_mesh.users.socket_path import socket_path
@@ -196,10 +197,53 @@ def test_a_socket_that_a_dead_program_left_is_replaced(rig, tmp_path):
     assert not path.exists()
 
 
-@pytest.mark.parametrize("request_line", [b"\n", b"{}\n", b"[1]\n", b'{"do": "fly"}\n', b"\xff\n"])
+@pytest.mark.parametrize(
+    "request_line",
+    [
+        b"\n",
+        b"{}\n",
+        b"[1]\n",
+        b'{"do": "fly"}\n',
+        b"\xff\n",
+        b"[" * 4000 + b"\n",
+        b'{"do": "echo", "to": 1e999}\n',
+        b'{"do": "listen", "port": "seven"}\n',
+    ],
+)
 def test_an_invalid_request_is_answered(rig, request_line):
     with socket.socket(socket.AF_UNIX) as client:
         client.connect(str(socket_path(0)))
         client.sendall(request_line)
         with client.makefile() as lines:
             assert "invalid request" in json.loads(lines.readline())["error"]
+
+
+@pytest.mark.parametrize("wait", [b"null", b'"soon"', b"NaN", b"Infinity", b"-1", b"301"])
+def test_a_message_with_an_invalid_wait_is_not_sent(rig, wait):
+    with socket.socket(socket.AF_UNIX) as client:
+        client.connect(str(socket_path(1)))
+        client.sendall(b'{"do": "send", "to": 0, "payload": "", "wait": ' + wait + b"}\n")
+        with client.makefile() as lines:
+            assert "invalid" in json.loads(lines.readline())["error"]
+    assert rig.network.received == {}
+
+
+def test_nobody_waits_for_a_message_that_was_given_up(rig):
+    started_s = time.monotonic()
+    arrived, words = LocalClient(socket_path(0)).send(77, b"", reliable=False, wait_s=60.0)
+    assert (arrived, "no route to node 77" in words) == (False, True)
+    assert time.monotonic() - started_s < 30.0
+
+
+def test_a_listener_that_does_not_read_is_disconnected_and_gets_no_half_line(rig, monkeypatch):
+    monkeypatch.setattr(local_socket._Client, "timeout", 0.2)
+    with socket.socket(socket.AF_UNIX) as client:
+        client.connect(str(socket_path(0)))
+        client.sendall(b'{"do": "listen"}\n')
+        with client.makefile("rb") as lines:
+            assert json.loads(lines.readline()) == {"listening": 0}
+            for _ in range(400):
+                rig.desks[0].send(0, bytes(1024))
+                time.sleep(0.001)
+            complete = [line for line in lines if line.endswith(b"\n")]
+    assert 0 < len(complete) < 400

@@ -8,7 +8,7 @@ import pytest
 
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.flood import MOST_HEADS, Flood
-from drone_mesh.communication.data.inbox import Inbox
+from drone_mesh.communication.data.inbox import MOST_PORTS, Inbox
 from drone_mesh.communication.data.ordering import PortOrder
 from drone_mesh.communication.data.outgoing import LIFETIME_S
 from drone_mesh.communication.data.packets import Head, Poll
@@ -45,12 +45,12 @@ class Receiver:
         done = self.latest.done >> ((self.latest.newest - number) & 0xFF) & 1
         return (self.latest.has == packets.COMPLETE, bool(done))
 
-    def first(self, number, now_s, session=OLD, size=4, order=None):
+    def first(self, number, now_s, session=OLD, size=4, order=None, behind=0, port=5):
         """The first fragment of a message arrives; returns what was delivered."""
         self.run(now_s)
         payload, order = bytes(size), number if order is None else order
-        check = packets.checksum(session, 5, order, payload)
-        head = Head(number, session, 5, size, True, 0, order, check)
+        check = packets.checksum(session, port, order, payload)
+        head = Head(number, session, port, size, True, behind, order, check)
         body = packets.first_body(head, payload, ROOM)
         return [whole.head.number for whole in self.inbox.fragment(0, body, now_s)]
 
@@ -119,6 +119,22 @@ def test_a_message_is_complete_for_as_long_as_its_sender_can_ask_for_it(heard, a
     for number in heard:
         receiver.first(number, 1.0, size=20)  # its second half is lost
     assert receiver.poll(7, after_s) == (complete, complete)
+
+
+def test_what_was_acknowledged_and_waits_is_delivered_when_its_sender_restarts():
+    receiver = Receiver()
+    receiver.first(0, 0.0)
+    assert receiver.first(2, 0.1, behind=1) == []
+    assert receiver.first(0, 1.0, session=NEW) == [2, 0]
+
+
+def test_a_port_on_which_messages_wait_is_not_forgotten_for_others():
+    receiver = Receiver()
+    receiver.first(0, 0.0)
+    assert receiver.first(2, 0.1, behind=1) == []
+    for port in range(6, 6 + 2 * MOST_PORTS):
+        receiver.first(3 + port, 0.2, order=0, port=port)
+    assert receiver.first(1, 0.3) == [1, 2]
 
 
 @pytest.mark.parametrize(("after_s", "is_new"), [(4.0, False), (6.0, True)])

@@ -87,6 +87,32 @@ def test_a_message_to_all_reaches_each_node_once(network):
     assert ticket.final
 
 
+def test_no_message_to_all_gets_an_ack_neither_twice_nor_in_part_nor_marked_as_reliable(network):
+    sent = []
+    network.nodes[0].antenna.send_message_to = lambda payload: bool(sent.append(payload)) or True
+    first = packets.first_body(Head(0, 7, 5, 70, True, 0, 0, 0), bytes(70), 27)
+    last = packets.further_body(0, 2, bytes(70), 27)
+    short = packets.first_body(
+        Head(1, 7, 5, 0, True, 0, 1, packets.checksum(7, 5, 1, b"")), b"", 27
+    )
+    for index, body in ((0, first), (2, last), (2, last), (0, short), (0, short)):
+        header = bytes((2, 1, packets.FRAGMENTS.start + index, 0, TO_ALL))
+        network.inject(0, (header + body).ljust(32, bytes(1)))
+    network.run_for(5.0)
+    assert [payload for payload in sent if is_data(payload) and payload[0] == 0] == []
+
+
+def test_a_gateway_without_internet_takes_its_own_messages_when_it_has_it_again(network):
+    network.internet(0, False)
+    network.run_for(40.0)
+    waiting = network.send(0, TO_GATEWAY, b"first")
+    network.internet(0, True)
+    second = network.send(0, TO_GATEWAY, b"second")
+    network.run_for(1.0)
+    assert payloads(network, 0) == [b"first", b"second"]
+    assert waiting.state is second.state is TicketState.DELIVERED
+
+
 def test_a_message_to_itself_is_delivered_at_once(network):
     assert network.send(2, 2, b"me").state is TicketState.DELIVERED
     assert payloads(network, 2) == [b"me"]
