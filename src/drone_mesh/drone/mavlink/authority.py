@@ -28,7 +28,7 @@ class Authority:
         permissions: Permissions,
     ) -> None:
         self.choice = ModeChoice(telemetry)
-        self._disarming = Disarming(telemetry)
+        self.disarming = Disarming(telemetry)
         self._telemetry = telemetry
         self._area = area
         self._limits = limits
@@ -40,7 +40,7 @@ class Authority:
         autopilot = self._telemetry.autopilot
         assert autopilot is not None  # otherwise the heartbeat is not the drone's
         lands = phase is Phase.LANDING or self._was_ordered_to_land(autopilot)
-        self._disarming.on_heartbeat(now_s, lands)
+        self.disarming.on_heartbeat(now_s, lands)
 
     def trouble(self, now_s: float) -> str:
         """Why no flight is possible now, under any control; empty if one is."""
@@ -87,7 +87,7 @@ class Authority:
         mode = self._why_not_leave(now_s, autopilot, bool(on_ground), for_repair)
         if mode:
             return mode
-        if self._disarming.by_others:
+        if self.disarming.by_others:
             own = autopilot.mode_name(autopilot.own_mode)
             return f"disarmed: its pilot has to arm, or choose {own} again"
         if not telemetry.armed and not may.may_arm:
@@ -124,10 +124,12 @@ class Authority:
         autopilot = telemetry.autopilot
         if trouble or autopilot is None:
             return trouble
-        if self._disarming.by_others and phase is not Phase.LANDING:
+        if self.disarming.by_others and phase is not Phase.LANDING:
             return "disarmed"
         mode = telemetry.mode
         if mode == autopilot.own_mode:
+            if phase in (Phase.TAKING_OFF, Phase.FLYING) and not telemetry.armed:
+                return "disarmed"
             return ""
         if phase is Phase.CHANGING_MODE and not self.choice.was_made_after(since_s):
             on_ground = bool(telemetry.on_ground(now_s))

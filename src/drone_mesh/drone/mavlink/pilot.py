@@ -34,6 +34,7 @@ NO_PROGRESS = "the last flight made no progress"
 STALLED_S = 20.0  # our choice: a flight that moves less than STALLED_M in this time has ended
 STALLED_M = 1.0  # our choice: more than the noise of a position
 _MODE_CHANGED = (mavlink.MAV_CMD_DO_SET_MODE, mavlink.MAV_RESULT_ACCEPTED)
+_ARMED = (mavlink.MAV_CMD_COMPONENT_ARM_DISARM, mavlink.MAV_RESULT_ACCEPTED)
 
 _log = logging.getLogger(__name__)
 
@@ -80,7 +81,7 @@ class MavlinkPilot:
             self._authority.on_heartbeat(now_s, self._phase)
         elif message.get_type() == "COMMAND_ACK":
             self._commander.on_ack(message, now_s)
-            self._on_ack(message)
+            self._on_ack(message, now_s)
         elif message.get_type() == "STATUSTEXT":
             self._commander.on_text(message)
         elif message.get_type() == "PARAM_VALUE":
@@ -182,8 +183,9 @@ class MavlinkPilot:
         ours = autopilot is not None and telemetry.mode == autopilot.own_mode
         in_air = telemetry.armed and telemetry.on_ground(now_s) is False
         if ours and in_air and here is not None and not telemetry.link_trouble(now_s):
-            self._hold = self._hold if was is Phase.HOLDING else self._area.within(here)
-            self._enter(Phase.HOLDING, now_s)
+            if was is not Phase.HOLDING:
+                self._hold = self._area.within(here)
+                self._enter(Phase.HOLDING, now_s)
         else:
             self._hold = None
             self._enter(Phase.IDLE, now_s)
@@ -191,11 +193,13 @@ class MavlinkPilot:
             self._ended = reason
             _log.warning("node %d: the flight ends: %s", self._node_id, reason)
 
-    def _on_ack(self, message: Message) -> None:
+    def _on_ack(self, message: Message, now_s: float) -> None:
         autopilot = self._telemetry.autopilot
-        done = (message.command, message.result) == _MODE_CHANGED
-        if done and self._phase is Phase.CHANGING_MODE and autopilot is not None:
+        done = message.command, message.result
+        if done == _MODE_CHANGED and self._phase is Phase.CHANGING_MODE and autopilot is not None:
             self._authority.choice.accepted(autopilot.own_mode)
+        elif done == _ARMED and self._phase is Phase.ARMING:
+            self._authority.disarming.accepted_to_arm(now_s)
 
     # The flight ------------------------------------------------------------------------------
 
@@ -244,6 +248,7 @@ class MavlinkPilot:
             self._send_target(self._area.here(now_s), now_s)
             if now_s - self._phase_since_s < TARGETS_BEFORE_MODE_S:
                 return
+        self._authority.disarming.ordered_own_mode(now_s)
         self._command(
             mavlink.MAV_CMD_DO_SET_MODE,
             (
@@ -260,7 +265,8 @@ class MavlinkPilot:
             autopilot = self._telemetry.autopilot
             if autopilot is not None and autopilot.wants_targets_beforehand:
                 self._send_target(self._area.here(now_s), now_s)
-            self._command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, (1.0,), now_s)
+            if not self._authority.disarming.is_settling:
+                self._command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, (1.0,), now_s)
         elif self._telemetry.on_ground(now_s):
             self._enter(Phase.TAKING_OFF, now_s)
         else:
@@ -324,6 +330,8 @@ class MavlinkPilot:
         is_new = now_s - self._phase_since_s < HOLD_TARGETS_S
         if is_new or autopilot.wants_targets_beforehand:
             self._send_target(self._hold, now_s)
+        else:
+            self._hold = self._goal = None  # it may be flown elsewhere, and be ordered back
 
     def _watch_progress(self, here: Location, now_s: float) -> None:
         """An autopilot drops targets beyond its fence without a word, and one may have crashed."""
