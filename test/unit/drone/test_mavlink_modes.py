@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from typing import Callable
+from typing import Any, Callable
 
 import pytest
-from mavlink_rig import ALL, ARDUPILOT, Rig, lift
+from mavlink_rig import ALL, ARDUPILOT, STEP_S, Rig, lift
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.autopilots import PX4, Autopilot, px4_mode
 from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions
 from drone_mesh.drone.mavlink.pilot_status import Phase
@@ -386,6 +387,113 @@ def test_a_drone_that_its_pilot_disarmed_in_the_air_during_an_ordered_landing_st
     rig.run(5.0)
     assert rig.status().why_not_repair.startswith("disarmed: its pilot has to arm")
     assert refuses(rig, rig.goal)
+
+
+@BOTH
+@pytest.mark.parametrize("asked", ["goal", "repair"])
+def test_nor_is_it_armed_by_what_is_asked_for_in_the_moment_after(
+    autopilot: Autopilot, asked: str
+) -> None:
+    rig = in_flight(autopilot)
+    rig.goal(30.0, 0.0, 0.0, lands=True)
+    rig.reach(Phase.LANDING)
+    rig.run_until("it sinks", lambda: rig.place.height < 7.0)
+    _kill(rig)
+    for _ in range(round(15.0 / STEP_S)):
+        refuses(rig, getattr(rig, asked))
+        rig.step()
+        assert not rig.vehicle.body.armed
+
+
+def test_nor_when_its_height_is_unknown_for_a_while() -> None:
+    rig = in_flight(ARDUPILOT)
+    rig.goal(30.0, 0.0, 0.0, lands=True)
+    rig.reach(Phase.LANDING)
+    rig.run_until("it sinks", lambda: rig.place.height < 7.0)
+    _kill(rig)
+    rig.vehicle.faults.estimate_good = False
+    rig.run(8.0)
+    rig.vehicle.faults.estimate_good = True
+    rig.run(3.0)
+    assert rig.status().why_not_repair.startswith("disarmed: its pilot has to arm")
+
+
+@BOTH
+def test_a_disarming_right_after_the_arming_counts(autopilot: Autopilot) -> None:
+    rig = Rig(autopilot)
+    rig.ready()
+    rig.goal(50.0, 0.0, 8.0)
+    rig.run_until("it arms", lambda: rig.vehicle.body.armed)
+    rig.run(0.2)
+    assert not rig.status().armed  # no heartbeat has told yet
+    rig.vehicle.body.armed = False
+    rig.run(12.0)
+    assert refuses(rig, rig.repair)
+    assert not rig.vehicle.body.armed
+
+
+@pytest.mark.parametrize("late_s", [0.1, 0.3, 0.6])
+def test_a_change_of_mode_that_was_ordered_before_gives_nothing_back(late_s: float) -> None:
+    rig = in_flight(ARDUPILOT, TAKE_BACK)
+    rig.vehicle.choose_mode(Mode.HOLD)
+    rig.run(3.0)
+    on_message, late = rig.vehicle.on_message, []
+
+    def delayed(message: Any, now_s: float) -> None:
+        is_mode = message.get_type() == "COMMAND_LONG"
+        if is_mode and message.command == mavlink.MAV_CMD_DO_SET_MODE:
+            late.append((now_s + late_s, message))
+        else:
+            on_message(message, now_s)
+
+    rig.vehicle.on_message = delayed
+    rig.goal(50.0, 0.0, 8.0)
+    rig.step()
+    (due_s, order), *_ = late
+    _kill(rig)
+    rig.run(due_s - rig.now_s)
+    on_message(order, rig.now_s)
+    rig.run(8.0)
+    assert rig.vehicle.mode is Mode.FOLLOW
+    assert refuses(rig, rig.goal)
+    assert rig.status().why_not_repair.startswith("disarmed: its pilot has to arm")
+
+
+def _flown_on() -> Rig:
+    """The mesh flew it to 20 m, and its ground station to 60 m."""
+    rig = in_flight(ARDUPILOT)
+    rig.goal(20.0, 0.0, 8.0)
+    rig.reach(Phase.HOLDING)
+    rig.run(5.0)
+    rig.vehicle._target = Location(60.0, 0.0, 8.0)
+    rig.run_until("it is there", lambda: rig.place.latitude > 59.9, within_s=60.0)
+    return rig
+
+
+def _empty_battery(rig: Rig) -> None:
+    rig.vehicle.body.battery_percent = 28.0
+
+
+def _sticks(rig: Rig) -> None:
+    rig.vehicle.faults.stick_us = 1700
+
+
+@pytest.mark.parametrize("reason", [_empty_battery, _sticks])
+def test_a_copter_that_was_flown_on_in_guided_is_not_flown_back_for_any_reason(
+    reason: Callable[[Rig], None],
+) -> None:
+    rig = _flown_on()
+    rig.down.sent.clear()
+    reason(rig)
+    rig.run(20.0)
+    assert rig.targets() == []
+    assert rig.place.latitude == pytest.approx(60.0, abs=0.1)
+
+
+def test_a_copter_that_was_flown_on_in_guided_flies_back_when_that_is_ordered() -> None:
+    rig = _flown_on()
+    rig.goal(20.0, 0.0, 8.0)
+    rig.run_until("it is back", lambda: rig.place.latitude < 21.0, within_s=60.0)
 
 
 @BOTH
