@@ -5,6 +5,7 @@ Also what the autopilot's home says about --origin.
 
 from __future__ import annotations
 
+import math
 import time
 from typing import Sequence
 
@@ -13,6 +14,7 @@ from drone_mesh.errors import ConfigurationError
 from drone_mesh.raspberry.options import Options
 
 WITHIN_S = 30.0  # our choice: to the first heartbeat, and again to the last parameter
+HOME_WITHIN_S = 6.0  # our choice: after the parameters; it comes every 2 s
 POLL_S = 0.05
 
 
@@ -32,12 +34,17 @@ def check_drone(options: Options) -> int:
         commander = Commander(telemetry, link.send)
         parameters = ParameterCheck(commander, telemetry)
         end_s = time.monotonic() + WITHIN_S
-        heard = False
-        while not parameters.is_done:
+        heard, done_s = False, math.inf
+        while True:
             now_s = time.monotonic()
+            if parameters.is_done:
+                done_s = min(done_s, now_s)
+                has_compared = options.flight.origin is None or telemetry.home is not None
+                if has_compared or now_s > done_s + HOME_WITHIN_S:
+                    break
             if telemetry.autopilot is not None and not heard:
                 heard, end_s = True, now_s + WITHIN_S
-            if now_s > end_s:
+            elif now_s > end_s and not parameters.is_done:
                 raise ConfigurationError(telemetry.link_trouble(now_s) or "no answer in 30 s")
             for message in link.receive(POLL_S):
                 is_ours = telemetry.on_message(message, now_s)
@@ -63,6 +70,8 @@ def check_drone(options: Options) -> int:
         print("  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip())
     origin = options.flight.origin
     doubts = FlightArea(telemetry, origin, options.flight.limits).doubts() if origin else ""
+    if origin is not None and telemetry.home is None:
+        doubts = "its home is not known yet, so --origin was not compared with it: GPS?"
     if doubts:
         print(doubts)
     return 0 if all(finding.is_safe for finding in parameters.findings) else 1
