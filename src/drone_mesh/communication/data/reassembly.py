@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import OrderedDict
 from typing import Callable, NamedTuple, Optional
 
@@ -12,6 +13,7 @@ EXPIRES_S = 60.0  # our choice: an incomplete message is dropped after this time
 MOST_PARTIAL = 24  # incomplete messages of one sender, which has at most 16 under way
 _LIVE = 64  # numbers: older messages are no longer under way
 DONE_S = 300.0  # our choice: longer than a sender retries (LIFETIME_S of outgoing.py)
+SILENCE_S = 5.0  # our choice: in less, a sender does not use 192 numbers that all get lost
 
 
 Open = Callable[[bytes, bytes], Optional[bytes]]
@@ -26,10 +28,14 @@ class Whole(NamedTuple):
 
 
 class _Done(NamedTuple):
-    """A message that was complete. Its number comes again after 256 messages."""
+    """A message that was complete. Its number comes again after 256 messages.
+
+    After a silence of its sender only its fragment 0 tells whether the number is still its own.
+    """
 
     fingerprint: tuple[int, ...]
     since_s: float
+    is_certain: bool = True
 
 
 class _Partial:
@@ -51,6 +57,7 @@ class Reassembly:
         self._open = open_message
         self._partial: OrderedDict[int, _Partial] = OrderedDict()  # by number, oldest first
         self._done: OrderedDict[int, _Done] = OrderedDict()  # the latest complete ones, by number
+        self._heard_s = -math.inf
 
     def add(self, index: int, body: bytes, now_s: float) -> Whole | None:
         """Add a fragment; returns the message if it is complete. Drops damaged messages."""
@@ -97,19 +104,28 @@ class Reassembly:
 
         Call `heard` before.
         """
-        done = self._done.get(body[0])
+        number = body[0]
+        done = self._done.get(number)
         if done is None:
             return False
-        if index == 0 and packets.head_of(body).fingerprint != done.fingerprint:
-            del self._done[body[0]]
+        if index > 0:
+            return done.is_certain
+        if packets.head_of(body).fingerprint != done.fingerprint:
+            del self._done[number]
             return False
+        self._done[number] = done._replace(is_certain=True)
+        self._partial.pop(number, None)
         return True
 
     def heard(self, number: int, now_s: float) -> None:
         """The sender uses this number: forget messages that it cannot have under way any more."""
         for other in [n for n in self._partial if _LIVE <= (number - n) & 255 < 192]:
             del self._partial[other]
+        was_silent = now_s - self._heard_s >= SILENCE_S
+        self._heard_s = now_s
         for other, done in list(self._done.items()):
+            if was_silent:
+                self._done[other] = done._replace(is_certain=False)
             if _LIVE <= (number - other) & 255 < 192 or now_s - done.since_s >= DONE_S:
                 del self._done[other]
 
@@ -122,7 +138,8 @@ class Reassembly:
 
     def has(self, number: int) -> int:
         """The fragments of a message that have arrived, as bits; COMPLETE for a complete one."""
-        if number in self._done:
+        done = self._done.get(number)
+        if done is not None and done.is_certain:
             return COMPLETE
         partial = self._partial.get(number)
         return partial.has if partial is not None else 0
@@ -136,11 +153,12 @@ class Reassembly:
 
     def newest_done(self) -> tuple[int, int]:
         """Number of the latest complete message, and the complete ones up to it as bits."""
-        if not self._done:
+        certain = [number for number, done in self._done.items() if done.is_certain]
+        if not certain:
             return 0, 0
-        newest = next(reversed(self._done))
+        newest = certain[-1]
         bits = 0
-        for number in self._done:
+        for number in certain:
             back = (newest - number) & 255
             if back < packets.DONE_BITS:
                 bits |= 1 << back
