@@ -42,17 +42,13 @@ class PortOrder:
         if self._next is None:
             self._next = oldest
             self._given_up.extend((oldest - n) & 0xFFFF for n in range(MOST_BEHIND, 0, -1))
-        if order in self._given_up and ahead(order, self._next) < 0:
+        if order in self._given_up:
             self._given_up.remove(order)
-            return [whole]
+            if ahead(order, self._next) < 0:
+                return [whole]
         if ahead(order, self._next) < 0 or order in self._held:
             return []
         self._held[order] = whole, now_s
-        missing = ahead(oldest, self._next)
-        for back in range(min(missing, MOST_BEHIND), 0, -1):
-            place = (oldest - back) & 0xFFFF
-            if place not in self._held:
-                self._given_up.append(place)
         return self._ready_up_to(oldest)
 
     def overdue(self, now_s: float) -> list[Whole]:
@@ -71,10 +67,13 @@ class PortOrder:
     def _ready_up_to(self, oldest: int) -> list[Whole]:
         """The held messages before `oldest`, and those from there up to the first gap.
 
-        Messages before `oldest` that are missing can no longer arrive.
+        Those before `oldest` that are missing are no longer waited for.
         """
         ready = []
         place = self._next if self._next is not None else oldest
+        for back in range(min(ahead(oldest, place), MOST_BEHIND), 0, -1):
+            if (oldest - back) & 0xFFFF not in self._held:
+                self._given_up.append((oldest - back) & 0xFFFF)
         while ahead(oldest, place) > 0 or place in self._held:
             held = self._held.pop(place, None)
             if held is not None:

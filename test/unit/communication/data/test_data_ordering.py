@@ -38,6 +38,13 @@ def test_a_message_before_the_first_that_arrived_is_delivered_once():
     assert taken(order, message(1), message(0), message(0), message(2)) == [[1], [0], [], [2]]
 
 
+def test_a_place_that_comes_again_after_the_wrap_is_delivered_once():
+    order = PortOrder()
+    for place in range(1 << 16):
+        order.take(message(place), 0.0)
+    assert taken(order, message(65521), message(65535), message(0), message(0)) == [[], [], [0], []]
+
+
 def test_the_order_continues_across_the_wrap():
     order = PortOrder()
     assert taken(order, message(65535), message(1, 1), message(0)) == [[65535], [], [0, 1]]
@@ -48,7 +55,7 @@ def test_a_message_that_waited_too_long_is_delivered_without_the_earlier_one():
     taken(order, message(7), message(9, behind=1))
     assert order.overdue(HOLD_S - 1) == []
     assert [whole.head.order for whole in order.overdue(HOLD_S)] == [9]
-    assert taken(order, message(8), message(10)) == [[], [10]]
+    assert taken(order, message(8), message(8), message(10)) == [[8], [], [10]]
 
 
 def test_without_acknowledgement_a_late_message_is_dropped():
