@@ -432,6 +432,31 @@ def test_a_disarming_right_after_the_arming_counts(autopilot: Autopilot) -> None
     assert not rig.vehicle.body.armed
 
 
+def test_a_flight_ends_for_a_node_that_missed_how_its_pilot_disarmed_and_gave_back() -> None:
+    rig = in_flight(ARDUPILOT)
+    vehicle, missed = rig.vehicle, []
+    for change in (_kill, lambda _rig: vehicle.choose_mode(Mode.PILOT), _gives_back):
+        change(rig)
+        for _ in range(round(1.2 / STEP_S)):
+            rig.now_s += STEP_S
+            vehicle._ground_station_s = rig.now_s  # its own pilot's
+            vehicle.tick(rig.now_s)
+        missed += rig.up.take()
+    for message in missed:
+        rig.pilot.on_message(message, rig.now_s)
+    rig.run(2.0)
+    vehicle.arm()
+    lift(vehicle, 3.0)
+    before = rig.place
+    rig.run(10.0)
+    assert rig.status().ended == "disarmed"
+    assert rig.place == before
+
+
+def _gives_back(rig: Rig) -> None:
+    rig.vehicle.choose_mode(Mode.FOLLOW)
+
+
 @pytest.mark.parametrize("late_s", [0.1, 0.3, 0.6])
 def test_a_change_of_mode_that_was_ordered_before_gives_nothing_back(late_s: float) -> None:
     rig = in_flight(ARDUPILOT, TAKE_BACK)
