@@ -90,6 +90,7 @@ class Inbox:
             return
         if poll.session == self._session:
             self._reassembly.heard(poll.number, now_s)
+            self._reassembly.asked_about(poll.number, poll.checksum)
         self._asked = poll
         self.ack_due_s = min(self.ack_due_s, now_s)
 

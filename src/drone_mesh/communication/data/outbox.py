@@ -289,14 +289,14 @@ class Outbox:
             return None
         assert self._latest is not None
         assert self._latest.head is not None
-        poll = Poll(self._session, NO_ANSWER, self._latest.head.number)
+        poll = Poll(self._session, NO_ANSWER, self._latest.head.number, self._latest.head.checksum)
         return DataPacket(packets.POLL, packets.poll_body(poll), self._latest, ends_train=True)
 
     def _asking(self, message: OutgoingMessage) -> DataPacket:
         assert message.head is not None
         self._nonce = self._nonce % 0xFF + 1
         message.nonce = self._nonce
-        poll = Poll(self._session, self._nonce, message.head.number)
+        poll = Poll(self._session, self._nonce, message.head.number, message.head.checksum)
         return DataPacket(packets.POLL, packets.poll_body(poll), message)
 
     def _partly(self, message: OutgoingMessage, ack: Ack, now_s: float) -> None:

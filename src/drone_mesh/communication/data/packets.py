@@ -34,7 +34,7 @@ _RELIABLE = 1 << _LENGTH_BITS
 _BEHIND_SHIFT = _LENGTH_BITS + 1
 MOST_BEHIND = (1 << 16 - _BEHIND_SHIFT) - 1
 _ACK = struct.Struct("<HBBQBI")
-_POLL = struct.Struct("<HBB")
+_POLL = struct.Struct("<HBBH")
 _TOKEN = struct.Struct("<H")
 
 
@@ -82,6 +82,7 @@ class Poll(NamedTuple):
     session: int
     nonce: int  # 1..255, different each time, so that no two have the same bytes; or NO_ANSWER
     number: int
+    checksum: int = 0  # of that message: its number comes again after 256
 
 
 COMPLETE = (1 << len(FRAGMENTS)) - 1  # as Ack.has

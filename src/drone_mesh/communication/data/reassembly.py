@@ -30,7 +30,7 @@ class Whole(NamedTuple):
 class _Done(NamedTuple):
     """A message that was complete. Its number comes again after 256 messages.
 
-    After a silence of its sender only its fragment 0 tells whether the number is still its own.
+    After a silence of its sender a fragment 0 or a POLL tells whether the numbers still stand.
     """
 
     fingerprint: tuple[int, ...]
@@ -113,9 +113,22 @@ class Reassembly:
         if packets.head_of(body).fingerprint != done.fingerprint:
             del self._done[number]
             return False
-        self._done[number] = done._replace(is_certain=True)
+        self._numbers_stand()
         self._partial.pop(number, None)
         return True
+
+    def asked_about(self, number: int, checksum: int) -> None:
+        """The sender asks for its message with this checksum. Call `heard` before."""
+        done = self._done.get(number)
+        if done is not None and done.fingerprint[-1] != checksum:
+            del self._done[number]
+        elif done is not None:
+            self._numbers_stand()
+
+    def _numbers_stand(self) -> None:
+        """The numbers have not gone round since the latest messages were complete."""
+        for number, done in self._done.items():
+            self._done[number] = done._replace(is_certain=True)
 
     def heard(self, number: int, now_s: float) -> None:
         """The sender uses this number: forget messages that it cannot have under way any more."""

@@ -62,8 +62,8 @@ def test_an_ack_and_a_poll_have_these_bytes_and_fit_the_smallest_space():
         "01 02 05 03 05 00 00 00 00 00 00 00 02 03 00 00 00"
     )
     assert packets.ack_of(packets.ack_body(ack)) == ack
-    poll = Poll(session=0x0201, nonce=5, number=3)
-    assert packets.poll_body(poll) == bytes.fromhex("01 02 05 03")
+    poll = Poll(session=0x0201, nonce=5, number=3, checksum=0x0706)
+    assert packets.poll_body(poll) == bytes.fromhex("01 02 05 03 06 07")
     assert packets.poll_of(packets.poll_body(poll)) == poll
     assert len(packets.ack_body(ack)) <= packets.LEAST_ROOM
 
