@@ -20,7 +20,7 @@ from drone_mesh.view.palette import LIGHT
 WIDTH_IN = 7.2  # the text width of A4; the page scales it
 # Okabe and Ito's palette, distinguishable for the colour-blind, without its yellow.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", LIGHT.ink)
-MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<")  # one more, so no pair comes again soon
+MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<")  # more than colours: no pair twice
 PANELS_PER_ROW = 2
 MOST_TICKS = 9
 

@@ -179,10 +179,13 @@ class _Client(socketserver.StreamRequestHandler):
             while not (self.server.stopping or self._is_gone()):
                 message = listener.next(_POLL_S)
                 if message is not None:
-                    self._write(in_json(message))  # a client that does not read is disconnected
+                    self._write(in_json(message))
                 if listener.dropped and not warned:
                     warned = True
                     _log.warning("node %d: a listener reads too slowly and loses messages", node)
+        except socket.timeout:  # after half a line, so nothing more can be told
+            text = "node %d: disconnects a listener that read nothing for %g s"
+            _log.warning(text, node, REQUEST_WITHIN_S)
         finally:
             listener.close()
             if warned:

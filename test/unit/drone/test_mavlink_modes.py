@@ -375,14 +375,20 @@ def test_a_disarmed_drone_is_given_back_by_choosing_guided_again() -> None:
     rig.reach(Phase.HOLDING)
 
 
-@BOTH
-def test_a_drone_that_its_pilot_disarmed_in_the_air_during_an_ordered_landing_stays_down(
-    autopilot: Autopilot,
-) -> None:
+def _sinks(autopilot: Autopilot) -> Rig:
+    """In the air, during an ordered landing."""
     rig = in_flight(autopilot)
     rig.goal(30.0, 0.0, 0.0, lands=True)
     rig.reach(Phase.LANDING)
     rig.run_until("it sinks", lambda: rig.place.height < 7.0)
+    return rig
+
+
+@BOTH
+def test_a_drone_that_its_pilot_disarmed_in_the_air_during_an_ordered_landing_stays_down(
+    autopilot: Autopilot,
+) -> None:
+    rig = _sinks(autopilot)
     _kill(rig)
     rig.run(5.0)
     assert rig.status().why_not_repair.startswith("disarmed: its pilot has to arm")
@@ -394,10 +400,7 @@ def test_a_drone_that_its_pilot_disarmed_in_the_air_during_an_ordered_landing_st
 def test_nor_is_it_armed_by_what_is_asked_for_in_the_moment_after(
     autopilot: Autopilot, asked: str
 ) -> None:
-    rig = in_flight(autopilot)
-    rig.goal(30.0, 0.0, 0.0, lands=True)
-    rig.reach(Phase.LANDING)
-    rig.run_until("it sinks", lambda: rig.place.height < 7.0)
+    rig = _sinks(autopilot)
     _kill(rig)
     for _ in range(round(15.0 / STEP_S)):
         refuses(rig, getattr(rig, asked))
@@ -406,10 +409,7 @@ def test_nor_is_it_armed_by_what_is_asked_for_in_the_moment_after(
 
 
 def test_nor_when_its_height_is_unknown_for_a_while() -> None:
-    rig = in_flight(ARDUPILOT)
-    rig.goal(30.0, 0.0, 0.0, lands=True)
-    rig.reach(Phase.LANDING)
-    rig.run_until("it sinks", lambda: rig.place.height < 7.0)
+    rig = _sinks(ARDUPILOT)
     _kill(rig)
     rig.vehicle.faults.estimate_good = False
     rig.run(8.0)

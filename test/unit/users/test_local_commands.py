@@ -235,7 +235,9 @@ def test_nobody_waits_for_a_message_that_was_given_up(rig):
     assert time.monotonic() - started_s < 30.0
 
 
-def test_a_listener_that_does_not_read_is_disconnected_and_gets_no_half_line(rig, monkeypatch):
+def test_a_listener_that_does_not_read_is_disconnected_with_a_line_in_the_log(
+    rig, monkeypatch, caplog
+):
     monkeypatch.setattr(local_socket._Client, "timeout", 0.2)
     with socket.socket(socket.AF_UNIX) as client:
         client.connect(str(socket_path(0)))
@@ -247,3 +249,4 @@ def test_a_listener_that_does_not_read_is_disconnected_and_gets_no_half_line(rig
                 time.sleep(0.001)
             complete = [line for line in lines if line.endswith(b"\n")]
     assert 0 < len(complete) < 400
+    assert "node 0: disconnects a listener that read nothing for 5 s" in caplog.messages

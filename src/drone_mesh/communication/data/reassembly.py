@@ -128,7 +128,8 @@ class Reassembly:
     def _numbers_stand(self) -> None:
         """The numbers have not gone round since the latest messages were complete."""
         for number, done in self._done.items():
-            self._done[number] = done._replace(is_certain=True)
+            if not done.is_certain:
+                self._done[number] = done._replace(is_certain=True)
 
     def heard(self, number: int, now_s: float) -> None:
         """The sender uses this number: forget messages that it cannot have under way any more."""
