@@ -3,21 +3,42 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import subprocess
+import sys
 import time
 import unittest
+from typing import Iterator
 
 import rospy
 import rostest
 from rostest_support import wait_for
 
-from drone_mesh.bench.overload import busy_loops
 from drone_mesh.msg import MeshEvent, MeshState
 
 DRONES = 100
 START_S = 100.0  # wall
 SIMULATED_S = 15.0  # each node checks its connection at least once
 WITHIN_S = 120.0  # wall; an eighth of full speed
+
+
+@contextlib.contextmanager
+def busy_loops(count: int) -> Iterator[None]:
+    """`count` processes that loop without waiting.
+
+    Each has its own session; otherwise the kernel's autogroups would give all of them together only
+    one share of the processor time.
+    """
+    command = [sys.executable, "-c", "while True: pass"]
+    loops = [subprocess.Popen(command, start_new_session=True) for _ in range(count)]
+    try:
+        yield
+    finally:
+        for loop in loops:
+            loop.kill()
+        for loop in loops:
+            loop.wait()
 
 
 class OverloadTest(unittest.TestCase):

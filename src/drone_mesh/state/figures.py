@@ -1,4 +1,4 @@
-"""Names of the figures in /diagnostics that the benchmark sums over processes."""
+"""Names of the figures that processes publish in /diagnostics."""
 
 from __future__ import annotations
 

@@ -8,10 +8,10 @@ import time
 from collections import Counter
 
 import pytest
+from wall_mesh import WallMesh
 
 from drone_mesh.communication.seals.keys import MeshKey
 from drone_mesh.inprocess import Network
-from drone_mesh.inprocess.wall_mesh import WallMesh
 from drone_mesh.mobility import Area, Mobility, tracks_of
 from drone_mesh.nrf24.emulator.links import IdealDisc, LinkModel, LogDistance
 from drone_mesh.nrf24.settings import RadioSettings

@@ -1,1 +1,0 @@
-"""The benchmark command: starts the system, measures it and prints the figures."""
