@@ -204,9 +204,9 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
 
     @abc.abstractmethod
     def _on_location(
-        self, node: int, location: Location, gateway: messages.GatewayPlace | None
+        self, node: int, location: Location, is_goal: bool, gateway: messages.GatewayPlace | None
     ) -> None:
-        """`node` reports its place, and perhaps that of a gateway."""
+        """`node` reports its place, or where it flies to, and perhaps the place of a gateway."""
 
     def _on_goal(self, neighbour: int, goal: Location) -> None:
         """A neighbour announces where it is about to fly."""
@@ -217,9 +217,9 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
     # Receiving: methods for types that every node handles, beside those of its parts -------------
 
     def receive_location(self, payload: bytes, creator: int, from_: int) -> None:
-        """A node's place, and perhaps that of a gateway."""
-        location = messages.place_in(payload)
-        self._on_location(creator, location, messages.GatewayPlace.from_payload(payload))
+        """A node's place or goal, and perhaps the place of a gateway."""
+        location, is_goal = messages.place_in(payload), messages.is_goal(payload)
+        self._on_location(creator, location, is_goal, messages.GatewayPlace.from_payload(payload))
         if creator == from_ and messages.addressee(payload) == BROADCAST:
             self._on_goal(creator, location)
 
@@ -270,10 +270,11 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
         self._neighbours.set_place(last.node, last.place, heard_s)
 
     def _send_location(self, asker: int) -> None:
-        location = self._pilot.goal or self._pilot.location()  # its destination counts
+        goal = self._pilot.goal
+        location = goal or self._pilot.location()
         if location is not None:
             me, now_s, places = self._node_id, self._deadlines.now_s, self.places
-            answer = messages.location(location, now_s, me, me, asker, asker)
+            answer = messages.own_location(location, goal is not None, now_s, me, asker)
             if places.gateway is not None:
                 gateway, age_s = self.get_preferred_gateway(), now_s - places.gateway_seen_s
                 extension = messages.GatewayPlace(gateway, places.gateway, age_s)

@@ -176,7 +176,9 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
     def _begin(self) -> None:
         self._internet.connect(self)
 
-    def _on_location(self, node: int, location: Location, gateway: GatewayPlace | None) -> None:
+    def _on_location(
+        self, node: int, location: Location, is_goal: bool, gateway: GatewayPlace | None
+    ) -> None:
         now_s = self._deadlines.now_s
         self._neighbours.set_place(node, location, now_s)
         if node == self.control.gateway:

@@ -106,12 +106,12 @@ class _TypedMessage:
 
 @dataclass(frozen=True)
 class LocationMessage(_TypedMessage, kind=MessageType.LOCATION):
-    """The position of its creator."""
+    """The position of its creator, or its goal in flight; see own_location."""
 
     latitude: float  # y, metres
     longitude: float  # x, metres
     height: int  # whole metres
-    time_since_posix: int  # whole seconds of the creator's clock
+    time_since_posix: int  # whole seconds of the creator's clock; highest bit: a goal
 
 
 @dataclass(frozen=True)
@@ -170,6 +170,9 @@ _REQUEST = int(MessageType.REQUESTLOCATION)
 _ASKER_PLACE = struct.Struct("<ffH")  # latitude, longitude, height + 1 and whether it flies there
 _NEW_REQUEST = struct.Struct(f"<{HEADER_BYTES}BffH{BODY_BYTES - _ASKER_PLACE.size}x")
 _FLIES_THERE = 2**15
+_GOAL = 2**31  # highest bit of the time in a LOCATION; nothing else uses that
+_GOAL_AT = HEADER_BYTES + LocationMessage.BODY.size - 1  # the byte with that bit
+_GOAL_BYTE = 2**7
 _ORDER_NUMBER = struct.Struct("<H")
 _ORDER_NUMBER_AT = HEADER_BYTES + GoToLocationMessage.BODY.size
 _FRAME_DIGEST = struct.Struct("<H")
@@ -333,6 +336,17 @@ def location(
     return _NEW_LOCATION.pack(
         creator, from_, _LOCATION, to, forward, latitude, longitude, height, time_s
     )
+
+
+def own_location(place: Location, is_goal: bool, now_s: float, me: int, to: int) -> bytes:
+    """A new LOCATION of node `me`: where it is, or its goal while it flies there."""
+    time_s = int(now_s) % _GOAL + is_goal * _GOAL
+    return location(place, time_s, me, me, to, to)
+
+
+def is_goal(location: bytes) -> bool:
+    """Whether the creator of a LOCATION is still on its way to the place in it."""
+    return location[_GOAL_AT] >= _GOAL_BYTE
 
 
 def request_for_place(creator: int, to: int, place: Location | None, flies_there: bool) -> bytes:

@@ -126,9 +126,13 @@ class MeshnetworkRouter(MeshnetworkComponent):
             about = None if gateway is None else gateway.place
             self._repair.on_bid(creator, bid.cost, from_, about)
 
-    def _on_location(self, node: int, location: Location, gateway: GatewayPlace | None) -> None:
+    def _on_location(
+        self, node: int, location: Location, is_goal: bool, gateway: GatewayPlace | None
+    ) -> None:
         now_s, control = self._deadlines.now_s, self.control
-        is_gateway, is_next_hop = node == control.gateway, node == control.next_hop()
+        is_gateway = node == control.gateway
+        # A gateway is followed to its goal; a relay's goal is not where this node had a link to it.
+        is_next_hop = node == control.next_hop() and (is_gateway or not is_goal)
         if is_gateway:
             control.gateway_sent_place()
         elif gateway is not None:

@@ -86,6 +86,18 @@ def test_decodes_what_the_original_encoded(name, arguments, wire):
     assert dataclasses.astuple(message) == pytest.approx(wanted, rel=1e-6)
 
 
+@pytest.mark.parametrize(("is_goal", "last_byte_of_time"), [(False, "7f"), (True, "ff")])
+@pytest.mark.parametrize("now_s", [0x7F030201, 0xFF030201])  # the second: after 2038
+def test_a_location_says_in_the_highest_bit_of_its_time_whether_it_is_a_goal(
+    is_goal, last_byte_of_time, now_s
+):
+    payload = messages.own_location(Location(1.5, -2.0, -3), is_goal, now_s, me=1, to=4)
+    body = f"00 00 c0 3f 00 00 00 c0 fd ff 01 02 03 {last_byte_of_time}"
+    assert payload == padded(f"01 01 01 04 04 {body}")
+    assert messages.is_goal(payload) is is_goal
+    assert messages.place_in(payload) == Location(1.5, -2.0, -3)
+
+
 @pytest.mark.parametrize(("name", "arguments", "wire"), VECTORS)
 def test_the_functions_without_objects_read_the_same_fields_as_the_classes(name, arguments, wire):
     payload, message = bytes.fromhex(wire), from_line(name, arguments)

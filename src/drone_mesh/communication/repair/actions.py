@@ -13,7 +13,7 @@ from drone_mesh.communication.messages import (
     GatewayPlace,
     MovementNegotiationMessage,
     addressed,
-    location,
+    own_location,
 )
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.parts import NodeParts
@@ -197,9 +197,8 @@ class RepairActions(abc.ABC):
         ask_for_place(self._parts, node)
 
     def announce_place(self, place: Location) -> None:
-        """Send the place where this drone is or will be to all nodes in range."""
-        me = self.node_id
-        packet = location(place, self.now_s, me, me, BROADCAST, BROADCAST)
+        """Send the place to which this drone flies to all nodes in range."""
+        packet = own_location(place, True, self.now_s, self.node_id, BROADCAST)
         self._parts.antenna.broadcast_message(packet)
 
     def present(self) -> None:

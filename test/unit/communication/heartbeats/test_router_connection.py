@@ -737,9 +737,10 @@ def test_a_router_that_takes_off_announces_its_goal():
     rig = shared_rig()
     rig.connect_through(2)
     rig.hear("00 02 06 01 01 00 00 80 3f")  # latitude 1
-    assert rig.broadcasts() == [packet("01 01 01 fe fe 00 00 80 3f")]
+    goal = packet("01 01 01 fe fe 00 00 80 3f 00 00 00 00 00 00 00 00 00 80")
+    assert rig.broadcasts() == [goal]
     rig.wait(0.2)
-    assert rig.broadcasts() == [packet("01 01 01 fe fe 00 00 80 3f")]
+    assert rig.broadcasts() == [goal]
     rig.wait(0.2)
     assert rig.broadcasts() == []
 

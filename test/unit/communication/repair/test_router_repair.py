@@ -86,6 +86,45 @@ def test_the_place_of_the_next_hop_is_the_one_to_step_back_to():
     assert rig.mesh.get_last_good_known_location_id() == 2
 
 
+def test_where_the_next_hop_flies_to_is_no_place_to_step_back_to_and_kept_clear_of():
+    rig = Rig()
+    rig.connect_through(2)
+    rig.hear(NEIGHBOUR_2_AT_0_8, "02 02 01 01 01 00 00 70 41 00 00 00 00 00 00 00 00 00 80")
+    assert rig.mesh.places.good == Location(8.0, 0.0, 0.0)
+    assert rig.mesh._neighbours.place_of(2).place == Location(15.0, 0.0, 0.0)
+
+
+def test_a_goal_farther_away_than_the_next_hop_can_stand_is_no_wrong_place():
+    rig = Rig()
+    rig.connect_through(2)
+    rig.hear("02 02 01 01 01 00 00 c8 42 00 00 00 00 00 00 00 00 00 80")  # 100 m to the north
+    assert rig.mesh._neighbours.place_of(2).place == Location(100.0, 0.0, 0.0)
+    assert not rig.mesh.complaints.counts
+
+
+def test_a_gateway_is_followed_to_where_it_flies():
+    rig = Rig()
+    rig.connect_to_gateway()
+    rig.hear(GATEWAY_AT_0_4, "00 00 01 01 01 00 00 c0 40 00 00 00 00 00 00 00 00 00 80")
+    assert rig.mesh.places.gateway == rig.mesh.places.good == Location(6.0, 0.0, 0.0)
+
+
+def test_a_drone_in_flight_answers_with_its_goal_and_says_so():
+    rig = Rig()
+    rig.know_neighbour(5)
+    rig.hear("00 05 06 01 01 00 00 80 3f 00 00 00 c0 07 00")
+    rig.antenna.taken.clear()
+    rig.hear("05 05 02 01 01")
+    (answer,) = rig.sent(LOCATION)
+    assert answer[:15] == bytes.fromhex("01 01 01 05 05 00 00 80 3f 00 00 00 c0 07 00")
+    assert answer[18] & 0x80
+    fly(rig, Location(1.0, -2.0, 7))
+    rig.antenna.taken.clear()
+    rig.hear("05 05 02 01 01")
+    (answer,) = rig.sent(LOCATION)
+    assert not answer[18] & 0x80
+
+
 def test_it_is_the_gateways_when_that_is_the_next_hop():
     rig = Rig()
     rig.connect_to_gateway()
