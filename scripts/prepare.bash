@@ -16,7 +16,7 @@ if [ -e "$noetic" ]; then
     ros-noetic-{rosbash,rosgraph-msgs,roslaunch,rosmsg,rosnode,rosparam,rospy,rosservice,rostest}
     ros-noetic-{rostopic,std-msgs,tf2-msgs,visualization-msgs}
   )
-  screen_packages=(iproute2 libgl1 mosquitto libxtst6 tshark xvfb)
+  screen_packages=(iproute2 libgl1 mosquitto tshark xvfb)
   browsers=()  # Ubuntu has Chromium as a snap only
   rviz_package=ros-noetic-rviz
 else
@@ -30,7 +30,7 @@ else
     python3-actionlib python3-diagnostic-updater
     python3-rospy python3-rostest
   )
-  screen_packages=(iproute2 libgl1 mosquitto libxtst6 tshark xvfb)
+  screen_packages=(iproute2 libgl1 mosquitto tshark xvfb)
   browsers=(chromium-headless-shell chromium)  # the first takes half of the processor time
   rviz_package=rviz
 fi

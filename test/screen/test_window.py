@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
-import logging
 import os
 import shutil
 import signal
@@ -96,23 +94,6 @@ def wait_until_shown(screen):
     wait_until(lambda: pixels_like(screen, LIGHT.gateway) > 100, "a gateway on the screen")
 
 
-def press(screen, key):
-    """Press a key over the middle of the window, as a keyboard would."""
-    try:
-        x11, xtest = ctypes.CDLL("libX11.so.6"), ctypes.CDLL("libXtst.so.6")
-    except OSError:
-        pytest.skip("libXtst, which presses keys, is not installed")
-    x11.XOpenDisplay.restype = ctypes.c_void_p
-    connection = ctypes.c_void_p(x11.XOpenDisplay(screen.encode()))
-    code = x11.XKeysymToKeycode(connection, ctypes.c_ulong(ord(key)))
-    xtest.XTestFakeMotionEvent(connection, -1, 600, 400, ctypes.c_ulong(0))
-    xtest.XTestFakeKeyEvent(connection, code, 1, ctypes.c_ulong(0))
-    x11.XSync(connection, 0)
-    time.sleep(0.3)  # how long the key stays pressed
-    xtest.XTestFakeKeyEvent(connection, code, 0, ctypes.c_ulong(0))
-    x11.XCloseDisplay(connection)
-
-
 @needs_screen
 def test_the_drones_are_on_the_screen_in_their_colours_until_it_is_stopped(screen, window):
     wait_until_shown(screen)
@@ -121,14 +102,6 @@ def test_the_drones_are_on_the_screen_in_their_colours_until_it_is_stopped(scree
     window.stop()
     # The screen's server notices it a moment later.
     wait_until(lambda: pixels_like(screen, LIGHT.gateway) == 0, "an empty screen")
-
-
-@needs_screen
-def test_q_closes_the_window_and_the_simulation_hears_of_it(screen, window, caplog):
-    caplog.set_level(logging.INFO)
-    wait_until_shown(screen)
-    press(screen, "q")
-    wait_until(lambda: "window was closed; the simulation continues" in caplog.text, "closed")
 
 
 @needs_screen

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
-from typing import Callable, Optional, Sequence, Tuple
+from typing import Sequence, Tuple
 
 import numpy as np
 
+from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.air.reach import MAX_DISTANCE_M
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.errors import MeshError
@@ -58,25 +59,24 @@ def check_topic(node_id: int, topic: str) -> None:
         raise AirError(f"node {node_id}: invalid topic name {topic[:60]!r}")
 
 
-Sees = Optional[Callable[[Position, np.ndarray], np.ndarray]]
-"""(3,) position, (n, 3) others in range, metres -> (n,) bool: which of them have a link to it."""
-
-
 class NodeTable:
     """The rules of the simulated air. Not thread-safe.
 
     docs/ros.md, "Wireless signal simulator" and "Sources of DroneInfo".
     """
 
-    def __init__(self, max_distance_m: float = MAX_DISTANCE_M, sees: Sees = None) -> None:
-        """`sees` decides about obstacles between nodes within range; None: there are no obstacles.
+    def __init__(
+        self, max_distance_m: float = MAX_DISTANCE_M, obstacles: Obstacles | None = None
+    ) -> None:
+        """Nodes within range of each other have a link unless `obstacles` cut it.
 
         Raises AirError unless the distance is a positive number.
         """
         if not max_distance_m > 0:
             raise AirError(f"invalid max_distance {max_distance_m}: must be above 0 metres")
+        self._range_m = max_distance_m
         self._reach_m2 = max_distance_m * max_distance_m
-        self._sees = sees
+        self._obstacles = obstacles
         self._nodes: dict[int, Node] = {}
         self._positions: dict[int, Position] = {}  # also of nodes that are not registered yet
         self._places: np.ndarray = np.zeros((MAX_NODE_ID + 1, 3))  # (id, xyz), metres
@@ -148,8 +148,7 @@ class NodeTable:
         distance_m2 = sum((a - b) * (a - b) for a, b in zip(here, there))
         if distance_m2 >= self._reach_m2:
             return None
-        sees = self._sees
-        if sees is None or sender == receiver or sees(here, self._places[[receiver]])[0]:
+        if sender == receiver or self._sees(here, there):
             return destination.topic
         return None
 
@@ -172,7 +171,10 @@ class NodeTable:
         apart = self._places - self._places[node_id]  # (id, xyz), metres
         near = (np.square(apart).sum(axis=1) < self._reach_m2) & self._hears
         near[node_id] = False
-        others = np.flatnonzero(near)
-        if self._sees is not None and len(others):
-            others = others[self._sees(self._positions[node_id], self._places[others])]
-        return tuple(int(other) for other in others)
+        here = self._positions[node_id]
+        others = (int(other) for other in np.flatnonzero(near))
+        return tuple(other for other in others if self._sees(here, self._positions[other]))
+
+    def _sees(self, here: Position, there: Position) -> bool:
+        obstacles = self._obstacles
+        return obstacles is None or obstacles.margin_db(here, there, self._range_m) > 0

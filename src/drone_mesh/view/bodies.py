@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from typing import NamedTuple, Sequence, Tuple
+from typing import Sequence, Tuple
 
 import numpy as np
 import pybullet
@@ -14,7 +14,7 @@ from drone_mesh.drone.roles import Role
 from drone_mesh.state.model import ObstacleStatus
 from drone_mesh.view.camera import Camera
 from drone_mesh.view.palette import FRAME, LIGHT, ROTOR, Colour, rgb
-from drone_mesh.view.quadrocopter import MOTORS, BodyPart, solid_of, turned_rad
+from drone_mesh.view.quadrocopter import BodyPart, solid_of
 from drone_mesh.view.scene import DronePicture, Scene, Shape
 from drone_mesh.view.solids import normal
 from drone_mesh.world.bullet_world import UPRIGHT
@@ -25,16 +25,6 @@ NOTHING = -1  # pybullet's body number for pixels without a body
 BASE = -1  # pybullet's number for a body without its links
 
 _Triangles = Tuple[Sequence[Vector], Sequence[Vector]]  # corners, and the normal at each
-
-_ROTORS = (2, 3, 4, 5)  # links of a flying drone, after its lamp and discs
-
-
-class _Link(NamedTuple):
-    """A part of a body, at a place on it; it may turn about the vertical axis."""
-
-    shape: int
-    place: Vector = (0.0, 0.0, 0.0)
-    turns: bool = False
 
 
 class Bodies:
@@ -55,26 +45,11 @@ class Bodies:
             return self._add(box, (), drone.centre(scale))
         frame = self._part_shape(BodyPart.FRAME, drone, FRAME, scale)
         lamp = self._part_shape(BodyPart.LAMP, drone, drone.colour, scale)
-        if not drone.is_flying:
-            blades = self._part_shape(BodyPart.BLADES, drone, FRAME, scale)
-            return self._add(frame, (_Link(lamp), _Link(blades)), drone.underside(scale))
-        discs = self._part_shape(BodyPart.DISCS, drone, ROTOR, scale)
-        rotor = self._part_shape(BodyPart.ROTOR, drone, FRAME, scale)
-        rotors = (_Link(rotor, (x * scale, y * scale, 0.0), True) for x, y in MOTORS)
-        links = (_Link(lamp), _Link(discs), *rotors)
-        body = self._add(frame, links, drone.underside(scale))
-        self.turn_rotors(body, drone, 0.0)
-        return body
-
-    def turn_rotors(self, body: int, drone: DronePicture, time_s: float) -> None:
-        """Turn the rotors of a drone to their angle at this time, if it flies."""
-        if drone.is_flying and self._shape is Shape.QUADROCOPTER:
-            pybullet.resetJointStatesMultiDof(
-                body,
-                _ROTORS,
-                [[turned_rad(time_s, motor) + 0.9 * motor] for motor in range(len(MOTORS))],
-                physicsClientId=self._client,
-            )
+        if drone.is_flying:
+            rotors = self._part_shape(BodyPart.DISCS, drone, ROTOR, scale)
+        else:
+            rotors = self._part_shape(BodyPart.BLADES, drone, FRAME, scale)
+        return self._add(frame, (lamp, rotors), drone.underside(scale))
 
     def move_drone(self, body: int, drone: DronePicture, scale: float) -> None:
         """Move a drone's body to its current position."""
@@ -99,7 +74,7 @@ class Bodies:
     def _add(
         self,
         shape: int,
-        links: Sequence[_Link],
+        links: Sequence[int],
         place: Sequence[float],
         orientation: Sequence[float] = UPRIGHT,
     ) -> int:
@@ -113,16 +88,13 @@ class Bodies:
                 list(orientation),
                 linkMasses=[0.0] * count,
                 linkCollisionShapeIndices=[-1] * count,
-                linkVisualShapeIndices=[link.shape for link in links],
-                linkPositions=[link.place for link in links],
+                linkVisualShapeIndices=list(links),
+                linkPositions=[(0.0, 0.0, 0.0)] * count,
                 linkOrientations=[UPRIGHT] * count,
                 linkInertialFramePositions=[(0.0, 0.0, 0.0)] * count,
                 linkInertialFrameOrientations=[UPRIGHT] * count,
                 linkParentIndices=[0] * count,
-                linkJointTypes=[
-                    pybullet.JOINT_REVOLUTE if link.turns else pybullet.JOINT_FIXED
-                    for link in links
-                ],
+                linkJointTypes=[pybullet.JOINT_FIXED] * count,
                 linkJointAxis=[(0.0, 0.0, 1.0)] * count,
                 physicsClientId=self._client,
             )

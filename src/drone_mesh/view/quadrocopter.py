@@ -30,7 +30,6 @@ class BodyPart(enum.Enum):
     LAMP = "lamp"  # in the colour of the drone's condition
     BLADES = "blades"  # of the rotors, at rest
     DISCS = "discs"  # the rotors as they look in flight
-    ROTOR = "rotor"  # the blades of one rotor, around the origin
 
 
 def solid_of(role: Role, part: BodyPart) -> Solid:
@@ -41,8 +40,6 @@ def solid_of(role: Role, part: BodyPart) -> Solid:
         return _gateway_lamp() if role is Role.GATEWAY else _router_lamp()
     if part is BodyPart.BLADES:
         return [triangle for motor in range(4) for triangle in rotor(motor, 0.6 + 0.9 * motor)]
-    if part is BodyPart.ROTOR:
-        return prism(bar(*blade_ends((0.0, 0.0), 0.0), BLADE_WIDTH_M), DISC_HIGH_M, ROTOR_HIGH_M)
     discs = (polygon(motor, ROTOR_RADIUS_M, 12) for motor in MOTORS)
     return [t for disc in discs for t in prism(disc, ROTOR_LOW_M, DISC_HIGH_M)]
 

@@ -69,7 +69,7 @@ class WindowProcess:
         # The new process must find this package even if only our sys.path has it.
         paths = [os.environ.get("PYTHONPATH", ""), str(Path(drone_mesh.__file__).parents[1])]
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "drone_mesh.view.show_window", str(theirs.fileno())],
+            [sys.executable, "-m", "drone_mesh.view.window_process", str(theirs.fileno())],
             env={**os.environ, "PYTHONPATH": os.pathsep.join(path for path in paths if path)},
             pass_fds=[theirs.fileno()],
             stdout=subprocess.DEVNULL,  # pybullet prints a lot
@@ -121,3 +121,22 @@ class WindowProcess:
                 shown = scene
             elif scenes.poll():  # it never sends anything, so this is the end of the pipe
                 return
+
+
+def _show_scenes(scenes: Connection) -> None:
+    """The window's process: show the scenes from the pipe until it ends or the window is closed."""
+    from drone_mesh.view.window import WorldWindow  # only here: the other side opens no window
+
+    window = WorldWindow()
+    try:
+        while window.is_open():
+            if scenes.poll(POLL_PERIOD_S):
+                window.show(scenes.recv())
+    except EOFError:
+        pass
+    finally:
+        window.close()
+
+
+if __name__ == "__main__":
+    _show_scenes(Connection(int(sys.argv[1])))

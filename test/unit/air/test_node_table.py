@@ -8,7 +8,9 @@ import random
 
 import pytest
 
+from drone_mesh.air.box import Box
 from drone_mesh.air.node_table import AirError, Node, NodeTable
+from drone_mesh.air.obstacles import Obstacles
 
 NOWHERE = (0.0, 0.0, 0.0)  # what an antenna gives as its position
 
@@ -180,3 +182,17 @@ def test_power_off_twice_moves_nothing():
     for _ in range(2):
         table.drone_info(0, NOWHERE, "", False)
     assert table.position(0) == (1.0, 2.0, 0.05)
+
+
+def test_a_wall_hides_nodes_from_each_other_until_one_flies_over_it():
+    table = NodeTable(9.0, Obstacles([Box((2.5, 0.0, 1.0), (0.2, 20.0, 2.0))]))
+    for node, x in ((1, 0.0), (2, 5.0), (3, 1.0)):
+        table.drone_info(node, (x, 0.0, 0.05), "", True)
+        table.drone_info(node, (0.0, 0.0, 0.0), f"/Node/{node}", True)
+    assert table.in_range(1) == (3,)
+    assert table.link(1, 2) is None
+    assert table.link(2, 1) is None
+    assert table.link(1, 1) == "/Node/1"  # an antenna's probe for its own registration
+    table.drone_info(2, (5.0, 0.0, 6.0), "", True)
+    assert table.in_range(1) == (2, 3)
+    assert table.link(2, 1) == "/Node/1"

@@ -12,7 +12,8 @@ import rospy
 from std_msgs.msg import Bool
 
 from drone_mesh import srv
-from drone_mesh.air.node_table import AirError, NodeTable, Sees
+from drone_mesh.air.node_table import AirError, NodeTable
+from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.communication.interfaces import PAYLOAD_BYTES
 from drone_mesh.communication.messages import readdressed, receiver
 from drone_mesh.msg import NRF24, DroneInfo
@@ -74,9 +75,9 @@ class WirelessSignalSimulator:
     # of topics and admits one antenna's DroneInfo at a time, so that the open topic is always the
     # one in the node table.
 
-    def __init__(self, max_distance_m: float, sees: Sees = None) -> None:
-        """`sees` as for NodeTable. Raises AirError for an invalid distance."""
-        self._nodes = NodeTable(max_distance_m, sees)
+    def __init__(self, max_distance_m: float, obstacles: Obstacles | None = None) -> None:
+        """`obstacles` as for NodeTable. Raises AirError for an invalid distance."""
+        self._nodes = NodeTable(max_distance_m, obstacles)
         self._lock = threading.Lock()
         self._opening = threading.Lock()
         self._antenna_topics: dict[str, AntennaTopic] = {}
@@ -231,15 +232,10 @@ def main() -> None:
     obstacles = or_exit(lambda: configured_obstacles(configuration))
     show_library_logs_on_rosout()
     max_distance_m = configuration.max_distance
-    sees = None
     if obstacles is not None and obstacles.boxes:
-        # Only here: without obstacles this node needs no physics.
-        from drone_mesh.world.ray_links import RayLinks
-
-        sees = RayLinks(obstacles, max_distance_m).sees
         verb = "block" if obstacles.blocks else "attenuate"
         _log.info("obstacles that %s the radio: %d", verb, len(obstacles.boxes))
-    WirelessSignalSimulator(max_distance_m, sees)
+    WirelessSignalSimulator(max_distance_m, obstacles)
     _log.info("nodes closer than %g m hear each other", max_distance_m)
     MasterWatch().start()
     rospy.spin()
