@@ -47,12 +47,12 @@ class StopRequest:
         """Whether the program was asked to end. Any thread."""
         return self._made
 
-    def wait(self, timeout_s: float) -> bool:
-        """Wait at most `timeout_s` seconds; returns whether the request was made. Any thread."""
+    def wait(self, timeout_s: float | None = None) -> bool:
+        """Wait, at most `timeout_s` seconds if given; returns whether it was made. Any thread."""
         if not self._made:
             poll = select.poll()  # select() takes no file descriptor above 1023
             poll.register(self._read_end, select.POLLIN)
-            poll.poll(max(0.0, timeout_s) * 1000.0)
+            poll.poll(None if timeout_s is None else max(0.0, timeout_s) * 1000.0)
         return self._made
 
     def close(self) -> None:

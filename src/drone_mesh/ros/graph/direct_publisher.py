@@ -19,13 +19,27 @@ class DirectPublisher(rospy.SubscribeListener):
     caller once the kernel's buffers are full: for `limit_s` at most, then it is disconnected.
     """
 
-    def __init__(self, topic: str, data_class: type[Message], limit_s: float) -> None:
-        """`limit_s`: wall seconds, below 1, for which one send may block."""
+    def __init__(
+        self,
+        topic: str,
+        data_class: type[Message],
+        limit_s: float,
+        headers: dict[str, str] | None = None,
+    ) -> None:
+        """`limit_s`: wall seconds, below 1, for which one send may block.
+
+        `headers`: further ones of its connections.
+        """
         self._timeval = struct.pack("@ll", 0, int(limit_s * 1e6))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SyntaxWarning)  # rospy warns about queue_size
             self._publisher = rospy.Publisher(
-                topic, data_class, subscriber_listener=self, tcp_nodelay=True, queue_size=None
+                topic,
+                data_class,
+                subscriber_listener=self,
+                tcp_nodelay=True,
+                headers=headers,
+                queue_size=None,
             )
 
     def peer_subscribe(self, _topic: str, _publish: object, _peer_publish: object) -> None:

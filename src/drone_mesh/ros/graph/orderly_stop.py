@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 import signal
 import sys
 import threading
@@ -22,26 +23,34 @@ class OrderlyStop:
 
     rospy would close all topics as soon as Ctrl-C is pressed, while threads still publish. Instead,
     SIGINT, SIGTERM and `rosnode kill` only ask the main thread to leave the `with` block, in which
-    it stops what it started; then ROS shuts down. After `fail` the program exits with code 1.
-    Create it in the main thread.
+    it stops what it started; then ROS shuts down. After `fail` the program exits with code 1, after
+    `begin_anew` it starts again. Create it in the main thread.
     """
 
     def __init__(self) -> None:
         self._request = StopRequest()  # its pipe is open to the end of the program
         self._finished = threading.Event()
-        self._failed = False
+        self._failed = self._begins_anew = False
+        self._told = False  # from outside
 
     def __enter__(self) -> OrderlyStop:
         for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, lambda _number, _frame: self._request.make())
+            signal.signal(number, lambda _number, _frame: self._tell())
         rospy.on_shutdown(self._on_shutdown)
         return self
 
     def __exit__(self, *exc: object) -> None:
         self._finished.set()
         rospy.signal_shutdown("finished")
-        if self._failed and exc[0] is None:
+        if exc[0] is not None:
+            return
+        if self._failed:
             sys.exit(1)
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, signal.SIG_DFL)
+        if self._begins_anew and not self._told:
+            sys.stdout.flush()
+            os.execv(sys.executable, [sys.executable, *sys.argv])
 
     def fail(self, why: str) -> None:
         """Log this error, leave, and exit with code 1. Any thread."""
@@ -49,15 +58,27 @@ class OrderlyStop:
         self._failed = True
         self._request.make()
 
+    def begin_anew(self) -> None:
+        """Leave, and start this program again, for another world. Any thread."""
+        if not self._begins_anew:
+            self._begins_anew = True
+            _log.warning("another world has begun: %s begins anew", rospy.get_name())
+            self._request.make()
+
     def requested(self) -> bool:
         """Whether it is time to leave. Any thread."""
         return self._request.is_made()
 
-    def wait(self, timeout_s: float) -> bool:
-        """Wait at most `timeout_s` wall seconds; returns whether the program should stop."""
+    def wait(self, timeout_s: float | None = None) -> bool:
+        """Wait, at most `timeout_s` wall seconds if given; returns whether to stop."""
         return self._request.wait(timeout_s)
 
     def _on_shutdown(self) -> None:
         """In the thread of rospy that shuts the node down, before its topics are closed."""
+        if not self._finished.is_set():
+            self._tell()
+            self._finished.wait(FINISH_TIMEOUT_S)
+
+    def _tell(self) -> None:
+        self._told = True
         self._request.make()
-        self._finished.wait(FINISH_TIMEOUT_S)

@@ -19,6 +19,7 @@ from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import location_msg, location_of
 from drone_mesh.ros.graph.logs import ThrottledLog
 from drone_mesh.ros.graph.persistent_service import PersistentService, ServiceGone, ServiceRefused
+from drone_mesh.ros.graph.run import Run, run_headers
 from drone_mesh.srv import RequestGPS, RequestGPSRequest, RequestGPSResponse
 
 CONNECT_AGAIN_AFTER_S = 1.0  # our choice: wall seconds; a request costs the worker's time
@@ -33,11 +34,15 @@ class RosDroneEngineConnector(IDroneEngine):
     """
 
     def __init__(
-        self, node_id: int, why_not_fly: Callable[[], str], obstacles: Obstacles | None = None
+        self,
+        node_id: int,
+        run: Run,
+        why_not_fly: Callable[[], str],
+        obstacles: Obstacles | None = None,
     ) -> None:
-        """`why_not_fly` returns why the drone cannot fly, empty if it can.
+        """`run` and `obstacles` are the world's.
 
-        `obstacles` are the world's.
+        `why_not_fly` returns why the drone cannot fly, empty if it can.
 
         The engine decides, but the topic of its goals has no reply, so goals that it
         would refuse are refused here as well.
@@ -50,7 +55,11 @@ class RosDroneEngineConnector(IDroneEngine):
         self._throttled_log = ThrottledLog(_log)
         # Latched: an order that arrives before rospy has connected to the engine must not be lost.
         self._goal = rospy.Publisher(
-            names.goal_topic(node_id), LocationMsg, queue_size=10, latch=True
+            names.goal_topic(node_id),
+            LocationMsg,
+            headers=run_headers(run),
+            queue_size=10,
+            latch=True,
         )
 
     def connect(self) -> None:

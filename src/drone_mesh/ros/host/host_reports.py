@@ -13,6 +13,7 @@ from drone_mesh.msg import HostReport, NodeState
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import event_msg, ros_time
 from drone_mesh.ros.graph.periodic import Periodic
+from drone_mesh.ros.graph.run import Run, run_headers
 from drone_mesh.ros.host.node_snapshots import NodeSnapshots, Worker
 from drone_mesh.state.events import EventBatcher
 
@@ -31,11 +32,14 @@ class HostReports(Periodic):
     each node, which does not change any more.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, run: Run) -> None:
+        """`run` is the world's."""
         super().__init__("host reports", REPORT_PERIOD_S)
         self._snapshots: NodeSnapshots[NodeState] = NodeSnapshots(REPORT_PERIOD_S)
         self._batcher = EventBatcher()
-        self._publisher = rospy.Publisher(names.REPORTS_TOPIC, HostReport, queue_size=REPORTS_QUEUE)
+        self._publisher = rospy.Publisher(
+            names.REPORTS_TOPIC, HostReport, headers=run_headers(run), queue_size=REPORTS_QUEUE
+        )
 
     def add(
         self,

@@ -47,7 +47,7 @@ class MeshHost:
         `on_failure` is called with the reason when a node cannot start. `place_of` is called in
         any thread. `radios`: virtual ones by default.
         """
-        self._reports = HostReports()
+        self._reports = HostReports(settings.run)
         self._settings = settings
         self._on_failure = on_failure
         self.executor = MeshExecutor(clock, clock_notifies=True, name="mesh_host")

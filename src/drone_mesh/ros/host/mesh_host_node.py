@@ -115,22 +115,23 @@ def main() -> None:
     start_node(main.__doc__, "mesh_host", disable_signals=True)
     show_library_logs_on_rosout()
     with OrderlyStop() as stop:
-        clock = FollowedClock()
+        clock = FollowedClock(stop.begin_anew)
         fleet_is_there = partial(rospy.has_param, names.FLEET_PARAM)
         _wait_for("DroneFactory to create the drones", fleet_is_there, stop.requested)
         _wait_for("its clock", lambda: clock.now_s > 0.0, stop.requested)
         if stop.requested():
             return
+        run = clock.run
         fleet = get_fleet_parameter()
         ids = or_exit(lambda: share_of_host(fleet, get_present_drones()))
         _log.info("serving %s", f"drones {ids.start}..{ids.stop - 1}" if ids else "no drones")
-        settings = or_exit(lambda: MeshSettings.of(fleet, _obstacles_of(fleet)))
+        settings = or_exit(lambda: MeshSettings.of(fleet, run, _obstacles_of(fleet)))
         places = ReportedPlaces()
         host = MeshHost(settings, lambda: clock.now_s, stop.fail, places.place_of)
         # The world waits for declared hosts only.
         rospy.set_param(names.host_param(rospy.get_name()), [ids.start, ids.stop - 1])
         MasterWatch(names.host_param(rospy.get_name())).start()
-        clock.drive(host)
+        clock.drive(host, run)
         host.start()
         try:
             host.wait_for_radios(stop.requested)

@@ -16,6 +16,7 @@ from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.configuration import FactoryConfiguration
 from drone_mesh.errors import ConfigurationError, naming_argument
 from drone_mesh.internet.mqtt_topics import PASSWORD_VARIABLE, Broker, parse_broker
+from drone_mesh.ros.graph.run import Run
 
 
 @dataclass(frozen=True)
@@ -23,6 +24,7 @@ class MeshSettings:
     """Settings of every node of a simulation: the configuration, and what its words stand for."""
 
     configuration: FactoryConfiguration
+    run: Run
     repair_options: RepairOptions
     timing: MeshTiming
     obstacles: Obstacles | None
@@ -31,9 +33,9 @@ class MeshSettings:
 
     @classmethod
     def of(
-        cls, configuration: FactoryConfiguration, obstacles: Obstacles | None = None
+        cls, configuration: FactoryConfiguration, run: Run, obstacles: Obstacles | None = None
     ) -> MeshSettings:
-        """The settings of this configuration. Raises ConfigurationError.
+        """The settings of this configuration, in this run. Raises ConfigurationError.
 
         `obstacles`: nodes refuse orders to places that these make unreachable.
         """
@@ -41,6 +43,7 @@ class MeshSettings:
         create_repair_strategy(configuration.repair)
         return cls(
             configuration,
+            run,
             repair_options=RepairOptions(
                 clearance_m=configuration.clearance,
                 range_m=configuration.max_distance,

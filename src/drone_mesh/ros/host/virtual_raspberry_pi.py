@@ -45,7 +45,9 @@ class VirtualRaspberryPi(abc.ABC):
         Raises ConfigurationError for a routing technique that does not exist."""
         configuration = settings.configuration
         self.node_id = node_id
-        self.engine = RosDroneEngineConnector(node_id, why_not_fly, settings.obstacles)
+        self.engine = RosDroneEngineConnector(
+            node_id, settings.run, why_not_fly, settings.obstacles
+        )
         self.slot = slot
         self.users = UsersDesk(node_id, slot.submit)
         self._users_of_node = UsersOfNode(self.users)

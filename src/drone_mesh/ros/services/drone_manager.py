@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import logging
-from typing import Sequence
+from typing import Callable, Sequence
 
 import actionlib
 import rospy
@@ -22,6 +22,7 @@ from drone_mesh.ros.graph.conversions import flight_order, location_of
 from drone_mesh.ros.graph.fleet_parameter import drones_if_known
 from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
 from drone_mesh.ros.graph.master_watch import MasterWatch
+from drone_mesh.ros.graph.orderly_stop import OrderlyStop
 from drone_mesh.ros.graph.parameters import manager_layouts, or_exit
 from drone_mesh.ros.graph.present_drones import PresentDrones
 from drone_mesh.ros.graph.waiting import comes_true
@@ -54,7 +55,8 @@ class DroneManager:
 
     # The handlers may run in parallel: the layouts never change, StandingLayouts has its own lock.
 
-    def __init__(self, layouts: Layouts) -> None:
+    def __init__(self, layouts: Layouts, on_other_run: Callable[[], None]) -> None:
+        """`on_other_run` is called, by a thread of rospy, when the world was replaced."""
         self._layouts = layouts
         self._gateways, self._sharing = (
             rospy.Publisher(
@@ -64,7 +66,9 @@ class DroneManager:
         )
         self._answers = OrderAnswers()
         self._standing = StandingLayouts(
-            functools.partial(self._publish, allow_shared_place=True), self._order_case
+            functools.partial(self._publish, allow_shared_place=True),
+            self._order_case,
+            on_other_run,
         )
         for name in (names.REQUEST_MOVEMENT_SERVICE, names.SHORT_REQUEST_MOVEMENT_SERVICE):
             rospy.Service(name, srv.RequestDroneFlight, self._request_movement)
@@ -293,11 +297,12 @@ def _check(order: Order) -> None:
 
 def main() -> None:
     """Run the node."""
-    start_node(DroneManager.__doc__, "DroneManager")
+    start_node(DroneManager.__doc__, "DroneManager", disable_signals=True)
     show_library_logs_on_rosout()
     layouts = or_exit(lambda: manager_layouts("~casus"))
-    DroneManager(layouts)
-    file = rospy.get_param("~casus", "") or "config/casus.yaml of this package"
-    _log.info("%d layouts: built-in ones, and those of %s", len(layouts.cases), file)
-    MasterWatch().start()
-    rospy.spin()
+    with OrderlyStop() as stop:
+        DroneManager(layouts, stop.begin_anew)
+        file = rospy.get_param("~casus", "") or "config/casus.yaml of this package"
+        _log.info("%d layouts: built-in ones, and those of %s", len(layouts.cases), file)
+        MasterWatch().start()
+        stop.wait()

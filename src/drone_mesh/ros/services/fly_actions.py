@@ -29,6 +29,7 @@ from drone_mesh.ros.graph.fleet_parameter import drones_if_known
 from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
 from drone_mesh.ros.graph.master_watch import NO_ANSWER, MasterWatch
 from drone_mesh.ros.graph.orderly_stop import OrderlyStop
+from drone_mesh.ros.graph.run import Run, run_of
 from drone_mesh.ros.services.flight_request import (
     FlightNotOrdered,
     FlightRefused,
@@ -82,6 +83,7 @@ class FlyActions:
         self._flights: list[_Flight] = []
         self._states: rospy.Subscriber | None = None
         self._nodes: dict[int, NodeState] = {}
+        self._run: Run | None = None  # of these nodes
         rospy.Subscriber(names.EVENTS_TOPIC, MeshEvent, self._later(self._take_event))
 
     def run(self, ended: Callable[[], bool]) -> None:
@@ -190,6 +192,11 @@ class FlyActions:
                 self._end(flight, _OUTCOMES[flight.progress.state], words)
 
     def _take_state(self, state: MeshState) -> None:
+        before, self._run = self._run, run_of(state)
+        if before not in (None, self._run):
+            for flight in list(self._flights):
+                self._end(flight, FlyResult.GIVEN_UP, "the simulation was restarted")
+            return
         self._nodes = {node.id: node for node in state.nodes}
         for flight in self._flights:
             node = self._nodes.get(flight.drone)
@@ -211,7 +218,7 @@ class FlyActions:
         self._flights.remove(flight)
         if not self._flights and self._states is not None:
             self._states.unregister()
-            self._states, self._nodes = None, {}
+            self._states, self._nodes, self._run = None, {}, None
 
 
 def main() -> None:

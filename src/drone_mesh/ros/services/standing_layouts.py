@@ -28,6 +28,7 @@ from drone_mesh.ros.graph.conversions import event_record, mesh_status
 from drone_mesh.ros.graph.fleet_parameter import get_fleet_parameter
 from drone_mesh.ros.graph.master_watch import NO_ANSWER
 from drone_mesh.ros.graph.parameters import configured_obstacles
+from drone_mesh.ros.graph.run import Run, run_of
 from drone_mesh.state.airspace import SWAY_M
 from drone_mesh.state.departures import FlightRules
 from drone_mesh.state.formation_preview import FormationPreview, preview
@@ -83,18 +84,22 @@ class StandingLayouts:
         self,
         order: Callable[[Sequence[Order]], None],
         begin: Callable[[int, bool, actionlib.ServerGoalHandle], object],
+        on_other_run: Callable[[], None],
     ) -> None:
         """`order` publishes orders; `begin` orders a layout for the goal of an action.
 
-        Both are called in threads of rospy. `begin` calls `give`, or raises rospy.ServiceException
-        with the reason if the layout cannot be ordered.
+        `on_other_run`: the world in which these were ordered is over. All are called in threads of
+        rospy. `begin` calls `give`, or raises rospy.ServiceException with the reason if the layout
+        cannot be ordered.
         """
         self._order = order
         self._begin = begin
+        self._on_other_run = on_other_run
         self._lock = threading.Lock()
         self._reporter = ThreadPoolExecutor(max_workers=1, thread_name_prefix="standing layouts")
         self._orders = StandingOrders()
         self._mesh: MeshStatus | None = None  # the latest state
+        self._run: Run | None = None  # of that state
         self._shown: dict[int, StandingProgress] = {}
         self._saved = ""
         self._handles: dict[int, actionlib.ServerGoalHandle] = {}
@@ -170,6 +175,10 @@ class StandingLayouts:
 
     def _state_came(self, state: MeshState) -> None:
         mesh = mesh_status(state)
+        before, self._run = self._run, run_of(state)
+        if before not in (None, self._run):
+            self._on_other_run()
+            return
         with self._lock:
             is_idle = not self._orders.all_progress()
         rules = FlightRules() if is_idle else _flight_rules()

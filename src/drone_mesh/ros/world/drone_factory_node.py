@@ -78,7 +78,9 @@ class RosSimulation:
         if self._parameters.configuration.drones == "external":
             ExternalEngines(self._factory)
         else:
-            engines = EngineServers(self._factory, self._happened.append)
+            engines = EngineServers(
+                self._factory, self._parameters.settings.run, self._happened.append
+            )
             for drone in self._factory.drones:
                 if stop.requested():
                     return
@@ -131,7 +133,8 @@ class RosSimulation:
         stop: OrderlyStop,
     ) -> None:
         configuration, world = self._parameters.configuration, self._world
-        runner = WorldRunner(world, configuration.real_time_factor, host)
+        run = self._parameters.settings.run
+        runner = WorldRunner(world, run, configuration.real_time_factor, host)
         obstacles = self._parameters.obstacles
         settings = MeshStatus(
             world.now_s,
@@ -148,7 +151,7 @@ class RosSimulation:
             now = replace(settings, stamp_s=world.now_s, real_time_factor=factor, paused=paused)
             return now, drone_views(self._factory.drones, now.stamp_s)
 
-        state = MeshStatePublisher(read_view, self._happened)
+        state = MeshStatePublisher(run, read_view, self._happened)
         state.start()
         watch = MasterWatch(names.FLEET_PARAM, names.SIM_TIME_PARAM)
         changes = FleetChanges(

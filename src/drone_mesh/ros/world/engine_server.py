@@ -17,6 +17,7 @@ from drone_mesh.msg import Location as LocationMsg
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import NO_POSITION, engine_info, gps_response, power_off_info
 from drone_mesh.ros.graph.logs import ThrottledLog
+from drone_mesh.ros.graph.run import Run, is_left_behind
 from drone_mesh.state.model import EventRecord
 from drone_mesh.world.engine import DroneState
 from drone_mesh.world.factory import DroneFactory, VirtualDrone
@@ -45,16 +46,19 @@ class EngineServer:
     def __init__(
         self,
         drone: VirtualDrone,
+        run: Run,
         report: Callable[[VirtualDrone], None],
         happened: Callable[[EventRecord], None],
     ) -> None:
-        """`report` publishes its position.
+        """`run` is the world's: goals of another run are not flown.
 
-        `happened` is called in any thread with each event of the drone.
+        `report` publishes the drone's position. `happened` is called in any thread with each of its
+        events.
         """
         self._happened = happened
         self._drone = drone
         self._node_id = drone.node_id
+        self._run = run
         self._engine = drone.engine
         self._report = report
         # The world's thread:
@@ -99,6 +103,8 @@ class EngineServer:
         return srv.FlyMissionResponse(True, "")
 
     def _goal(self, goal: LocationMsg) -> None:
+        if is_left_behind(goal, self._run):  # latched by a host that outlived its world
+            return
         try:
             self._engine.set_goal(goal.latitude, goal.longitude, goal.height)
         except GoalRefused as error:
@@ -128,9 +134,12 @@ class EngineServers(rospy.SubscribeListener):
     with one publisher. Any thread.
     """
 
-    def __init__(self, factory: DroneFactory, happened: Callable[[EventRecord], None]) -> None:
-        """`happened` as for EngineServer."""
+    def __init__(
+        self, factory: DroneFactory, run: Run, happened: Callable[[EventRecord], None]
+    ) -> None:
+        """`run` and `happened` as for EngineServer."""
         self._factory = factory
+        self._run = run
         self._happened = happened
         self._servers: dict[int, EngineServer] = {}
         self._publisher = rospy.Publisher(
@@ -144,7 +153,7 @@ class EngineServers(rospy.SubscribeListener):
 
     def offer(self, drone: VirtualDrone) -> None:
         """Offer the engine of this drone, and report its position."""
-        self._servers[drone.node_id] = EngineServer(drone, self._report, self._happened)
+        self._servers[drone.node_id] = EngineServer(drone, self._run, self._report, self._happened)
         self._report(drone)
 
     def withdraw(self, node_id: int) -> None:

@@ -20,6 +20,7 @@ from drone_mesh.ros.graph.parameters import (
     factory_configuration,
     manager_layouts,
 )
+from drone_mesh.ros.graph.run import new_run
 from drone_mesh.ros.host.mesh_settings import MeshSettings
 from drone_mesh.view.window_process import require_screen
 from drone_mesh.world.factory import check_starts
@@ -72,7 +73,7 @@ class FactoryParameters:
             )
         if configuration.radio == "nrf24":
             _check_emulated_radio(configuration, int(hosts))
-        settings = MeshSettings.of(configuration, obstacles)
+        settings = MeshSettings.of(configuration, new_run(), obstacles)
         return cls(configuration, settings, fleet, obstacles, missions, int(hosts))
 
 

@@ -14,6 +14,7 @@ from drone_mesh.msg import GroundedDrones, HostReport, LayoutProgress, MeshEvent
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import event_msg, state_msg
 from drone_mesh.ros.graph.periodic import Periodic
+from drone_mesh.ros.graph.run import Run, is_left_behind, run_headers
 from drone_mesh.ros.world.diagnostics import diagnostics_msg
 from drone_mesh.state.model import EventRecord, MeshStatus
 from drone_mesh.state.roster import DroneView, MeshRoster
@@ -41,12 +42,17 @@ class MeshStatePublisher(Periodic):
     rospy's handlers only put messages into queues; the object's thread owns everything else.
     """
 
-    def __init__(self, read_view: Callable[[], WorldView], happened: deque[EventRecord]) -> None:
-        """`read_view` is called in the thread of this object and must not wait for the world.
+    def __init__(
+        self, run: Run, read_view: Callable[[], WorldView], happened: deque[EventRecord]
+    ) -> None:
+        """`run` is the world's: reports of another run do not count.
+
+        `read_view` is called in the thread of this object and must not wait for the world.
 
         Any thread fills `happened` with events of the drones; this object empties it.
         """
         super().__init__("mesh state", WATCHED_PERIOD_S)
+        self._world_run = run
         self._read_view = read_view
         self._roster = MeshRoster()
         self._reports: deque[tuple[HostReport, float]] = deque(maxlen=REPORTS_KEPT)
@@ -54,7 +60,9 @@ class MeshStatePublisher(Periodic):
         self._last_state: tuple[float, float] | None = None  # wall, simulated
         self.latest: MeshStatus | None = None  # the last one; the next round changes its nodes
         self._published_s = self._diagnosed_s = float("-inf")
-        self._state = rospy.Publisher(names.STATE_TOPIC, MeshState, queue_size=1, latch=True)
+        self._state = rospy.Publisher(
+            names.STATE_TOPIC, MeshState, headers=run_headers(run), queue_size=1, latch=True
+        )
         self._events = rospy.Publisher(names.EVENTS_TOPIC, MeshEvent, queue_size=EVENTS_QUEUE)
         self._diagnostics = rospy.Publisher(names.DIAGNOSTICS_TOPIC, DiagnosticArray, queue_size=4)
         self._grounded = rospy.Publisher(
@@ -82,7 +90,8 @@ class MeshStatePublisher(Periodic):
             publisher.unregister()
 
     def _reported(self, report: HostReport) -> None:
-        self._reports.append((report, time.monotonic()))
+        if not is_left_behind(report, self._world_run):
+            self._reports.append((report, time.monotonic()))
 
     def _work(self) -> None:
         now_s = time.monotonic()

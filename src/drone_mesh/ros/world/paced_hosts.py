@@ -12,6 +12,7 @@ import rospy
 from drone_mesh.msg import HostProgress
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.logs import ThrottledLog
+from drone_mesh.ros.graph.run import Run, is_left_behind
 from drone_mesh.ros.host.mesh_host import MeshHost
 from drone_mesh.world.under_way import UnderWay
 
@@ -45,8 +46,9 @@ class PacedHosts:
     Threads of rospy fill `_progress` and `_strangers`; the world's thread owns everything else.
     """
 
-    def __init__(self, nodes: MeshHost | None) -> None:
-        """`nodes` are those of this process, or None."""
+    def __init__(self, run: Run, nodes: MeshHost | None) -> None:
+        """`run` is the world's. `nodes` are those of this process, or None."""
+        self._run = run
         self._nodes = nodes
         self._progress: dict[str, _Progress] = {}
         self._under_way = UnderWay()
@@ -97,6 +99,8 @@ class PacedHosts:
             self._nodes.time_advanced()
 
     def _reported(self, progress: HostProgress) -> None:
+        if is_left_behind(progress, self._run):  # a host that has not noticed this world yet
+            return
         reporter = progress._connection_header["callerid"]
         if reporter not in self._progress and not self._is_host(reporter):
             self._throttled_log.warning("progress ignored", f"{reporter} is not a host of nodes")

@@ -18,6 +18,7 @@ from drone_mesh.errors import FleetRefused
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import ros_time
 from drone_mesh.ros.graph.direct_publisher import DirectPublisher
+from drone_mesh.ros.graph.run import Run, run_headers
 from drone_mesh.ros.host.mesh_host import MeshHost
 from drone_mesh.ros.world.paced_hosts import PacedHosts
 from drone_mesh.srv import SetSpeed, SetSpeedRequest, SetSpeedResponse
@@ -49,15 +50,17 @@ class WorldRunner:
     time slows down, and no timer is late. Threads of rospy set `paused` and `wanted_factor`.
     """
 
-    def __init__(self, world: World, factor: float, nodes: MeshHost | None) -> None:
-        """`nodes` are those of this process, or None."""
+    def __init__(self, world: World, run: Run, factor: float, nodes: MeshHost | None) -> None:
+        """`run` is the world's. `nodes` are those of this process, or None."""
         self._world = world
-        self._hosts = PacedHosts(nodes)
+        self._hosts = PacedHosts(run, nodes)
         self.paused = False  # this and the next: read by any thread
         self.wanted_factor = factor  # simulated seconds per wall second; 0: as fast as possible
         self._tasks: deque[tuple[Callable[[], Any], Future[Any]]] = deque()
         self._over = threading.Event()
-        self._clock = DirectPublisher(names.CLOCK_TOPIC, Clock, STUCK_SUBSCRIBER_S)
+        self._clock = DirectPublisher(
+            names.CLOCK_TOPIC, Clock, STUCK_SUBSCRIBER_S, run_headers(run)
+        )
         self._factor = rospy.Publisher(names.FACTOR_TOPIC, Float32, latch=True, queue_size=1)
         rospy.Service(names.SPEED_SERVICE, SetSpeed, self._set_speed)
 
