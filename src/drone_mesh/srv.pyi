@@ -120,12 +120,14 @@ class OrderFormationRequest(Message):
     drones: bytes
     places: list[Location]
     at_once: bool
+    gateways: bytes
     def __init__(
         self,
         name: str = ...,
         drones: bytes | Sequence[int] = ...,
         places: Sequence[Location] = ...,
         at_once: bool = ...,
+        gateways: bytes | Sequence[int] = ...,
     ) -> None: ...
 
 class OrderFormationResponse(Message):

@@ -121,7 +121,7 @@ class InProcessMesh:
         self._order(orders)
         return f"ordered layout {case}"
 
-    def formation(self, name: str, orders: Sequence[Order]) -> str:
+    def formation(self, name: str, orders: Sequence[Order], gateways: Sequence[int]) -> str:
         self._order(orders)
         return f"{name}: ordered {len(orders)} of {len(orders)} drones"
 

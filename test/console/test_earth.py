@@ -73,6 +73,33 @@ def test_a_line_becomes_the_mission_of_the_selected_drone(page, tmp_path):
     assert page.page.input_value("#mission-height") == "5"
 
 
+def test_a_line_through_its_points_is_offered_as_a_mission_and_moves_nobody(page, tmp_path):
+    page.page.click("#nodes tr[data-id='3']")
+    line = [degrees(x, 4.0) for x in (1.0, 5.0, 9.0)]
+    points = [("Point", at, {"name": f"{n} "}) for n, at in enumerate(line)]
+    load(page, tmp_path / "way.json", geojson(*points, ("LineString", line, {})))
+    page.page.wait_for_selector("#toasts :text('way.json is a mission of one drone')")
+    assert page.page.inner_text("#mission-text") == "3 waypoints, drone 3"
+    assert not page.page.is_visible("#held")
+
+
+def test_a_gateway_moves_only_after_a_question(page, tmp_path):
+    drawn = geojson(
+        ("Point", degrees(-1.0, -6.0), {"name": "gateway 0"}),
+        ("Point", degrees(-3.0, -3.0), {"drone": 1}),
+    )
+    load(page, tmp_path / "field.geojson", drawn)
+    page.page.wait_for_selector("#confirm-text:text('Gateway 0 would fly')")
+    page.page.click("#confirm [value='']")
+    page.page.wait_for_timeout(300)
+    assert not page.page.is_visible("#held")
+    page.answer_held("#held-now")
+    load(page, tmp_path / "field.geojson", drawn)
+    page.page.click("#confirm [value=yes]")
+    page.wait_for_held()
+    page.page.wait_for_selector("#toasts :text('ordered 2 of 2 drones')")
+
+
 @pytest.mark.parametrize(
     ("name", "text", "why"),
     [

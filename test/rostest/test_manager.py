@@ -155,7 +155,7 @@ class ManagerTest(unittest.TestCase):
         self.listen(no_route=[4])
         places = [Location(1.5, 2.5, 3), Location(4.5, 5.5, 0)]
         answer = call(
-            "/DroneManager/orderFormation", OrderFormation, "field.kml", [3, 4], places, True
+            "/DroneManager/orderFormation", OrderFormation, "field.kml", [3, 4], places, True, []
         )
         self.assertEqual((list(answer.sent), list(answer.no_route)), ([3], [4]))
         self.assertEqual(answer.message, "ordered 1 of 2 drones; no route yet to drone 4")
@@ -169,7 +169,7 @@ class ManagerTest(unittest.TestCase):
             ([3, 4], "a\n", "printable"),
         ):
             with self.assertRaisesRegex(rospy.ServiceException, why):
-                call("/DroneManager/orderFormation", OrderFormation, name, drones, places, True)
+                call("/DroneManager/orderFormation", OrderFormation, name, drones, places, True, [])
 
     def test_what_is_no_order_is_refused_with_a_reason(self) -> None:
         self.listen()

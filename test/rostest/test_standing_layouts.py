@@ -11,6 +11,7 @@ import subprocess
 import tempfile
 import unittest
 from pathlib import Path
+from typing import Sequence
 
 import actionlib
 import rospy
@@ -22,6 +23,10 @@ from drone_mesh.layouts import Layouts
 from drone_mesh.msg import LayoutAction, LayoutFeedback, LayoutGoal, LayoutProgress, MeshState
 from drone_mesh.srv import OrderLayout, WithdrawLayout
 
+PLACES = (
+    ("drone 1", [5.1213562, 52.0907270]),  # x -3, y 3
+    ("the old oak", [5.1213708, 52.0907270]),  # x -2, y 3
+)
 FLIGHTS_S = 120  # wall; the longest takes less than 30 simulated seconds
 
 
@@ -115,6 +120,8 @@ class StandingLayoutsTest(unittest.TestCase):
         self.assertEqual(drawn.returncode, 0, drawn.stdout + drawn.stderr)
         self.assertIn("2 of 2 at their places", drawn.stdout)
         self.mesh.wait_at(9, -2.0, 3.0, within_s=5.0)
+        self.assertIn("drone 1 to x -3, y 3, z 0 m\ndrone 9 to x -2, y 3, z 0 m\n", drawn.stdout)
+        self.missions_and_gateways_stay()
         layout = subprocess.Popen(  # 17 is off and elsewhere, since the test before
             ["rosrun", "drone_mesh", "layout", "17"], stdout=subprocess.PIPE, text=True
         )
@@ -129,18 +136,27 @@ class StandingLayoutsTest(unittest.TestCase):
             self.assertEqual(refused.returncode, 2)
             self.assertIn("invalid value", refused.stderr)
 
-    def drawing(self) -> str:
+    def missions_and_gateways_stay(self) -> None:
+        """Points "0 " and "1 " of a ground station's mission are no drones, and move nobody."""
+        line = {"type": "LineString", "coordinates": [at for _name, at in PLACES]}
+        mission = self.drawing([("0 ", PLACES[0][1]), ("1 ", PLACES[1][1])], line)
+        refused = run("layout", "--file", mission)
+        self.assertEqual(refused.returncode, 2, refused.stdout)
+        self.assertIn("a mission of one drone, as a line goes through its 2", refused.stderr)
+        gateway = self.drawing([("gateway 0", PLACES[0][1])])
+        refused = run("layout", "--file", gateway)
+        self.assertEqual(refused.returncode, 2, refused.stdout)
+        self.assertRegex(refused.stderr, r"would move gateway 0: .*--gateway")
+        moved = run("layout", "--file", gateway, "--gateway", "0")
+        self.assertIn("drone 0 to x -3", moved.stdout, moved.stderr)
+        self.assertNotEqual(moved.returncode, 2)
+
+    def drawing(self, points: Sequence[tuple[str, object]] = PLACES, *geometries: object) -> str:
         """A file of another program: a place for drone 1, and one for the nearest, which is 9."""
+        drawn = [(name, {"type": "Point", "coordinates": place}) for name, place in points]
         features = [
-            {
-                "type": "Feature",
-                "properties": {"name": name},
-                "geometry": {"type": "Point", "coordinates": place},
-            }
-            for name, place in (
-                ("drone 1", [5.1213562, 52.0907270]),  # x -3, y 3
-                ("the old oak", [5.1213708, 52.0907270]),  # x -2, y 3
-            )
+            {"type": "Feature", "properties": {"name": name}, "geometry": geometry}
+            for name, geometry in [*drawn, *(("", geometry) for geometry in geometries)]
         ]
         path = Path(tempfile.mkdtemp()) / "field.geojson"
         path.write_text(json.dumps({"type": "FeatureCollection", "features": features}))

@@ -35,8 +35,8 @@ class MeshControls:
         """Order all drones of a layout to their positions."""
         raise self._refusal("layout")
 
-    def formation(self, name: str, orders: Sequence[Order]) -> str:
-        """Order drones to the places of a formation with this name."""
+    def formation(self, name: str, orders: Sequence[Order], gateways: Sequence[int]) -> str:
+        """Order drones, of gateways only `gateways`, to the places of a formation of this name."""
         raise self._refusal("formation")
 
     def preview(self, case: int) -> FormationPreview:

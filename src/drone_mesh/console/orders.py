@@ -34,6 +34,7 @@ NodeOrNone = Optional[NodeId]
 Coordinate = Annotated[float, Field(ge=-MAX_COORDINATE_M, le=MAX_COORDINATE_M, allow_inf_nan=False)]
 Height = Annotated[float, Field(ge=0, le=MAX_HEIGHT_M, allow_inf_nan=False)]
 NodeIds = Annotated[List[NodeId], Field(min_length=1, max_length=MAX_DRONES)]
+Gateways = Annotated[List[NodeId], Field(max_length=MAX_DRONES)]
 Waypoints = Annotated[
     List[Tuple[Coordinate, Coordinate]], Field(min_length=1, max_length=MOST_WAYPOINTS)
 ]
@@ -68,7 +69,7 @@ def places_of(orders: Iterable[Order]) -> list[Place]:
 
 
 class FileContent(NamedTuple):
-    """What the page may fly: places of drones, and ways over x, y, z in metres."""
+    """What the page may fly: places of drones, or ways over x, y, z in metres."""
 
     places: Sequence[AnyPlace]
     ways: Sequence[Sequence[Vector]]
@@ -134,15 +135,16 @@ class _Layout(PageOrder):
 
 
 class _Formation(PageOrder):
-    """Send these drones to places of their own."""
+    """Send these drones to places of their own; of gateways only those that the user agreed to."""
 
     do: Literal["formation"]
     name: str = Field(min_length=1, max_length=MAX_NAME)
     places: Places
+    gateways: Gateways = []
 
     def carry_out(self, controls: MeshControls) -> str:
         orders = [Order(drone, Location(y, x, z)) for drone, x, y, z in self.places]
-        return controls.formation(self.name, orders)
+        return controls.formation(self.name, orders, self.gateways)
 
     def drones(self, layouts: Sequence[LayoutOffer]) -> Sequence[int]:
         return [place[0] for place in self.places]
@@ -223,10 +225,9 @@ class ReadPlaces(_Answered):
 
 
 def _content_of(found: Placemarks) -> FileContent:
-    return FileContent(
-        [(point.drone, *point.place.to_vector()) for point in found.points],
-        [[place.to_vector() for place in path.places] for path in found.paths],
-    )
+    if found.points and not found.is_mission:
+        return FileContent([(point.drone, *point.place.to_vector()) for point in found.points], [])
+    return FileContent([], [[place.to_vector() for place in path.places] for path in found.paths])
 
 
 class PreviewLayout(_Answered):

@@ -25,11 +25,16 @@ __all__ = [
 MAX_CHARACTERS = 300_000  # our choice: 254 places of a program that writes a style for each
 WRITERS = {"geojson": geojson_of, "kml": kml_of}
 _READERS = {".geojson": read_geojson, ".json": read_geojson, ".kml": read_kml}
+_OTHERS = {  # what drone programs save beside these
+    ".kmz": "a compressed file: unzip it, and give the KML in it",
+    ".plan": "a plan of QGroundControl, not GeoJSON or KML: export it there as KML",
+    ".waypoints": "a waypoint file of Mission Planner (QGC WPL), not GeoJSON or KML",
+}
 
 
 def is_earth_file(name: str) -> bool:
-    """Whether a file of this name is for `read_placemarks`, which also refuses KMZ."""
-    return name.lower().endswith((*_READERS, ".kmz"))
+    """Whether a file of this name is for `read_placemarks`, which refuses some by name."""
+    return name.lower().endswith((*_READERS, *_OTHERS))
 
 
 def read_placemarks(text: str, name: str, origin: Origin | None) -> Placemarks:
@@ -38,8 +43,8 @@ def read_placemarks(text: str, name: str, origin: Origin | None) -> Placemarks:
     Raises ConfigurationError, one line that begins with `name`.
     """
     ending = name[name.rfind(".") :].lower()
-    if ending not in _READERS:
-        raise ConfigurationError(f"{name}: a compressed file: unzip it, and give the KML in it")
+    if ending in _OTHERS:
+        raise ConfigurationError(f"{name}: {_OTHERS[ending]}")
     if origin is None:
         raise ConfigurationError(f"{name}: its places are in degrees: that needs an origin")
     if len(text) > MAX_CHARACTERS:

@@ -6,17 +6,27 @@ import json
 import reprlib
 from typing import Any, Iterator, Mapping
 
+from drone_mesh.drone.fleet import MAX_DRONES
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.location import Location
-from drone_mesh.earth_files.placemarks import Path, Placemarks, drone_named, on_earth, place_on
+from drone_mesh.earth_files.placemarks import (
+    Placemarks,
+    drone_named,
+    drone_with,
+    on_earth,
+    place_on,
+)
 from drone_mesh.errors import ConfigurationError
+
+_LINES_AND_POINTS = ("Point", "MultiPoint", "LineString", "MultiLineString")
+_SHAPES = (*_LINES_AND_POINTS, "Polygon", "MultiPolygon", "GeometryCollection")
 
 
 def read_geojson(text: str, origin: Origin) -> Placemarks:
-    """Points and lines; their properties `drone` or `name` name the drone, `height` its height.
+    """Points and lines; the properties `drone` (or `id`) or `name` name the drone.
 
-    `height`: metres above the origin. Without it and a third coordinate: 0. Other shapes are left
-    out. Raises ConfigurationError.
+    `height`: metres above the origin. Without it and a third coordinate: 0. Areas are left out.
+    Raises ConfigurationError.
     """
     try:
         content = json.loads(text)
@@ -59,6 +69,8 @@ def _features(content: Any) -> Iterator[Any]:
         yield from content["features"]
     elif kind == "Feature":
         yield content
+    elif kind in _SHAPES:
+        yield {"geometry": content}
     else:
         raise ConfigurationError("not GeoJSON: expected a FeatureCollection")
 
@@ -69,27 +81,47 @@ def _add(found: Placemarks, feature: Any, origin: Origin) -> None:
     properties, geometry = feature.get("properties") or {}, feature.get("geometry") or {}
     if not isinstance(properties, dict) or not isinstance(geometry, dict):
         raise ConfigurationError("expected properties and a geometry")
+    drone, height = _drone(properties), properties.get("height")
+    for kind, coordinates in _shapes(geometry):
+        parts = _list(coordinates) if kind.startswith("Multi") else [coordinates]
+        for part in parts:
+            if kind.endswith("Point"):
+                found.add_point(drone, _place(part, height, origin))
+            else:
+                places = [_place(position, height, origin) for position in _list(part)]
+                found.add_path(drone, places)
+
+
+def _drone(properties: Mapping[str, Any]) -> int | None:
     named = properties.get("drone")
-    drone = drone_named(str(properties.get("name") or "") if named is None else str(named))
-    if named is not None and drone is None:
-        raise ConfigurationError(f"the property drone is {reprlib.repr(named)}, not an id")
-    height = properties.get("height")
-    kind, coordinates = geometry.get("type"), geometry.get("coordinates")
-    if kind == "Point":
-        found.add_point(drone, _place(coordinates, height, origin))
-    elif kind == "MultiPoint":
-        for position in _list(coordinates):
-            found.add_point(drone, _place(position, height, origin))
-    elif kind in ("LineString", "MultiLineString"):
-        lines = [coordinates] if kind == "LineString" else _list(coordinates)
-        for line in lines:
-            places = [_place(position, height, origin) for position in _list(line)]
-            found.paths.append(Path(drone, places))
+    if named is not None:
+        drone = drone_with(str(named))
+        if drone is None:
+            raise ConfigurationError(f"the property drone is {reprlib.repr(named)}, not an id")
+        return drone
+    number = properties.get("id")  # other programs keep words and large numbers in it, too
+    if type(number) is int and 0 <= number < MAX_DRONES:
+        return number
+    return drone_named(str(properties.get("name") or ""))
 
 
-def _list(value: Any) -> list[Any]:
+def _shapes(geometry: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Its points and lines, with those in collections."""
+    waiting = [geometry] if geometry else []
+    while waiting:
+        shape = waiting.pop()
+        kind = shape.get("type") if isinstance(shape, dict) else None
+        if kind not in _SHAPES:
+            raise ConfigurationError(f"{reprlib.repr(shape)} is not a geometry")
+        if kind == "GeometryCollection":
+            waiting += reversed(_list(shape.get("geometries"), "geometries"))
+        elif kind in _LINES_AND_POINTS:
+            yield kind, shape.get("coordinates")
+
+
+def _list(value: Any, what: str = "coordinates") -> list[Any]:
     if not isinstance(value, list):
-        raise ConfigurationError(f"coordinates {reprlib.repr(value)} are not a list")
+        raise ConfigurationError(f"{what} {reprlib.repr(value)} are not a list")
     return value
 
 

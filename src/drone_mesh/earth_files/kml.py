@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Iterator, Sequence
+from typing import Iterable, Iterator, Sequence
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.location import Location
-from drone_mesh.earth_files.placemarks import Path, Placemarks, drone_named, on_earth, place_on
+from drone_mesh.earth_files.placemarks import Placemarks, drone_named, on_earth, place_on
 from drone_mesh.errors import ConfigurationError
 
 _NAMESPACE = "http://www.opengis.net/kml/2.2"
 
 
 def read_kml(text: str, origin: Origin) -> Placemarks:
-    """The points and lines of all placemarks; a name such as "3" or "drone 3" names the drone.
+    """The points, lines and recorded tracks of all placemarks; "drone 3" names the drone.
 
     Heights as their `altitudeMode` says: above the origin, above sea level, or (as without it) 0.
-    Other shapes are left out. Raises ConfigurationError.
+    Areas are left out. Raises ConfigurationError.
     """
     if "<!DOCTYPE" in text or "<!ENTITY" in text:  # entities may expand without bounds
         raise ConfigurationError("declares a document type or entities, which KML does not need")
@@ -34,10 +34,15 @@ def read_kml(text: str, origin: Origin) -> Placemarks:
         try:
             drone = drone_named(name)
             for shape in _all(mark, "Point"):
-                for place in _places(shape, origin)[:1]:
-                    found.add_point(drone, place)
+                places = _places(shape, origin)
+                if len(places) != 1:
+                    raise ConfigurationError(f"a point with {len(places)} places")
+                found.add_point(drone, places[0])
             for shape in _all(mark, "LineString"):
-                found.paths.append(Path(drone, _places(shape, origin)))
+                found.add_path(drone, _places(shape, origin))
+            for shape in _all(mark, "Track"):  # of Google: gx:coord has blanks between its numbers
+                positions = (",".join((one.text or "").split()) for one in _all(shape, "coord"))
+                found.add_path(drone, _places(shape, origin, positions))
         except ConfigurationError as error:
             raise ConfigurationError(f"placemark {(name or '')[:40]!r}: {error}") from error
     return found
@@ -81,10 +86,13 @@ def _text(element: Element, tag: str) -> str:
     return next((one.text or "" for one in element if _tag(one) == tag), "").strip()
 
 
-def _places(shape: Element, origin: Origin) -> list[Location]:
+def _places(
+    shape: Element, origin: Origin, positions: Iterable[str] | None = None
+) -> list[Location]:
+    """Its places, whose `positions` are by default its coordinates."""
     mode = _text(shape, "altitudeMode")
     places = []
-    for position in _text(shape, "coordinates").split():
+    for position in _text(shape, "coordinates").split() if positions is None else positions:
         try:
             longitude, latitude, *rest = (float(number) for number in position.split(","))
         except ValueError:

@@ -15,7 +15,8 @@ from drone_mesh.errors import ConfigurationError, GoalRefused
 
 STEP_M = 0.5  # our choice: a track has a place whenever the drone has moved so far
 MOST_PLACES = 20_000  # of all tracks
-_NAMED = re.compile(r"(?:(?:drone|node|router)\s*)?(\d{1,3})", re.IGNORECASE)
+_ID = re.compile(r"[0-9]{1,3}")
+_NAMED = re.compile(r"(?:drone|node|router|gateway)\s*([0-9]{1,3})", re.IGNORECASE)
 
 
 class Point(NamedTuple):
@@ -46,12 +47,39 @@ class Placemarks:
             raise ConfigurationError(f"drone {drone} has two places")
         self.points.append(Point(drone, place))
 
+    def add_path(self, drone: int | None, places: Sequence[Location]) -> None:
+        """Raises ConfigurationError for a line that leads nowhere."""
+        if len(places) < 2:
+            raise ConfigurationError(f"a line with {len(places)} places: it needs two")
+        self.paths.append(Path(drone, places))
+
+    @property
+    def is_mission(self) -> bool:
+        """Whether lines go through its points: then these are the waypoints of one drone each.
+
+        Ground stations save a mission so. Points that name a drone are places.
+        """
+        corners = {_metre(place) for path in self.paths for place in path.places}
+        through = sum(
+            point.drone is None and not corners.isdisjoint(_metres_around(point.place))
+            for point in self.points
+        )
+        return 2 * through > len(self.points)
+
     def goals(self, at: Mapping[int, Location]) -> dict[int, Location]:
         """The place of each drone; one without a number is for the nearest of those `at` places.
 
         Drones without a known place and without a point are not sent. Raises ConfigurationError if
-        there are more places than drones.
+        there are more places than drones, and for what is no layout.
         """
+        if not self.points:
+            raise ConfigurationError("has lines and no points: a layout is made of points")
+        if self.is_mission:
+            raise ConfigurationError(
+                f"a mission of one drone, as a line goes through its {len(self.points)} points, "
+                "and no layout: load it on the console's page, which offers it to the drone you "
+                "select there"
+            )
         goals = {point.drone: point.place for point in self.points if point.drone is not None}
         free = [point.place for point in self.points if point.drone is None]
         ways = sorted(
@@ -70,16 +98,32 @@ class Placemarks:
 
 
 def drone_named(name: str | None) -> int | None:
-    """The drone in a name such as "3", "drone 3" or "Router 3"; None: it names none.
+    """The drone in a name such as "drone 3" or "Router 3"; None: it names none.
 
-    Raises ConfigurationError for an id that no drone can have.
+    A bare number names none: programs number their points. Raises ConfigurationError for an id
+    that no drone can have.
     """
     match = _NAMED.fullmatch((name or "").strip())
-    if match is None:
+    return None if match is None else drone_with(match[1])
+
+
+def drone_with(number: str) -> int | None:
+    """The drone with this id; None: it is none. Raises as `drone_named`."""
+    if _ID.fullmatch(number) is None:
         return None
-    if int(match[1]) >= MAX_DRONES:
-        raise ConfigurationError(f"drone {match[1]}: the largest id is {MAX_DRONES - 1}")
-    return int(match[1])
+    if int(number) >= MAX_DRONES:
+        raise ConfigurationError(f"drone {number}: the largest id is {MAX_DRONES - 1}")
+    return int(number)
+
+
+def _metre(place: Location) -> tuple[int, int]:
+    return round(place.longitude), round(place.latitude)
+
+
+def _metres_around(place: Location) -> Iterable[tuple[int, int]]:
+    """Where something within 1 m of it may be: programs round points and lines differently."""
+    x, y = _metre(place)
+    return ((x + dx, y + dy) for dx in (-1, 0, 1) for dy in (-1, 0, 1))
 
 
 def place_on(

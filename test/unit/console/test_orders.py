@@ -15,6 +15,7 @@ from drone_mesh.console.orders import (
     number_of,
     parse_request,
 )
+from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.location import Location
 from drone_mesh.layouts import Order
 from drone_mesh.missions import Mission
@@ -38,8 +39,8 @@ class Notebook:
         self.done.append(("layout", case))
         return "done"
 
-    def formation(self, name: str, orders: Sequence[Order]) -> str:
-        self.done.append(("formation", name, *orders))
+    def formation(self, name: str, orders: Sequence[Order], gateways: Sequence[int]) -> str:
+        self.done.append(("formation", name, *orders, *gateways))
         return "done"
 
     def speed(self, paused: bool, factor: float) -> str:
@@ -106,6 +107,10 @@ def test_an_invalid_mission_is_refused(wrong: dict[str, object]) -> None:
         (
             {"do": "formation", "name": "a ring", "places": [[3, 1.5, -2, 4]]},
             ("formation", "a ring", Order(3, Location(latitude=-2.0, longitude=1.5, height=4.0))),
+        ),
+        (
+            {"do": "formation", "name": "all", "places": [[0, 1, 2, 3]], "gateways": [0]},
+            ("formation", "all", Order(0, Location(latitude=2.0, longitude=1.0, height=3.0)), 0),
         ),
         ({"do": "speed", "paused": True, "factor": 0}, ("speed", True, 0.0)),
         ({"do": "add", "x": 1.5, "y": -2}, ("add", None, False, 1.5, -2.0)),
@@ -174,6 +179,19 @@ def test_anything_else_is_refused_with_a_reason(text, why):
 )
 def test_a_refusal_goes_back_under_the_number_of_the_request(text, number):
     assert number_of(text) == number
+
+
+def test_of_a_mission_only_the_way_is_offered_and_of_a_layout_only_the_places():
+    at = [[5.1214, 52.0907], [5.1216, 52.0908]]
+    drawn = [{"type": "Point", "coordinates": point} for point in at]
+    for extra, ways in ([{"type": "LineString", "coordinates": at}], 1), ([], 0):
+        text = json.dumps({"type": "GeometryCollection", "geometries": [*drawn, *extra]})
+        request = parse_request(
+            json.dumps({"do": "places", "number": 1, "name": "a.json", "text": text})
+        )
+        assert isinstance(request, ReadPlaces)
+        found = request.content(Origin(52.0907, 5.1214, 3.0))
+        assert (len(found.places), len(found.ways)) == (0 if ways else 2, ways)
 
 
 def places_in(text: str) -> list[tuple[int, float, float, float]]:

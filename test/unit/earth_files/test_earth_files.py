@@ -64,6 +64,76 @@ def test_points_of_geojson_are_for_the_drones_that_they_name():
     assert [(point.drone, point.place.height) for point in points] == [(3, 0), (4, 2.5), (None, 12)]
 
 
+def test_a_bare_number_in_a_name_names_no_drone():
+    """Ground stations, receivers and drawing programs number their points."""
+    names = ("0 ", "1 Takeoff", "2", "drone 3", "gateway 0", "Node4")
+    marks = (f"<name>{n}</name><Point><coordinates>5.1,52.1</coordinates></Point>" for n in names)
+    points = read_placemarks(kml(*marks), "a.kml", ORIGIN).points
+    assert [point.drone for point in points] == [None, None, None, 3, 0, 4]
+    these = [{"name": "7"}, {"id": 7}, {"id": "7"}, {"id": 7000}, {"id": None, "name": "router 9"}]
+    text = features(*(feature("Point", [5.1, 52.1], **properties) for properties in these))
+    points = read_placemarks(text, "a.json", ORIGIN).points
+    assert [point.drone for point in points] == [None, 7, None, None, 9]
+
+
+MISSION = [[5.1214, 52.0907, 0], [5.1216, 52.0908, 30], [5.1219, 52.0907, 30]]
+
+
+def mission_in(ending: str) -> str:
+    """What ground stations export: numbered waypoints, and a line through them."""
+    if ending == "json":
+        points = [feature("Point", at[:2], name=str(n)) for n, at in enumerate(MISSION)]
+        return features(*points, feature("LineString", MISSION, height=5))
+    texts = [",".join(map(str, at)) for at in MISSION]
+    points = [
+        f"<name>{n} </name><Point><altitudeMode>absolute</altitudeMode>"
+        f"<coordinates>{text.rpartition(',')[0]},33</coordinates></Point>"
+        for n, text in enumerate(texts)
+    ]
+    return kml(*points, f"<LineString><coordinates>{' '.join(texts)}</coordinates></LineString>")
+
+
+@pytest.mark.parametrize("ending", ["json", "kml"])
+def test_a_line_through_its_points_is_a_mission_of_one_drone_and_no_layout(ending):
+    found = read_placemarks(mission_in(ending), f"a.{ending}", ORIGIN)
+    assert found.is_mission
+    assert [len(path.places) for path in found.paths] == [3]
+    with pytest.raises(ConfigurationError, match="a mission of one drone, as a line goes through"):
+        found.goals({n: Location(0.0, float(n), 0.0) for n in range(8)})
+
+
+def test_a_line_beside_the_points_or_points_that_name_drones_are_no_mission():
+    road = [[5.125, 52.09], [5.126, 52.09]]
+    beside = features(feature("Point", MISSION[1][:2]), feature("LineString", road))
+    named = [feature("Point", at[:2], drone=n) for n, at in enumerate(MISSION)]
+    for text in (beside, features(*named, feature("LineString", MISSION, height=5))):
+        assert not read_placemarks(text, "a.json", ORIGIN).is_mission
+
+
+def test_shapes_in_collections_and_bare_shapes_are_read_too():
+    point = {"type": "Point", "coordinates": [5.1214, 52.0907]}
+    line = {"type": "LineString", "coordinates": MISSION[:2]}
+    inner = {"type": "GeometryCollection", "geometries": [line]}
+    both = {"type": "GeometryCollection", "geometries": [point, inner]}
+    in_feature = {"type": "Feature", "properties": {"drone": 3, "height": 1}, "geometry": both}
+    found = read_placemarks(features(in_feature), "a.json", ORIGIN)
+    assert found.points == [Point(3, Location(0.0, 0.0, 1.0))]
+    assert [path.drone for path in found.paths] == [3]
+    assert len(read_placemarks(json.dumps(point), "a.json", ORIGIN).points) == 1
+
+
+def test_the_track_of_a_flight_log_is_a_line():
+    track = (
+        "<name>drone 3</name><gx:Track><altitudeMode>absolute</altitudeMode>"
+        "<when>2026-05-01T10:00:00Z</when><when>2026-05-01T10:00:01Z</when>"
+        "<gx:coord>5.1214 52.0907 3</gx:coord><gx:coord>5.1216 52.0907 13</gx:coord></gx:Track>"
+    )
+    text = kml(track).replace("<kml ", '<kml xmlns:gx="http://www.google.com/kml/ext/2.2" ')
+    (path,) = read_placemarks(text, "log.kml", ORIGIN).paths
+    assert path.drone == 3
+    assert [place.height for place in path.places] == [0, 10]
+
+
 def test_points_without_a_number_are_for_the_nearest_of_the_other_drones():
     east, west, north = Location(0, 9, 0), Location(0, -9, 0), Location(9, 0, 0)
     found = Placemarks([Point(None, east), Point(None, west), Point(1, north)])
@@ -104,6 +174,9 @@ def test_heights_of_kml_are_as_their_mode_says():
         (features(feature("Point", [5.1, 52.1], drone=254)), "drone 254: the largest id is 253"),
         (features(feature("Point", [5.1, 52.1], height="x")), "the property height is 'x', not"),
         (features(feature("LineString", 5)), "feature 1: coordinates 5 are not a list"),
+        (features(feature("LineString", [])), "feature 1: a line with 0 places: it needs two"),
+        (features(feature("point", [5.1, 52.1])), "feature 1: {'coordinates': "),
+        ('{"type": "GeometryCollection"}', "feature 1: geometries None are not a list"),
         (features(*[feature("Point", [5.12, 52.09], drone=1)] * 2), "feature 2: drone 1 has two"),
         (" " * 300_001, "a.json: longer than 300000 characters"),
     ],
@@ -127,6 +200,14 @@ def test_bad_geojson_is_refused_in_one_line(text, why):
             "a.kml: placemark 'Oak': 'here' is not longitude,latitude,height",
         ),
         ("<kml>\ud800</kml>", "a.kml: not XML: "),
+        (
+            kml("<name>w</name><LineString><coordinates> </coordinates></LineString>"),
+            "a.kml: placemark 'w': a line with 0 places: it needs two",
+        ),
+        (
+            kml("<Point><coordinates/></Point>"),
+            "a.kml: placemark '': a point with 0 places",
+        ),
     ],
 )
 def test_bad_kml_is_refused_in_one_line(text, why):
@@ -138,3 +219,5 @@ def test_what_is_missing_is_said():
         "a.json: its places are in degrees: that needs an origin"
     )
     assert refusal("PK", "a.kmz") == "a.kmz: a compressed file: unzip it, and give the KML in it"
+    assert refusal("{}", "a.plan").startswith("a.plan: a plan of QGroundControl, not GeoJSON or")
+    assert "(QGC WPL)" in refusal("QGC WPL 110", "a.waypoints")

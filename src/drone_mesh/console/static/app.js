@@ -260,7 +260,7 @@ byId("load-places").addEventListener("change", async (event) => {
   try {
     const request = { do: "places", name: file.name, text: await file.text() };
     const { places, ways } = await connection.request(request);
-    if (places.length) flyTo(file.name, places);
+    if (places.length) await flyTo(file.name, places);
     else flyAlong(file.name, ways);
   } catch (error) {
     toast(error.message, true);
@@ -286,7 +286,10 @@ async function flyTo(name, places) {
 /** Offers the only one of these ways [[x, y, z]] as a mission. */
 function flyAlong(name, ways) {
   if (ways.length > 1) return toast(`${name} has ${ways.length} lines: keep the one to fly`, true);
-  if (!mesh.actions.includes("mission")) return toast(`${name} has no points to fly to`, true);
+  const mission = `${name} is a mission of one drone: a line, whose points are its waypoints`;
+  if (!mesh.actions.includes("mission"))
+    return toast(`${mission}. Missions cannot be flown from here`, true);
+  toast(mission, false);
   fleet.close();
   missions.open(ways[0].map(([x, y]) => [x, y]));
   byId("mission-height").value = String(Math.round(Math.max(...ways[0].map((place) => place[2]))));

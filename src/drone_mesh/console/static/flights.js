@@ -31,7 +31,7 @@ export class Flights extends EventTarget {
    */
   async hold(moves, what = names(moves), send = () => this.#order(moves, what)) {
     this.#release();
-    if (!(await this.#agreed(moves, what))) return;
+    if (!(await this.#agreed(moves, what)) || !(await this.#gatewaysAgreed(moves))) return;
     this.#hold(moves, send);
     const goal = moves.length > 1 ? "" : ` to ${metres(moves[0].x)}, ${metres(moves[0].y)}`;
     byId("held-text").textContent = `${what} will leave${goal}`;
@@ -81,7 +81,8 @@ export class Flights extends EventTarget {
     if (moves.length === 1 || !this.mesh.actions.includes("formation"))
       return this.#orderEach(moves);
     const places = moves.map(({ id, x, y, z }) => [id, metres(x), metres(y), z]);
-    const request = { do: "formation", name: what.slice(0, MAX_NAME), places };
+    const gateways = this.#gateways(moves); // which the user agreed to
+    const request = { do: "formation", name: what.slice(0, MAX_NAME), places, gateways };
     try {
       this.toast(await this.order(request), false);
     } catch (error) {
@@ -133,6 +134,18 @@ export class Flights extends EventTarget {
     const question =
       `${what} would fly ${far.toFixed(0)} m` + (moves.length > 1 ? " at most." : ".");
     return agreed(question, "Send");
+  }
+
+  /** Whether none of these drones is a gateway, or the user agrees. */
+  async #gatewaysAgreed(moves) {
+    const ids = this.#gateways(moves);
+    if (!ids.length) return true;
+    const who = `${ids.length > 1 ? "Gateways" : "Gateway"} ${ids.join(", ")}`;
+    return agreed(`${who} would fly, on which the mesh hangs.`, "Send");
+  }
+
+  #gateways(moves) {
+    return moves.map(({ id }) => id).filter((id) => this.mesh.nodes.get(id)?.role === 1);
   }
 
   #distance({ id, x, y, z }) {

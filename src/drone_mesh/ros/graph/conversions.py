@@ -50,11 +50,12 @@ def location_of(message: PlaceMsg) -> Location:
 
 
 def formation_request(
-    name: str, orders: Sequence[Order], at_once: bool = False
+    name: str, orders: Sequence[Order], at_once: bool = False, gateways: Sequence[int] = ()
 ) -> OrderFormationRequest:
-    """Asks the drone manager to send these drones to their places."""
+    """Asks the drone manager to send these drones, of gateways only `gateways`, to their places."""
     places = [location_msg(*goal) for _drone, goal in orders]
-    return OrderFormationRequest(name, [drone for drone, _goal in orders], places, at_once)
+    drones = [drone for drone, _goal in orders]
+    return OrderFormationRequest(name, drones, places, at_once, gateways)
 
 
 def location_msg(latitude: float, longitude: float, height: float) -> LocationMsg:

@@ -123,7 +123,9 @@ class DroneManager:
         return self._order_case(request.caseID, request.at_once)
 
     def _order_formation(self, request: srv.OrderFormationRequest) -> srv.OrderFormationResponse:
-        answer = self._carry_out(request.name, _formation(request), request.at_once)
+        orders = _formation(request)
+        _check_gateways(request)
+        answer = self._carry_out(request.name, orders, request.at_once)
         return srv.OrderFormationResponse(
             **{name: getattr(answer, name) for name in answer.__slots__}
         )
@@ -283,6 +285,18 @@ def _formation(request: srv.OrderFormationRequest) -> list[Order]:
     for order in orders:
         _check(order)
     return orders
+
+
+def _check_gateways(request: srv.OrderFormationRequest) -> None:
+    """Raises ServiceException: the mesh hangs on a gateway, which flies for no mere number."""
+    fleet = drones_if_known()
+    moved = set(request.drones) - set(request.gateways)
+    unnamed = sorted(moved.intersection(fleet.gateways if fleet else ()))
+    if unnamed:
+        raise rospy.ServiceException(
+            f"would move {'gateway' if len(unnamed) == 1 else 'gateways'} {ids_in_words(unnamed)}: "
+            "a gateway flies only if it is named as one (--gateway; gateways in OrderFormation)"
+        )
 
 
 def _check(order: Order) -> None:

@@ -52,9 +52,9 @@ class RosControls(MeshControls):
         answer = _call(names.ORDER_LAYOUT_SERVICE, srv.OrderLayout, request)
         return _outcome(f"layout {case}", answer)
 
-    def formation(self, name: str, orders: Sequence[Order]) -> str:
+    def formation(self, name: str, orders: Sequence[Order], gateways: Sequence[int]) -> str:
         """Order these drones to their positions, as those of a layout."""
-        request = formation_request(name, orders)
+        request = formation_request(name, orders, gateways=gateways)
         answer = _call(names.ORDER_FORMATION_SERVICE, srv.OrderFormation, request)
         return _outcome(name, answer)
 

@@ -12,6 +12,7 @@ import rospy
 
 from drone_mesh import srv
 from drone_mesh.arguments import whole
+from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
 from drone_mesh.earth_files import is_earth_file, read_placemarks
@@ -61,6 +62,14 @@ def _parser() -> argparse.ArgumentParser:
         "running simulation)",
     )
     parser.add_argument("--at-once", action="store_true", help="all drones set out together")
+    parser.add_argument(
+        "--gateway",
+        type=whole(0, MAX_NODE_ID),
+        action="append",
+        default=[],
+        metavar="ID",
+        help="with --file: it may move this gateway; any other one in the file is refused",
+    )
     return parser
 
 
@@ -68,6 +77,8 @@ def _run(options: argparse.Namespace) -> int:
     join_graph("order_layout")
     heard: queue.Queue[LayoutProgress] = queue.Queue()
     orders = [] if options.file is None else _drawn(options.file, options.origin)
+    for drone, goal in orders:
+        print(f"drone {drone} to x {goal.longitude:g}, y {goal.latitude:g}, z {goal.height:g} m")
     rospy.Subscriber(names.LAYOUTS_TOPIC, LayoutProgress, heard.put)
     with StopRequest() as stop:  # from here on Ctrl-C finds a layout that it can withdraw
         signal.signal(signal.SIGINT, lambda _number, _frame: stop.make())
@@ -77,7 +88,8 @@ def _run(options: argparse.Namespace) -> int:
                 request = srv.OrderLayoutRequest(options.case, options.at_once)
                 answer = call_once(names.ORDER_LAYOUT_SERVICE, srv.OrderLayout, request)
             else:
-                drawn = formation_request(options.file.name[:MAX_NAME], orders, options.at_once)
+                name = options.file.name[:MAX_NAME]
+                drawn = formation_request(name, orders, options.at_once, options.gateway)
                 answer = call_once(names.ORDER_FORMATION_SERVICE, srv.OrderFormation, drawn)
         except ServiceGone as error:
             raise MeshError(f"{error}: is the simulation running?") from None
@@ -99,8 +111,6 @@ def _drawn(file: Path, origin: str) -> list[Order]:
     if not is_earth_file(file.name):
         return read_layout(text, str(file))
     found = read_placemarks(text, str(file), earth_origin(origin))
-    if not found.points:
-        raise MeshError(f"{file}: has lines and no points: a layout is made of points")
     places = {
         node.id: Location.from_vector(node.position)
         for node in live_state().nodes
