@@ -5,20 +5,21 @@ from __future__ import annotations
 import math
 from typing import Dict, List
 
+from drone_mesh.arguments import MOST
 from drone_mesh.mobility.settings import Knot
 
 Knots = Dict[int, List[Knot]]  # by drone, in order of time
 
 
 def number_in(text: str, line: int, name: str = "") -> float:
-    """The number called `name` in this line. Raises ValueError, also for nan and inf."""
+    """The number called `name` in this line. Raises ValueError, also for nan and from 1e9 on."""
     try:
         value = float(text)
     except ValueError:
         value = math.nan
-    if not math.isfinite(value):
+    if not abs(value) <= MOST:
         given = f"{name} {text}".strip()
-        raise ValueError(f"line {line}: expected numbers, not {given}")
+        raise ValueError(f"line {line}: expected numbers, not {given[:60]}")
     return value
 
 

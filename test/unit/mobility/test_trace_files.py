@@ -107,6 +107,47 @@ def test_of_two_ns2_destinations_at_one_time_the_later_line_counts(tmp_path):
     assert knots[0][-1] == (5.0, 3.0, 0.0, 0.0)
 
 
+def test_an_ns2_destination_may_be_repeated_and_a_flight_may_end_within_a_rounding_error(tmp_path):
+    for x in ("3.0", "0.30000000000000004"):  # 0.1 + 0.2, when 0.3 is the next destination
+        knots = read(
+            tmp_path,
+            "$node_(0) set X_ 0.0\n"
+            f'$ns_ at 1.0 "$node_(0) setdest {x} 0.0 0.1"\n'
+            f'$ns_ at 100.0 "$node_(0) setdest {x[:3]} 0.0 0.1"\n'
+            f'$ns_ at 1e8 "$node_(0) setdest {x} 0.0 20.0"\n',
+        )
+        assert knots[0][-1][1] == pytest.approx(float(x))
+        mobility = Mobility("trace", knots=knots)
+        (track,) = tracks_of(mobility, {0: (0, 0, 0)}, (), Area(0, 0, 1, 1), 1).values()
+        assert track.position_at(2e8)[0] == pytest.approx(float(x))
+
+
+def test_ns2_statements_are_those_that_ns3_reads(tmp_path):
+    knots = read(
+        tmp_path,
+        "set god_ [God instance]\n"
+        "set opt(nn) 2 ;# nodes\n"
+        '$ns_ at 2.0 "$node_(0) setdest 1.0 12.0 2.0  "; # fly\n'
+        '$ns_ at 4.0 "$node_(0) set X_ 9"\n'
+        '$ns_ at 4.0 "$node_(0) set Z_ 3 "\n'
+        '$ns_ at 5.0 "$node_(0) setdest 9 6 1"\n'
+        "$node_(0) set X_ 1.0 # the start may come last\n"
+        "$node_(0) set Y_ 2.0;\n"
+        '$ns_ at 1.0 "$node_(1) setdest 3.0 4.0 5.0"\n',
+    )
+    start = (0.0, 0.0, 0.0)  # as there, of a node without one
+    assert knots[1] == [(0.0, *start), (1.0, *start), (2.0, 3.0, 4.0, 0.0)]
+    mobility = Mobility("trace", knots={0: knots[0]})
+    (track,) = tracks_of(mobility, {0: (0, 0, 0)}, (), Area(0, 0, 1, 1), 1).values()
+    places = [track.position_at(t) for t in (0.0, 3.0, 4.0, 4.5, 5.0)]
+    assert places == [(1, 2, 0), (1, 4, 0), (9, 6, 3), (9, 6, 3), (9, 6, 3)]
+
+
+def test_an_ns2_speed_that_is_hardly_more_than_zero_is_a_rest(tmp_path):
+    order = '$ns_ at 2.0 "$node_(0) setdest 3.0 4.0 1e-300"\n'
+    assert read(tmp_path, order) == {0: [(0.0, 0.0, 0.0, 0.0), (2.0, 0.0, 0.0, 0.0)]}
+
+
 def test_csv_rows_may_come_in_any_order(tmp_path):
     knots = read(tmp_path, "t,id,x,y,z\n1.0,4,3,3,0\n0.0,4,1,2,0\n0.5,2,9,9,1\n")
     assert knots == {2: [(0.5, 9.0, 9.0, 1.0)], 4: [(0.0, 1.0, 2.0, 0.0), (1.0, 3.0, 3.0, 0.0)]}
@@ -137,7 +178,13 @@ NS2 = "$node_(1) set X_ 4.0\n"
         (f'{NS2}$ns_ at 2.0 "$node_(1) setdest 3 4 5 1"\n', "line 2: expected .* setdest X Y"),
         (f'{NS2}$ns_ at 2.0 "$node_(1) setdest 3 4 -1.5"\n', "line 2: .* speed -1.5 must be 0"),
         (f'{NS2}$ns_ at -2.0 "$node_(1) setdest 3 4 1"\n', "line 2: time -2.0 .* must be 0"),
-        ('$ns_ at 2.0 "$node_(1) setdest 3 4 1"\n', "node 1 has no start"),
+        (f'{NS2}$ns_ at 2.0 "$node_(1) set X_ far"\n', "line 2: expected numbers, not far"),
+        (
+            f'{NS2}$ns_ at 2.0 "$node_(1) setdest 3 1e308 1"\n',
+            "line 2: expected numbers, not 1e308",
+        ),
+        ("t,id,x,y,z\n1,2,-1e308,0,0\n", "line 2: expected numbers, not x -1e308"),
+        ("0.0 1e308 1e308\n", "line 1: expected numbers, not 1e308"),
         ("t,id,x,y,z\n1,2,3\n", "line 2: expected t,id,x,y,z"),
         ("t,id,x,y,z\n1,2,nan,0,0\n", "line 2"),
         ("0.0 1.0 two\n", "line 1: expected numbers"),
