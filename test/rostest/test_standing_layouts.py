@@ -143,7 +143,7 @@ class StandingLayoutsTest(unittest.TestCase):
         refused = run("layout", "--file", mission)
         self.assertEqual(refused.returncode, 2, refused.stdout)
         self.assertIn("a mission of one drone, as a line goes through its 2", refused.stderr)
-        gateway = self.drawing([("gateway 0", PLACES[0][1])])
+        gateway = self.drawing([("gateway 0", [5.1213562, 52.0907])])  # x -3, y 0
         refused = run("layout", "--file", gateway)
         self.assertEqual(refused.returncode, 2, refused.stdout)
         self.assertRegex(refused.stderr, r"would move gateway 0: .*--gateway")
