@@ -75,6 +75,16 @@ def test_a_layout_that_is_far_away_is_confirmed(start_console, visit):
     assert not page.page.is_visible("#held")
 
 
+def test_a_held_layout_says_who_would_be_out_of_reach(start_console, visit):
+    page = visit(start_console("--routers", "4", "--gridsize", "1").url)
+    page.wait_for_drones(5)
+    page.page.click("#layout-form button")
+    words = (
+        "Layout 0: 4 drones (13 not in this fleet) will leave: 4 drones would be out of reach: 1..4"
+    )
+    page.wait_for("who", lambda: page.page.inner_text("#held-text").startswith(words))
+
+
 def test_power_and_speed_are_restored_from_the_toast(page):
     page.page.click("#nodes tr[data-id='5']")
     page.undo_next()

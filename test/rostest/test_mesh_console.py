@@ -119,6 +119,9 @@ class MeshConsoleTest(unittest.TestCase):
         wait_for("paused", WALL_LIMIT_S, lambda: page.clock["paused"])
         self.assertTrue(page.order(do="speed", paused=False, factor=5)["done"])
         wait_for("faster", WALL_LIMIT_S, lambda: page.clock["factor"] == 5)
+        found = page.order(do="preview", case=1)
+        self.assertTrue(found["done"], found["text"])
+        self.assertEqual(found["preview"]["out_of_reach"], [1])
         two = page.order(do="formation", name="two", places=[[1, 3, 5, 0], [2, 6, 5, 0]])
         self.assertTrue(two["done"], two["text"])
         places = [[3.0, 5.0, 0.0], [6.0, 5.0, 0.0]]

@@ -145,7 +145,8 @@ class _Rehearsal:
                 node.path = ()
                 del self._flights[drone]
                 if drone in self._formation:
-                    self._found.duration_s = path.start_s + path.duration_s
+                    landed_s = path.start_s + path.duration_s
+                    self._found.duration_s = max(self._found.duration_s, landed_s)
 
     def _routers(self) -> set[int]:
         return {n for n, node in self._nodes.items() if node.on and node.role != Role.GATEWAY}

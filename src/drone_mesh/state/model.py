@@ -1,7 +1,6 @@
 """The state of a mesh at one moment.
 
-NodeStatus and MeshStatus are NodeState.msg and MeshState.msg without ROS. NodeStatus has the
-message's field names, so code that reads one accepts the other and nothing has to be copied.
+NodeStatus and MeshStatus are NodeState.msg and MeshState.msg without ROS, with the same field names.
 """
 
 from __future__ import annotations

@@ -152,6 +152,12 @@ def test_a_preview_flies_the_drones_of_standing_formations_too():
     assert found.duration_s > preview(mesh({1: at(1, 0)}), there).duration_s
 
 
+def test_a_preview_ends_when_the_last_of_those_that_land_together_has_landed():
+    places = {1: at(0, 3), 2: at(3, 0)}
+    found = preview(mesh(places), {1: at(0, 6.4), 2: at(5.2, 0)}, at_once=True)
+    assert found.duration_s == pytest.approx(1.7)
+
+
 def test_at_most_a_fifth_of_the_drones_is_away_at_once():
     places = {n: at(1.5 * (n % 5) - 3, 1.5 * (n // 5) + 1.5) for n in range(1, 21)}
     goals = {n: place._replace(longitude=place.longitude + 8) for n, place in places.items()}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from operator import attrgetter
 from typing import Any, Protocol, Sequence
 
 import rospy
@@ -16,10 +17,11 @@ from drone_mesh.msg import Location as LocationMsg
 from drone_mesh.msg import MeshEvent as MeshEventMsg
 from drone_mesh.ros.graph import names
 from drone_mesh.srv import OrderFormationRequest, RequestGPSResponse
-from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
+from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus, ObstacleStatus
 
 _CODES = {kind.value: number for number, kind in enumerate(MeshEventKind)}  # as in MeshEvent.msg
 _MESH_FIELDS = [field.name for field in fields(MeshStatus) if field.name != "stamp_s"]
+_node_values = attrgetter(*(field.name for field in fields(NodeStatus)))
 NO_POSITION: Vector = (0.0, 0.0, 0.0)  # of a DroneInfo that only speaks of power or topic
 
 
@@ -132,15 +134,19 @@ def state_msg(mesh: MeshStatus) -> MeshState:
 
 
 def mesh_status(message: MeshState) -> MeshStatus:
-    """The state in a message; it shares the message's nodes.
+    """The state in a message.
 
     A message of an older definition, from a bag, gets defaults for the fields that it lacks.
     """
     values = _values(message, _MESH_FIELDS)
-    if message._md5sum != MeshState._md5sum:
+    if message._md5sum == MeshState._md5sum:
+        values["nodes"] = [NodeStatus(*_node_values(node)) for node in message.nodes]
+    else:
         values["nodes"] = [
             NodeStatus(**_values(node, NodeState.__slots__)) for node in message.nodes
         ]
+    boxes = values.get("obstacles", ())
+    values["obstacles"] = [ObstacleStatus(box.center, box.size, box.yaw) for box in boxes]
     return MeshStatus(message.header.stamp.to_sec(), **values)
 
 
