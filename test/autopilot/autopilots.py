@@ -19,9 +19,9 @@ from drone_mesh.drone.geodesy import Origin
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.nrf24.settings import DataRate
 from drone_mesh.raspberry.emulated_air import column_place
-from drone_mesh.raspberry.emulated_fleet import DEMONSTRATION_ORIGIN
 from drone_mesh.stopping import ends_as
 
+DEMONSTRATION_ORIGIN = Origin(52.0907, 5.1214, 3.0)  # Utrecht; only without --origin
 MOST_COPTERS = 16  # our choice
 POLL_S = 0.5
 

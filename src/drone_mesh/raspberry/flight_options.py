@@ -69,7 +69,7 @@ def add_flight_options(parser: argparse.ArgumentParser) -> None:
 def flight_options(parsed: argparse.Namespace) -> FlightOptions:
     """The parsed options. Raises ConfigurationError."""
     if parsed.emulated and parsed.drone != GROUND:
-        raise ConfigurationError("--drone is for a single node; use --drones with --emulated")
+        raise ConfigurationError("--drone is for a single node, not for --emulated")
     return FlightOptions(
         drone=parsed.drone,
         origin=parsed.origin,

@@ -30,7 +30,6 @@ from drone_mesh.errors import ConfigurationError, MeshError, naming_argument
 from drone_mesh.internet.http_settings import HttpSettings
 from drone_mesh.nrf24.settings import DATA_RATES, BroadcastMode, RadioSettings, TxPower
 from drone_mesh.raspberry.air_options import AirOptions, add_air_options, air_options
-from drone_mesh.raspberry.emulated_fleet import FleetOptions, add_fleet_options, fleet_options
 from drone_mesh.raspberry.flight_options import add_flight_options, flight_options
 from drone_mesh.raspberry.http_options import add_http_options, http_options
 from drone_mesh.raspberry.mqtt_options import MqttOptions, add_mqtt_options, mqtt_options
@@ -64,7 +63,6 @@ class Options:
     repair_options: RepairOptions
     location: Location | None  # None: not known
     flight: FlightOptions
-    fleet: FleetOptions  # the drones of emulated nodes
     air: AirOptions  # an emulated air that several processes share
     emulated: int  # number of emulated nodes that replace the real one; 0: none
     trace: Path | None  # file for the frames on the emulated air
@@ -241,7 +239,6 @@ def _parser(program: str, description: str) -> argparse.ArgumentParser:
         "--height", type=float, default=0.0, help="z in metres (default: %(default)g)"
     )
     add_flight_options(parser)
-    add_fleet_options(parser)
     parser.add_argument(
         "--trace",
         type=Path,
@@ -324,7 +321,6 @@ def _options(
             ),
             location=location,
             flight=flight_options(parsed),
-            fleet=fleet_options(parsed),
             air=air_options(parsed),
             emulated=parsed.emulated,
             trace=parsed.trace,

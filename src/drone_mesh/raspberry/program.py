@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import logging
 import signal
 import sys
@@ -14,12 +13,12 @@ from types import FrameType
 from typing import Callable, Iterable, Iterator, Sequence
 
 from drone_mesh.communication.interfaces import IInternetConnection
+from drone_mesh.drone.engines import create_engine
 from drone_mesh.internet.on_demand import http_internet, mqtt_internet, status_server
 from drone_mesh.internet.several import SeveralInternets
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
 from drone_mesh.raspberry.drone_check import check_drone
 from drone_mesh.raspberry.emulated_air import EmulatedAir
-from drone_mesh.raspberry.emulated_fleet import EmulatedFleet
 from drone_mesh.raspberry.event_history import EventHistory
 from drone_mesh.raspberry.mesh_record import MeshRecord
 from drone_mesh.raspberry.node import MakeInternet, RadioNode
@@ -174,18 +173,13 @@ def _real_node(options: Options) -> RadioNode:
 def _emulated_nodes(options: Options, stack: contextlib.ExitStack) -> list[RadioNode]:
     air = EmulatedAir(options.radio, options.emulated, options.trace)
     stack.callback(air.close)
-    fleet = EmulatedFleet(options.fleet, options.flight, air)
-    stack.callback(fleet.close)
     _log.info("%d nodes on emulated radios; node 0 is the gateway", options.emulated)
-    options = dataclasses.replace(
-        options, flight=dataclasses.replace(options.flight, origin=fleet.origin)
-    )
     events = EventHistory()
     make_internet = _orders(options) or without_internet
     return [
         RadioNode(
             air.radio(node_id, options.radio),
-            fleet.engine(node_id),
+            create_engine(node_id, air.place(node_id), options.flight),
             options,
             None if node_id else make_internet,
             events,

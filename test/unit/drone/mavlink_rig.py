@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Callable
 
+from mavlink_vehicle.modes import Mode
+from mavlink_vehicle.vehicle import MavlinkVehicle
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from drone_mesh.drone.geodesy import Origin
@@ -14,8 +16,6 @@ from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions
 from drone_mesh.drone.mavlink.pilot import MavlinkPilot
 from drone_mesh.drone.mavlink.pilot_status import Phase
 from drone_mesh.drone.mavlink.telemetry import Message
-from drone_mesh.drone.mavlink_vehicle.modes import Mode
-from drone_mesh.drone.mavlink_vehicle.vehicle import MavlinkVehicle
 
 STEP_S = 0.05
 ORIGIN = Origin(52.0907, 5.1214, 3.0)

@@ -8,6 +8,7 @@ import time
 from typing import Callable, Iterator
 
 import pytest
+from mavlink_vehicle.server import VehicleServer
 
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.location import Location
@@ -15,7 +16,6 @@ from drone_mesh.drone.mavlink.autopilots import ARDUPILOT, PX4
 from drone_mesh.drone.mavlink.engine import MavlinkEngine
 from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions
 from drone_mesh.drone.mavlink.lines import UdpLine
-from drone_mesh.drone.mavlink_vehicle.server import VehicleServer
 from drone_mesh.errors import GoalRefused, LocationUnknown
 
 pytestmark = pytest.mark.slow  # autopilots and links live in real time

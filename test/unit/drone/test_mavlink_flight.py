@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 from mavlink_rig import ALL, ARDUPILOT, Rig, is_inside, lift
+from mavlink_vehicle.modes import Mode
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.autopilots import PX4, Autopilot
 from drone_mesh.drone.mavlink.limits import FlightLimits
 from drone_mesh.drone.mavlink.pilot_status import Phase
-from drone_mesh.drone.mavlink_vehicle.modes import Mode
 from drone_mesh.errors import GoalRefused
 
 BOTH = pytest.mark.parametrize("autopilot", [ARDUPILOT, PX4], ids=lambda a: a.name)

@@ -12,13 +12,13 @@ import struct
 
 import pytest
 from mavlink_rig import ALL, ARDUPILOT, NONE, Rig, is_inside
+from mavlink_vehicle.modes import Mode
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.autopilots import PX4, Autopilot
 from drone_mesh.drone.mavlink.limits import FlightLimits
 from drone_mesh.drone.mavlink.telemetry import Message
-from drone_mesh.drone.mavlink_vehicle.modes import Mode
 from drone_mesh.errors import GoalRefused
 
 MESSAGES = int(os.environ.get("MAVLINK_MESSAGES", "20000"))  # of all tests together

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 from mavlink_rig import ARDUPILOT, ORIGIN, Wire, lift
+from mavlink_vehicle.modes import Mode, mode_number
+from mavlink_vehicle.vehicle import MavlinkVehicle
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.autopilots import PX4, Autopilot
 from drone_mesh.drone.mavlink.telemetry import Message
-from drone_mesh.drone.mavlink_vehicle.modes import Mode, mode_number
-from drone_mesh.drone.mavlink_vehicle.vehicle import MavlinkVehicle
 
 WAY = [Location(0.0, 0.0, 0.0), Location(20.0, 0.0, 10.0), Location(20.0, 30.0, 12.0)]
 

@@ -12,13 +12,13 @@ from typing import Any, Callable
 
 import pytest
 from mavlink_rig import ALL, ARDUPILOT, STEP_S, Rig, lift
+from mavlink_vehicle.modes import Mode, mode_number
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.autopilots import PX4, Autopilot, px4_mode
 from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions
 from drone_mesh.drone.mavlink.pilot_status import Phase
-from drone_mesh.drone.mavlink_vehicle.modes import Mode, mode_number
 from drone_mesh.errors import ConfigurationError, GoalRefused
 
 BOTH = pytest.mark.parametrize("autopilot", [ARDUPILOT, PX4], ids=lambda a: a.name)

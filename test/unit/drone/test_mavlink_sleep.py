@@ -6,13 +6,13 @@ import socket
 
 import pytest
 from mavlink_rig import STEP_S, Rig
+from mavlink_vehicle.modes import Mode
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.engine import ListeningClock
 from drone_mesh.drone.mavlink.link import MavlinkLink
 from drone_mesh.drone.mavlink.pilot_status import Phase
-from drone_mesh.drone.mavlink_vehicle.modes import Mode
 
 GOAL = Location(100.0, 0.0, 12.0)
 HEARTBEATS = 200

@@ -13,6 +13,9 @@ from pathlib import Path
 from typing import Callable, Iterator
 
 import pytest
+from mavlink_vehicle.modes import Mode
+from mavlink_vehicle.server import VehicleServer
+from mavlink_vehicle.vehicle import MavlinkVehicle
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from drone_mesh.drone.geodesy import Origin
@@ -20,9 +23,6 @@ from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.autopilots import ARDUPILOT, PX4, Autopilot
 from drone_mesh.drone.mavlink.engine import MavlinkEngine
 from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions
-from drone_mesh.drone.mavlink_vehicle.modes import Mode
-from drone_mesh.drone.mavlink_vehicle.server import VehicleServer
-from drone_mesh.drone.mavlink_vehicle.vehicle import MavlinkVehicle
 
 mavsdk = pytest.importorskip("mavsdk", reason="the binary in MAVSDK's wheel does not load here")
 pytest.importorskip("MAVProxy")

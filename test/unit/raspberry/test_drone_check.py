@@ -6,11 +6,11 @@ import sys
 from typing import Any, Iterator
 
 import pytest
+from mavlink_vehicle.server import VehicleServer
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.mavlink.autopilots import ARDUPILOT
-from drone_mesh.drone.mavlink_vehicle.server import VehicleServer
 from drone_mesh.raspberry.program import router
 
 HOME = mavlink.MAVLINK_MSG_ID_HOME_POSITION

@@ -13,6 +13,8 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "drone"))
 from mavlink_rig import ALL, ORIGIN, Wire
+from mavlink_vehicle.modes import Mode
+from mavlink_vehicle.vehicle import MavlinkVehicle
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from drone_mesh.communication.timing import MeshTiming
@@ -22,8 +24,6 @@ from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.autopilots import ARDUPILOT, OUR_SYSTEM_ID, PX4, Autopilot
 from drone_mesh.drone.mavlink.limits import FlightLimits
 from drone_mesh.drone.mavlink.pilot import MavlinkPilot
-from drone_mesh.drone.mavlink_vehicle.modes import Mode
-from drone_mesh.drone.mavlink_vehicle.vehicle import MavlinkVehicle
 from drone_mesh.errors import LocationUnknown
 from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.node import InProcessNode

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 
 import pytest
+from drone_mesh.raspberry.emulated_fleet import FleetOptions
 
 from drone_mesh.communication.repair.options import RepairOptions
 from drone_mesh.communication.seals.key_file import write_key_file
@@ -17,7 +18,6 @@ from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions
 from drone_mesh.internet.http_settings import HttpSettings
 from drone_mesh.nrf24.settings import BroadcastMode, DataRate, RadioSettings, TxPower
 from drone_mesh.raspberry.air_options import AirAddress, AirOptions
-from drone_mesh.raspberry.emulated_fleet import FleetOptions
 from drone_mesh.raspberry.options import Options, parse_gateway, parse_router
 from drone_mesh.raspberry.wiring_options import Hardware
 
@@ -200,9 +200,7 @@ def test_emulated_nodes_need_no_id():
         ("--id 3 --drone mavlink:/dev/serial0,57600", "--drone mavlink: needs --origin"),
         ("--id 3 --origin 52,5", "invalid origin '52,5': use LAT,LON,ALT"),
         ("--id 3 --max-height 501", "--max-height 501 is outside"),
-        ("--id 3 --drones mavlink", "--drones needs --emulated"),
-        ("--emulated 3 --drone package.module:Class", "use --drones with --emulated"),
-        ("--emulated 3 --ground-station 127.0.0.1:14550", "needs --drones mavlink"),
+        ("--emulated 3 --drone package.module:Class", "--drone is for a single node"),
         ("--id 3 --trace air.pcapng", "--trace needs --emulated"),
         ("--emulated 1", "invalid value '1': must be a whole number 2..17"),
         ("--id 3 --debug -1", "must be a number 0..3600"),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import logging
 import selectors
 import socket
 import threading
@@ -15,8 +14,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.mavlink.autopilots import Autopilot
 from drone_mesh.drone.mavlink.telemetry import Message
-from drone_mesh.drone.mavlink_vehicle.vehicle import MavlinkVehicle
-from drone_mesh.errors import ConfigurationError
+from mavlink_vehicle.vehicle import MavlinkVehicle
 
 Address = Tuple[str, int]
 
@@ -25,22 +23,17 @@ FORGET_PEER_S = 10.0  # our choice: a peer silent for this long gets no more mes
 MOST_BYTES = 4096
 LOOPBACK = "127.0.0.1"
 
-_log = logging.getLogger(__name__)
-
 
 class _Port:
     """One vehicle on its own UDP port; it answers every peer."""
 
-    def __init__(
-        self, system_id: int, autopilot: Autopilot, home: Origin, ground_stations: Sequence[Address]
-    ) -> None:
+    def __init__(self, system_id: int, autopilot: Autopilot, home: Origin) -> None:
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.bind((LOOPBACK, 0))
         self.socket.setblocking(False)
         self.vehicle = MavlinkVehicle(autopilot, home, self._send, system_id)
         self._codec = mavlink.MAVLink(None, system_id, mavlink.MAV_COMP_ID_AUTOPILOT1)
         self._codec.robust_parsing = True
-        self._ground_stations = tuple(ground_stations)
         self._heard_s: dict[Address, float] = {}
 
     @property
@@ -69,7 +62,7 @@ class _Port:
     def _send(self, message: Message) -> None:
         data = message.pack(self._codec)
         self._codec.seq = (self._codec.seq + 1) % 256
-        for peer in {*self._ground_stations, *self._heard_s}:
+        for peer in self._heard_s:
             with contextlib.suppress(OSError):  # no listener there now; datagrams may get lost
                 self.socket.sendto(data, peer)
 
@@ -77,14 +70,9 @@ class _Port:
 class VehicleServer:
     """Vehicles with system ids 1, 2, ... Its thread flies them, from start to close."""
 
-    def __init__(
-        self, autopilot: Autopilot, homes: Sequence[Origin], ground_stations: Sequence[Address] = ()
-    ) -> None:
-        """Each vehicle starts at its home; `ground_stations` receive all messages."""
-        self._ports = [
-            _Port(number, autopilot, home, ground_stations)
-            for number, home in enumerate(homes, start=1)
-        ]
+    def __init__(self, autopilot: Autopilot, homes: Sequence[Origin]) -> None:
+        """Each vehicle starts at its home."""
+        self._ports = [_Port(number, autopilot, home) for number, home in enumerate(homes, start=1)]
         self._selector = selectors.DefaultSelector()
         for port in self._ports:
             self._selector.register(port.socket, selectors.EVENT_READ, port)
@@ -125,11 +113,3 @@ class VehicleServer:
                 due_s = max(due_s, now_s - TICK_S) + TICK_S
                 for port in self._ports:
                     port.tick(now_s)
-
-
-def parse_ground_station(text: str) -> Address:
-    """From "HOST:PORT". Raises ConfigurationError."""
-    host, _, port = text.rpartition(":")
-    if not host or not port.isdecimal() or not 1 <= int(port) <= 65535:
-        raise ConfigurationError(f"invalid ground station {text!r}: use HOST:PORT")
-    return host, int(port)

@@ -11,11 +11,11 @@ from drone_mesh.drone.geodesy import EarthPlace, Origin
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.autopilots import OUR_SYSTEM_ID, PX4, Autopilot
 from drone_mesh.drone.mavlink.telemetry import Message
-from drone_mesh.drone.mavlink_vehicle.body import LANDING_SPEED_M_S, Body, VehicleFaults
-from drone_mesh.drone.mavlink_vehicle.modes import Mode, mode_of
-from drone_mesh.drone.mavlink_vehicle.parameters import Parameters
-from drone_mesh.drone.mavlink_vehicle.reports import Reports
-from drone_mesh.drone.mavlink_vehicle.uploaded_mission import UploadedMission
+from mavlink_vehicle.body import LANDING_SPEED_M_S, Body, VehicleFaults
+from mavlink_vehicle.modes import Mode, mode_of
+from mavlink_vehicle.parameters import Parameters
+from mavlink_vehicle.reports import Reports
+from mavlink_vehicle.uploaded_mission import UploadedMission
 
 RETURN_HEIGHT_M = 15.0  # ArduPilot's RTL_ALT
 GROUND_STATION_LOST_S = 5.0  # ArduPilot's FS_GCS_TIMEOUT

@@ -16,9 +16,9 @@ from drone_mesh.drone.mavlink.telemetry import (
     GOOD_ESTIMATE,
     Message,
 )
-from drone_mesh.drone.mavlink_vehicle.body import Body, VehicleFaults
-from drone_mesh.drone.mavlink_vehicle.modes import Mode, mode_number
-from drone_mesh.drone.mavlink_vehicle.uploaded_mission import UploadedMission
+from mavlink_vehicle.body import Body, VehicleFaults
+from mavlink_vehicle.modes import Mode, mode_number
+from mavlink_vehicle.uploaded_mission import UploadedMission
 
 SENSORS = (
     mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO
