@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 
 import pytest
-from drone_mesh.raspberry.emulated_fleet import FleetOptions
 
 from drone_mesh.communication.repair.options import RepairOptions
 from drone_mesh.communication.seals.key_file import write_key_file
@@ -35,7 +34,6 @@ def test_a_router_needs_only_its_id_and_has_the_documented_settings():
         repair_options=RepairOptions(clearance_m=5.0, range_m=100.0),
         location=None,
         flight=FlightOptions(),
-        fleet=FleetOptions(),
         air=AirOptions(),
         emulated=0,
         trace=None,
@@ -138,7 +136,6 @@ def test_each_option_reaches_what_it_is_for():
             FlightLimits(40.0, 200.0, 3.0, 25.0, 8.0, 1.5, 12.0),
             Permissions(True, True, True, orders_may_take_back_s=60.0),
         ),
-        fleet=FleetOptions(),
         air=AirOptions(),
         emulated=0,
         trace=None,
