@@ -92,6 +92,9 @@ class PacketAntenna(IWirelessCommunication):
         self._power_until_s = self._runtime.now_s() + POWER_WANTED_S
         return self._power
 
+    def works(self) -> bool:
+        return self._radio.working or not self.powered
+
     def patience(self) -> float:
         return self._sender.patience
 

@@ -37,6 +37,7 @@ class PacketRadio(Protocol):
 
     node_id: int
     access: MediumAccess  # when this radio may send
+    working: bool  # whether it answered when it was last used; read from any thread
 
     @property
     def medium(self) -> Medium:

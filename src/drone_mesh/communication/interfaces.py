@@ -149,6 +149,10 @@ class IWirelessCommunication(abc.ABC):
         """Whether there is power in its channel now, of whatever sender; None: it cannot tell."""
         return None
 
+    def works(self) -> bool:
+        """False if its radio is known not to work. Then nothing tells where its drone is."""
+        return True
+
     def patience(self) -> float:
         """The number of check periods for which the mesh should not probe what is known to work.
 

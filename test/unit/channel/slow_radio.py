@@ -37,6 +37,8 @@ class Arrived:
 class SlowRadio:
     """A PacketRadio: hears nothing while it sends, and overlapping frames are lost."""
 
+    working = True
+
     def __init__(self, air, host, rng):
         self.node_id, self.drone = host.node_id, host.drone
         self.medium = Medium.for_hop(HOP_S)

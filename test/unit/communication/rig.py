@@ -45,6 +45,7 @@ class RecordingAntenna(IWirelessCommunication):
         self.losing = 0
         self.gets_lost = lambda payload: False
         self.powered = True
+        self.is_whole = True
         self.power = lambda: None  # whether it hears power; None: it cannot tell
 
     def start_antenna(self, mesh):
@@ -80,6 +81,9 @@ class RecordingAntenna(IWirelessCommunication):
 
     def hears_power(self):
         return self.power()
+
+    def works(self):
+        return self.is_whole
 
 
 class RigEngine(IDroneEngine):

@@ -106,6 +106,22 @@ def test_a_drone_takes_its_chip_along_and_a_restarted_node_comes_back():
     mesh.stop()
 
 
+@pytest.mark.parametrize("routing", ["child_table_tree", "beacon"])
+def test_a_drone_whose_chip_answers_no_more_does_not_fly_until_it_does(routing):
+    mesh = Network(3, radio="chips", routing=routing)
+    mesh.add_fleet(gateways=1, routers=3, gridsize=2, spacing=6.0)
+    assert mesh.run_until(mesh.all_connected, within_s=30.0)
+    here, chip = mesh.location(3), mesh.nodes[3].antenna.chip
+    chip.faults.miso_stuck_at = 0xFF
+    mesh.run_for(150.0)
+    said = mesh.nodes[3].component.get_repair_status().in_words(mesh.now_s())
+    assert "its radio does not work" in said
+    assert mesh.location(3) == here
+    chip.faults.miso_stuck_at = None
+    assert mesh.run_until(mesh.all_connected, within_s=30.0)
+    mesh.stop()
+
+
 def test_a_mesh_with_a_key_works_on_chips():
     mesh = Network(3, radio="chips", key=MeshKey(bytes(range(16))))
     mesh.add_fleet(gateways=1, routers=4, gridsize=2, spacing=6.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import abc
 import math
+from collections import deque
 from typing import Mapping, NamedTuple
 
 from drone_mesh.communication.control_plane import IControlPlane
@@ -23,6 +24,9 @@ from drone_mesh.communication.repair.options import RepairOptions
 from drone_mesh.communication.repair.spots import NEAR, PITCH
 from drone_mesh.communication.router_states import RepairState, RouterEvent, RouterStates
 from drone_mesh.drone.location import Location
+
+RADIO_FAILED = "its radio does not work"
+TRIED_SPOTS = 4  # our choice: more take all spots around a place, so that the drone drifts away
 
 
 class Step(NamedTuple):
@@ -68,7 +72,7 @@ class RepairActions(abc.ABC):
         self._control = control
         self._options = options
         self._tried_goals: list[Location] = []  # goals of this drone since it was last connected
-        self._tried_spots: list[Location] = []  # where it landed for these
+        self._tried_spots: deque[Location] = deque(maxlen=TRIED_SPOTS)  # where it landed for these
 
     # Views -----------------------------------------------------------------------------------
 
@@ -142,7 +146,12 @@ class RepairActions(abc.ABC):
         return self._parts.pilot.location()
 
     def why_not_fly(self) -> str:
-        """Why the drone cannot fly for a repair; empty if it can."""
+        """Why the drone cannot fly for a repair; empty if it can.
+
+        Without a radio it would be connected nowhere, and tell nobody where it lands.
+        """
+        if not self._parts.antenna.works():
+            return RADIO_FAILED
         return self._parts.engine.why_not_repair()
 
     @abc.abstractmethod
@@ -165,6 +174,8 @@ class RepairActions(abc.ABC):
     @abc.abstractmethod
     def fly(self, step: Step, until_connected: bool = False) -> None:
         """Fly there and land clear of other drones; `on_landed` reports the landing.
+
+        Nothing happens if the drone cannot fly (`why_not_fly`).
 
         `until_connected`: land as soon as a gateway answers. The routes are forgotten.
         """

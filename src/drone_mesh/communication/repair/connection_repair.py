@@ -12,7 +12,7 @@ from drone_mesh.communication.control_plane import IControlPlane
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.parts import NodeParts
-from drone_mesh.communication.repair.actions import RepairActions, Step
+from drone_mesh.communication.repair.actions import RADIO_FAILED, RepairActions, Step
 from drone_mesh.communication.repair.election import NO_BID, TOOK_OFF, TOOK_OFF_HOME
 from drone_mesh.communication.repair.flight import ASK_AGAIN_S, ASK_SEALED_S, RepairFlight
 from drone_mesh.communication.repair.heights import above_ground, at_whole_metres
@@ -68,8 +68,7 @@ class ConnectionRepair(RepairActions):
             self._was_silent = self.silent
             self._plan_emergency()
             if due_s >= self._emergency_s - ROUNDING_S:
-                self._parts.report(MeshEventKind.EMERGENCY)
-                self._strategy.on_emergency()
+                self._emergency()
         elif self._checked_s is None:
             self._checked_s = due_s
 
@@ -177,6 +176,8 @@ class ConnectionRepair(RepairActions):
 
     def fly(self, step: Step, until_connected: bool = False) -> None:
         """See RepairActions; also for the functions below."""
+        if self.why_not_fly():
+            return
         self._parts.report(MeshEventKind.FLIGHT_DECIDED, step.owner)
         flight = self._new_flight(step, self.goal_of(step))
         flight.stops_when_connected = until_connected or step.home
@@ -315,6 +316,14 @@ class ConnectionRepair(RepairActions):
         if tried:  # there it heard nobody: now from the other side
             origin = Location(*(2.0 * mid - spot for mid, spot in zip(step.place, tried[-1])))
         return Landing(origin, [] if step.home else links)
+
+    def _emergency(self) -> None:
+        if self._parts.antenna.works():
+            self._parts.report(MeshEventKind.EMERGENCY)
+            self._strategy.on_emergency()
+        elif self._strategy.reason != RADIO_FAILED:
+            self._parts.report(MeshEventKind.EMERGENCY, detail=f"{RADIO_FAILED}: it stays")
+            self._strategy.reason = RADIO_FAILED
 
     def _plan_emergency(self) -> None:
         patience = self._strategy.patience(self.silent)

@@ -106,6 +106,9 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
     def hears_power(self) -> bool | None:
         return self._antenna.hears_power()
 
+    def works(self) -> bool:
+        return self._antenna.works()
+
     def patience(self) -> float:
         return self._antenna.patience()
 

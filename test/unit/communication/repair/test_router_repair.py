@@ -11,6 +11,11 @@ from rig import FROM_0, Rig, packet
 
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.repair.election import HOME_FAILED, TOOK_OFF, TOOK_OFF_HOME
+from drone_mesh.communication.repair.interfaces import IRepairStrategy
+from drone_mesh.communication.repair.named_strategies import (
+    REPAIR_STRATEGIES,
+    create_repair_strategy,
+)
 from drone_mesh.communication.repair.options import LostPlace, RepairOptions
 from drone_mesh.communication.repair.spots import Landing, own_spot, spot_beside_rivals
 from drone_mesh.communication.repair.strategies.thesis import Thesis
@@ -49,12 +54,12 @@ def own_bid(to: int, score: float) -> bytes:
 UNDERGROUND = "02 02 01 01 01 00 00 00 41 00 00 00 00 f5 ff"  # node 2: height -11 m
 
 
-def lone_rig(options=None, timing=None):
+def lone_rig(options=None, timing=None, repair=None):
     """Connected through 2 to gateway 0, whose place is (0, 4); 2 stands at (0, 8). Then 2 dies.
 
     The check at 5 s notices, the one at 15 s starts the timer, that at EMERGENCY_S acts.
     """
-    rig = Rig(timing=timing, options=options)
+    rig = Rig(timing=timing, options=options, repair=repair)
     rig.engine.place = Location(12.0, 0.0, 0.0)
     rig.connect_through(2)
     rig.hear("00 02 01 01 01 00 00 80 40", NEIGHBOUR_2_AT_0_8)
@@ -1315,6 +1320,42 @@ def test_a_drone_whose_channel_is_jammed_stays_says_so_and_tries_again(make_rig)
     assert rig.engine.goals == []  # the others need time to be heard again
     rig.wait(20.0)
     assert rig.engine.goals != []
+
+
+@pytest.mark.parametrize("strategy", [*REPAIR_STRATEGIES, "reckless"])
+def test_a_drone_whose_own_radio_does_not_work_stays_and_says_so(strategy):
+    rig = lone_rig(repair=Reckless() if strategy == "reckless" else create_repair_strategy(strategy))
+    rig.antenna.is_whole = False
+    rig.wait_until(3600.0)
+    assert rig.engine.goals == []
+    assert rig.repair_in_words().endswith("does not fly: its radio does not work")
+    said = [event.detail for event in rig.events if event.kind.name == "EMERGENCY"]
+    assert said == ["its radio does not work: it stays"]
+    rig.antenna.is_whole = True
+    rig.wait(60.0)
+    assert (rig.engine.goals == []) is (strategy == "stay")
+
+
+class Reckless(IRepairStrategy):
+    """Flies whenever it is asked anything, without asking whether it can."""
+
+    def patience(self, silent):
+        self.on_emergency()
+        return 1.0
+
+    def on_emergency(self):
+        self.mesh.fly(self.mesh.steps[0])
+
+
+def test_a_drone_alone_flies_for_hours_without_leaving_the_places_that_it_knows():
+    rig = lone_rig(RepairOptions(clearance_m=5.0))
+    for _flight in range(200):
+        flown = len(rig.engine.goals)
+        while len(rig.engine.goals) == flown:
+            rig.wait(10.0)
+        rig.engine.place = rig.engine.goals[-1]
+    farthest_m = max(goal.distance_m(Location(4.0, 0.0, 0.0)) for goal in rig.engine.goals)
+    assert farthest_m < 8.0 + 2 * 5.5 + 0.1  # two rings around where it was connected last
 
 
 def test_power_in_a_few_samples_is_a_frame_of_strangers_and_no_jammer():
