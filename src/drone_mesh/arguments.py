@@ -1,4 +1,4 @@
-"""Numbers that users write: on command lines, in parameters, in addresses.
+"""Numbers that users write: on command lines, in parameters, in addresses, in files.
 
 int() and float() also take `1_0`, digits of other scripts, white space and `nan`.
 """
@@ -6,6 +6,7 @@ int() and float() also take `1_0`, digits of other scripts, white space and `nan
 from __future__ import annotations
 
 import argparse
+import math
 import re
 from typing import Callable
 
@@ -28,6 +29,19 @@ def is_up_to(text: str, most: int) -> bool:
 def is_decimal(text: str) -> bool:
     """Whether the text is a number in decimal digits, also with an exponent."""
     return _DECIMAL.fullmatch(text) is not None
+
+
+def finite(text: str) -> float:
+    """The number in this text of a file, which other programs may begin with +.
+
+    Raises ValueError for anything but a decimal number, and for one that no float can be.
+    """
+    text = text.strip(" \t")
+    digits = text[1:] if text[:1] == "+" and text[1:2] != "-" else text
+    number = float(digits) if is_decimal(digits) else math.nan
+    if not math.isfinite(number):
+        raise ValueError(f"{text[:40]!r} is not a number")
+    return number
 
 
 def whole(lowest: int, highest: int) -> Callable[[str], int]:

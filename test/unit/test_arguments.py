@@ -6,7 +6,7 @@ import argparse
 
 import pytest
 
-from drone_mesh.arguments import decimal, whole
+from drone_mesh.arguments import decimal, finite, whole
 
 
 @pytest.mark.parametrize(("text", "number"), [("0", 0), ("-3", -3), ("007", 7), ("12", 12)])
@@ -29,3 +29,14 @@ def test_decimal_numbers_within_the_bounds_are_taken(text, number):
 def test_any_other_text_is_refused_with_the_bounds(text):
     with pytest.raises(argparse.ArgumentTypeError, match=r"must be a number -1\.\.10"):
         decimal(-1, 10)(text)
+
+
+@pytest.mark.parametrize(("text", "number"), [("+1.5", 1.5), (" -2e3 ", -2000.0), ("7.", 7.0)])
+def test_numbers_in_files_are_decimal_as_other_programs_write_them(text, number):
+    assert finite(text) == number
+
+
+@pytest.mark.parametrize("text", ["", "+", "nan", "-inf", "1e999", "1_0", "٣", "0x1", "++1", "+-1"])
+def test_what_only_python_takes_for_a_number_is_none(text):
+    with pytest.raises(ValueError, match="is not a number"):
+        finite(text)

@@ -7,13 +7,17 @@ beside this module.
 
 from __future__ import annotations
 
+import gzip
 import html
+import io
+import logging
 import re
 import sqlite3
 import threading
+import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Callable, Mapping, Sequence
+from typing import Any, Callable, Sequence
 from urllib.parse import urlsplit
 
 from starlette.requests import Request
@@ -21,13 +25,26 @@ from starlette.responses import Response
 from starlette.routing import BaseRoute, Mount, Route
 from starlette.staticfiles import StaticFiles
 
+from drone_mesh.arguments import finite, is_up_to
 from drone_mesh.errors import ConfigurationError
+
+_log = logging.getLogger(__name__)
 
 LEAFLET = Path(__file__).resolve().parent / "leaflet"
 KEPT_BY_BROWSER_S = 3600  # our choice
 MOST_ZOOM = 22
+# Our choices, of a file: far above what pictures of 512 pixels and their directories need.
+MOST_TILE_BYTES = 4_000_000
+MOST_UNPACKED_BYTES = 1_000_000
+MOST_WORDS = 2_000  # characters
+MOST_ROWS = 1_000  # of metadata
+MOST_QUERY_S = 5.0
+STEPS = 10_000  # of the database, between two looks at the time
 _OWN_URL = "/tiles/{z}/{x}/{y}"
 _PICTURES = {b"\x89PNG": "image/png", b"\xff\xd8\xff": "image/jpeg", b"RIFF": "image/webp"}
+_IS_TILE = f"typeof(tile_data) = 'blob' AND length(tile_data) <= {MOST_TILE_BYTES}"
+_PACKED = b"\x1f\x8b"  # gzip
+_LONG_NUMBER = re.compile(rb"[\x80-\xff]{10}")
 _URL = re.compile(r"https?://([A-Za-z0-9.-]|\{s\})+(:\d+)?/[^\s'\";]*")
 
 ReadTile = Callable[[int, int, int], "bytes | None"]
@@ -69,15 +86,16 @@ class Tiles:
     def routes(self) -> list[BaseRoute]:
         """Where the console serves the library, and the tiles of a file."""
         library: list[BaseRoute] = [Mount("/leaflet", StaticFiles(directory=LEAFLET))]
-        tiles = [Route("/tiles/{z:int}/{x:int}/{y:int}", self._tile)] if self._read else []
+        tiles = [Route("/tiles/{z}/{x}/{y}", self._tile)] if self._read else []
         return [*library, *tiles]
 
     def _tile(self, request: Request) -> Response:
         """Not async, so Starlette calls it in a thread of its own."""
         z, x, y = (request.path_params[name] for name in "zxy")
         picture = None
-        if self._read is not None and z <= MOST_ZOOM and max(x, y) < 2**z:
-            picture = self._read(z, x, y)
+        side = 2 ** int(z) if is_up_to(z, MOST_ZOOM) else 0
+        if self._read is not None and is_up_to(x, side - 1) and is_up_to(y, side - 1):
+            picture = self._read(int(z), int(x), int(y))
         kept = {"Cache-Control": f"private, max-age={KEPT_BY_BROWSER_S}"}
         kind = None if picture is None else _picture_type(picture)
         if kind is None:
@@ -129,28 +147,41 @@ def _of_file(path: Path) -> Tiles:
 
 def _open_mbtiles(path: Path) -> Tiles:
     lock = threading.Lock()  # of the connection
+    until_s = 0.0
     uri = f"{path.resolve().as_uri()}?mode=ro&immutable=1"
     database = sqlite3.connect(uri, uri=True, check_same_thread=False)
-    find = "SELECT tile_data FROM tiles WHERE zoom_level=? AND tile_column=? AND tile_row=?"
+    # The tables may be views, whose queries need not end.
+    database.set_progress_handler(lambda: time.monotonic() > until_s, STEPS)
+
+    def find(query: str, values: Sequence[int] = ()) -> list[Any]:
+        nonlocal until_s
+        with lock:
+            until_s = time.monotonic() + MOST_QUERY_S
+            return database.execute(query, values).fetchmany(MOST_ROWS)
 
     def read(z: int, x: int, y: int) -> bytes | None:
-        with lock:  # the rows of MBTiles count from the south
-            row = database.execute(find, (z, x, 2**z - 1 - y)).fetchone()
-        return None if row is None else bytes(row[0])
+        try:  # the rows of MBTiles count from the south
+            rows = find(
+                f"SELECT tile_data FROM tiles WHERE zoom_level=? AND tile_column=? AND tile_row=? "
+                f"AND {_IS_TILE}",
+                (z, x, 2**z - 1 - y),
+            )
+        except sqlite3.Error as error:
+            _log.warning("the tile %d/%d/%d of %s is damaged: %s", z, x, y, path, error)
+            return None
+        return rows[0][0] if rows else None
 
     try:
-        about = dict(database.execute("SELECT name, value FROM metadata"))
-        low, high = database.execute(
-            "SELECT min(zoom_level), max(zoom_level) FROM tiles"
-        ).fetchone()
-        if low is None:
-            raise ConfigurationError("has no tiles")
-        (some,) = database.execute("SELECT tile_data FROM tiles LIMIT 1").fetchone()
+        about = dict(find(f"SELECT name, substr(value, 1, {MOST_WORDS}) FROM metadata"))
+        ((low,),) = find("SELECT min(zoom_level) FROM tiles")
+        ((high,),) = find("SELECT max(zoom_level) FROM tiles")
+        some = find(f"SELECT tile_data FROM tiles WHERE {_IS_TILE} LIMIT 1")
     except sqlite3.Error as error:
         raise ConfigurationError(f"not an MBTiles file: {error}") from error
-    _check_picture(bytes(some))
+    if not some:
+        raise ConfigurationError("has no tiles")
     bounds = _bounds(str(about.get("bounds", "")).split(","))
-    return Tiles(MapOffer(_OWN_URL, low, high, _credit(about), bounds), read)
+    return _of_pictures(some[0][0], (low, high), about, bounds, read)
 
 
 def _open_pmtiles(path: Path) -> Tiles:
@@ -161,42 +192,90 @@ def _open_pmtiles(path: Path) -> Tiles:
     try:
         with path.open("rb") as file:
             source = MmapSource(file)  # a mapping of its own: the file may be closed
-        reader = Reader(source)
-        header, about = reader.header(), reader.metadata()
-        _position, some = next(iter(all_tiles(source)))
+        reader = Reader(_bounded(source, _is_directory))
+        header, about = reader.header(), Reader(_bounded(source)).metadata()
+        _position, some = next(iter(all_tiles(_bounded(source, _is_directory))))
     except StopIteration:
         raise ConfigurationError("has no tiles") from None
     except Exception as error:  # of the package and of all that it reads with
         reason = str(error) or type(error).__name__
         raise ConfigurationError(f"not a PMTiles file of version 3: {reason}") from error
-    _check_picture(some)
     names = ("min_lon_e7", "min_lat_e7", "max_lon_e7", "max_lat_e7")
-    bounds = _bounds([header[name] / 1e7 for name in names])
+    bounds = _bounds([str(header[name] / 1e7) for name in names])
+
+    def read(z: int, x: int, y: int) -> bytes | None:
+        try:
+            return reader.get(z, x, y)
+        except Exception as error:
+            _log.warning("the tile %d/%d/%d of %s is damaged: %s", z, x, y, path, error)
+            return None
+
     zooms = header["min_zoom"], header["max_zoom"]
-    return Tiles(MapOffer(_OWN_URL, *zooms, _credit(about), bounds), reader.get)
+    return _of_pictures(some, zooms, about, bounds, read)
+
+
+def _bounded(
+    source: Callable[[int, int], bytes], fits: Callable[[bytes], object] = bool
+) -> Callable[[int, int], bytes]:
+    """The source, but it raises ValueError for parts that unpack to more than a map needs.
+
+    `fits`: whether an unpacked part is one that the package can read in bounded time.
+    """
+
+    def get_bytes(offset: int, length: int) -> bytes:
+        if length > MOST_TILE_BYTES:
+            raise ValueError(f"a part has {length} bytes")
+        part = source(offset, length)
+        if part.startswith(_PACKED):
+            unpacked = gzip.GzipFile(fileobj=io.BytesIO(part)).read(MOST_UNPACKED_BYTES + 1)
+            if len(unpacked) > MOST_UNPACKED_BYTES or not fits(unpacked):
+                raise ValueError(f"a part unpacks to more than {MOST_UNPACKED_BYTES} bytes")
+        return part
+
+    return get_bytes
+
+
+def _is_directory(unpacked: bytes) -> bool:
+    """Whether no number of it has more bytes than one of 64 bits."""
+    return _LONG_NUMBER.search(unpacked) is None
+
+
+def _of_pictures(
+    some: bytes,
+    zooms: tuple[Any, Any],
+    about: Any,
+    bounds: Sequence[float],
+    read: ReadTile,
+) -> Tiles:
+    """The tiles of a file, of which `some` is one."""
+    if _picture_type(some) is None:
+        raise ConfigurationError(
+            "its tiles are not pictures (PNG, JPEG or WebP): the page draws no vector tiles"
+        )
+    low, high = (zoom if isinstance(zoom, int) else -1 for zoom in zooms)
+    if not 0 <= low <= high:
+        raise ConfigurationError(f"zoom levels {zooms[0]!r:.20} to {zooms[1]!r:.20}")
+    offer = MapOffer(_OWN_URL, low, min(high, MOST_ZOOM), _credit(about), bounds)
+    return Tiles(offer, read)
 
 
 def _picture_type(data: bytes) -> str | None:
     return next((kind for start, kind in _PICTURES.items() if data.startswith(start)), None)
 
 
-def _check_picture(data: bytes) -> None:
-    if _picture_type(data) is None:
-        raise ConfigurationError(
-            "its tiles are not pictures (PNG, JPEG or WebP): the page draws no vector tiles"
-        )
-
-
-def _credit(about: Mapping[str, Any]) -> str:
+def _credit(about: Any) -> str:
     """The attribution as plain text; files have HTML there."""
-    words = re.sub(r"<[^>]*>", "", str(about.get("attribution") or about.get("name") or ""))
+    known = about if isinstance(about, dict) else {}
+    words = str(known.get("attribution") or known.get("name") or "")[:MOST_WORDS]
+    words = re.sub(r"<[^<>]*>", "", words)
     return html.unescape(words).strip()[:200]
 
 
-def _bounds(values: Sequence[Any]) -> Sequence[float]:
+def _bounds(values: Sequence[str]) -> Sequence[float]:
     """Degrees, or empty if they are not the corners of an area."""
     try:
-        west, south, east, north = map(float, values)
+        west, south, east, north = map(finite, values)
     except ValueError:
         return ()
-    return (west, south, east, north) if west < east and south < north else ()
+    is_area = -360 <= west < east <= 360 and -90 <= south < north <= 90
+    return (west, south, east, north) if is_area else ()

@@ -14,6 +14,7 @@ import struct
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from drone_mesh.arguments import finite
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError
 
@@ -56,7 +57,7 @@ class Origin:
     def parse(cls, text: str) -> Origin:
         """From "LAT,LON,ALT": degrees, degrees, metres. Raises ConfigurationError."""
         try:
-            latitude_deg, longitude_deg, altitude_m = (float(part) for part in text.split(","))
+            latitude_deg, longitude_deg, altitude_m = (finite(part) for part in text.split(","))
         except ValueError:
             raise ConfigurationError(
                 f"invalid origin {text!r}: use LAT,LON,ALT, as in 52.0907,5.1214,3"

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Iterable, Iterator, Sequence
+from typing import Iterable, Sequence
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
+from drone_mesh.arguments import finite
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.location import Location
 from drone_mesh.earth_files.placemarks import Placemarks, drone_named, on_earth, place_on
@@ -29,20 +30,27 @@ def read_kml(text: str, origin: Origin) -> Placemarks:
     if _tag(root) != "kml":
         raise ConfigurationError(f"not KML: its first element is {_tag(root)!r}")
     found = Placemarks()
-    for mark in _all(root, "Placemark"):
+    for mark in root.iter():
+        if _tag(mark) != "Placemark":
+            continue
         name = next((element.text for element in mark if _tag(element) == "name"), None)
         try:
             drone = drone_named(name)
-            for shape in _all(mark, "Point"):
-                places = _places(shape, origin)
-                if len(places) != 1:
-                    raise ConfigurationError(f"a point with {len(places)} places")
-                found.add_point(drone, places[0])
-            for shape in _all(mark, "LineString"):
-                found.add_path(drone, _places(shape, origin))
-            for shape in _all(mark, "Track"):  # of Google: gx:coord has blanks between its numbers
-                positions = (",".join((one.text or "").split()) for one in _all(shape, "coord"))
-                found.add_path(drone, _places(shape, origin, positions))
+            for shape in mark.iter():
+                tag = _tag(shape)
+                if tag == "Placemark" and shape is not mark:  # n of them have n * n / 2 shapes
+                    raise ConfigurationError("another placemark inside it")
+                if tag == "Point":
+                    places = _places(shape, origin)
+                    if len(places) != 1:
+                        raise ConfigurationError(f"a point with {len(places)} places")
+                    found.add_point(drone, places[0])
+                elif tag == "LineString":
+                    found.add_path(drone, _places(shape, origin))
+                elif tag == "Track":  # of Google: gx:coord has blanks between its numbers
+                    coords = (one.text or "" for one in shape if _tag(one) == "coord")
+                    positions = (",".join(text.split()) for text in coords)
+                    found.add_path(drone, _places(shape, origin, positions))
         except ConfigurationError as error:
             raise ConfigurationError(f"placemark {(name or '')[:40]!r}: {error}") from error
     return found
@@ -78,10 +86,6 @@ def _tag(element: Element) -> str:
     return str(element.tag).rpartition("}")[2]
 
 
-def _all(element: Element, tag: str) -> Iterator[Element]:
-    return (one for one in element.iter() if _tag(one) == tag)
-
-
 def _text(element: Element, tag: str) -> str:
     return next((one.text or "" for one in element if _tag(one) == tag), "").strip()
 
@@ -94,7 +98,7 @@ def _places(
     places = []
     for position in _text(shape, "coordinates").split() if positions is None else positions:
         try:
-            longitude, latitude, *rest = (float(number) for number in position.split(","))
+            longitude, latitude, *rest = map(finite, position.split(","))
         except ValueError:
             raise ConfigurationError(
                 f"{position[:40]!r} is not longitude,latitude,height"

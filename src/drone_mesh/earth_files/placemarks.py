@@ -82,6 +82,9 @@ class Placemarks:
             )
         goals = {point.drone: point.place for point in self.points if point.drone is not None}
         free = [point.place for point in self.points if point.drone is None]
+        others = len(at.keys() - goals.keys())
+        if len(free) > others:
+            raise ConfigurationError(f"{len(free)} points for any drone, and {others} drones")
         ways = sorted(
             (place.distance_m(at[drone]), drone, number)
             for drone in at.keys() - goals.keys()
@@ -92,8 +95,6 @@ class Placemarks:
             if drone not in goals and number not in taken:
                 goals[drone] = free[number]
                 taken.add(number)
-        if len(taken) < len(free):
-            raise ConfigurationError(f"{len(free)} points for any drone, and {len(taken)} drones")
         return goals
 
 

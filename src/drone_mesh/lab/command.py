@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 from typing import Callable, Sequence
 
-from drone_mesh.arguments import MOST, whole
+from drone_mesh.arguments import MOST, is_up_to, whole
 from drone_mesh.errors import MeshError
 from drone_mesh.lab.campaign import Campaign
 from drone_mesh.lab.estimate import Estimate, estimate
@@ -167,7 +167,7 @@ def _add_workers(parser: argparse.ArgumentParser) -> None:
 
 def _shard(text: str) -> tuple[int, int]:
     part, slash, of = text.partition("/")
-    if not (slash and part.isdigit() and of.isdigit() and 0 <= int(part) < int(of)):
+    if not (slash and is_up_to(of, MOST) and is_up_to(part, int(of) - 1)):
         raise argparse.ArgumentTypeError(f"expected I/N with 0 <= I < N, not {text}")
     return int(part), int(of)
 

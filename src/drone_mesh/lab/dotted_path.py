@@ -2,6 +2,7 @@
 
 from typing import Any, List, Sequence, Union
 
+from drone_mesh.arguments import MOST, is_up_to
 from drone_mesh.yaml_file import KeyPath
 
 
@@ -21,7 +22,7 @@ def put(content: Any, path: str, value: Any) -> KeyPath:
                 key = _index_of(content, step)
             except NoSuchPlace:
                 raise NoSuchPlace(f"{'.'.join(steps[:index])} has no entry {step}") from None
-            if not step.isdigit():  # the action's name leads into the fault and into the action
+            if not is_up_to(step, MOST):  # an action's name leads into the fault and the action
                 place.append(key)
                 content, key = content[int(key)], step
         elif not isinstance(content, dict):
@@ -37,7 +38,7 @@ def put(content: Any, path: str, value: Any) -> KeyPath:
 
 
 def _index_of(entries: Sequence[Any], step: str) -> int:
-    if step.isdigit():
+    if is_up_to(step, MOST):
         if int(step) >= len(entries):
             raise NoSuchPlace
         return int(step)

@@ -7,7 +7,6 @@ import json
 from pathlib import Path
 from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
-import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from typing_extensions import Annotated, Literal
 
@@ -21,7 +20,7 @@ from drone_mesh.lab.metrics import METRICS
 from drone_mesh.lab.parts import Part
 from drone_mesh.lab.scenario import Scenario
 from drone_mesh.lab.scenario_checks import check_scenario
-from drone_mesh.yaml_file import KeyPath, read_mapping
+from drone_mesh.yaml_file import KeyPath, read_mapping, read_value
 
 NAME_PATTERN = r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$"  # used as the name of a folder
 
@@ -103,7 +102,7 @@ def load_experiment(
 
     `folder`: the location of the files and modules that it names, if not beside it.
     """
-    file = read_mapping(path, limited=False)  # its author may run code here anyway
+    file = read_mapping(path, shares=True)
     content = file.content
     source = Source(file, folder or path.parent)
     if not content:
@@ -138,8 +137,8 @@ def _override(content: Dict[str, Any], override: str, source: Source) -> None:
     if not equals or not path:
         raise ConfigurationError(f"argument {override}: expected key=value, as in seeds=50")
     try:
-        value = yaml.safe_load(text)
-    except yaml.YAMLError:
+        value = read_value(text)
+    except ConfigurationError:
         raise ConfigurationError(f"argument {override}: the value is not valid YAML") from None
     head, _, rest = path.partition(".")
     if head not in Experiment.model_fields:

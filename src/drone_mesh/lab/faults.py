@@ -15,7 +15,9 @@ from drone_mesh.lab.parts import Above0, AtLeast0, NodeId, Part, Point, Share
 EVENTS = ("all connected", "the first flight", "the first landing", "the first loss", "healed")
 
 _PATTERN = re.compile(
-    r"\s*(?:when\s+|(?P<delay>\d+(?:\.\d+)?)\s*s\s+after\s+)?(?P<event>[a-z ]+?)\s*", re.IGNORECASE
+    r"\s*(?:when\s+|(?P<delay>[0-9]{1,9}(?:\.[0-9]{1,9})?)\s*s\s+after\s+)?"
+    r"(?P<event>[a-z ]+?)\s*",
+    re.IGNORECASE,
 )
 
 

@@ -10,11 +10,13 @@ from typing import Callable, List, NamedTuple, Tuple
 
 from drone_mesh.air.graph import Graph, within
 from drone_mesh.air.obstacles import Obstacles
+from drone_mesh.arguments import finite, is_up_to
 from drone_mesh.drone.fleet import MAX_DRONES, plan_fleet
 from drone_mesh.drone.roles import Role
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.lab.scenario import Layout
 from drone_mesh.layouts import Layouts, UnknownCase
+from drone_mesh.yaml_file import read_text
 
 MEAN_DEGREE = 8.0  # the published layouts have 7.3..8.8
 MOST_DRAWS = 2000  # for a random layout that must be connected
@@ -61,9 +63,8 @@ def rows_of_file(path: Path) -> list[list[float]]:
     A role is gateway or router. Raises ConfigurationError.
     """
     try:
-        with path.open(encoding="utf-8", newline="") as file:
-            rows = list(csv.reader(file))
-    except (OSError, UnicodeDecodeError) as error:
+        rows = list(csv.reader(read_text(path).splitlines()))
+    except (ConfigurationError, csv.Error) as error:
         raise ConfigurationError(f"layout file {path}: {error}") from error
     if not rows or [name.strip() for name in rows[0]] != PLACES_HEADER:
         raise ConfigurationError(f"layout file {path}, line 1: expected {','.join(PLACES_HEADER)}")
@@ -72,13 +73,17 @@ def rows_of_file(path: Path) -> list[list[float]]:
         if not row:
             continue
         where = f"layout file {path}, line {number}"
+        if len(row) != len(PLACES_HEADER):
+            raise ConfigurationError(f"{where}: expected id,x,y,role")
+        drone, *place, role = map(str.strip, row)
+        node_id = int(drone) if is_up_to(drone, MAX_DRONES - 1) else -1
+        if node_id < 0 or node_id in places:
+            raise ConfigurationError(f"{where}: id {drone} is out of range or a duplicate")
         try:
-            node_id, x, y, role = int(row[0]), float(row[1]), float(row[2]), row[3].strip()
-        except (ValueError, IndexError) as error:
-            raise ConfigurationError(f"{where}: expected id,x,y,role") from error
-        if not 0 <= node_id < MAX_DRONES or node_id in places:
-            raise ConfigurationError(f"{where}: id {node_id} is out of range or a duplicate")
-        if role not in ("gateway", "router") or not (math.isfinite(x) and math.isfinite(y)):
+            x, y = map(finite, place)
+        except ValueError:
+            role = ""
+        if role not in ("gateway", "router"):
             raise ConfigurationError(f"{where}: expected finite x, y and role gateway or router")
         places[node_id] = [float(node_id), x, y, float(role == "gateway")]
     if not any(is_gateway for *_, is_gateway in places.values()):

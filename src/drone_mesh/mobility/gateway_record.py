@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from typing import Any, Iterable, Iterator, Tuple
 
 Answer = Tuple[float, Any]
@@ -20,8 +21,8 @@ def answers(lines: Iterable[str]) -> Iterator[Answer]:
     for number, line in enumerate(lines, start=1):
         try:
             answer = json.loads(line)
-            uptime_s = float(answer["uptime_s"])
-        except (ValueError, KeyError, TypeError):
+            uptime_s = _number(answer["uptime_s"])
+        except (ValueError, KeyError, TypeError, RecursionError):
             continue
         try:
             list(places(answer))
@@ -40,11 +41,18 @@ def places(answer: Any) -> Iterator[tuple[int, tuple[float, float, float]]]:
     try:
         for node in answer["nodes"]:
             if node["place"] is not None:
-                latitude, longitude, height = (float(metres) for metres in node["place"])
-                yield int(node["id"]), (longitude, latitude, height)
+                latitude, longitude, height = map(_number, node["place"])
+                yield int(_number(node["id"])), (longitude, latitude, height)
     except (KeyError, TypeError) as error:
         raise ValueError("expected an answer to GET /mesh") from error
     except ValueError as error:
         raise ValueError(
             f"node {node['id']}: place {node['place']} must be three numbers"
         ) from error
+
+
+def _number(value: Any) -> float:
+    """Raises ValueError for what JSON of others may have in its place, NaN included."""
+    if type(value) not in (int, float) or not abs(value) < math.inf:
+        raise ValueError(f"{value!r:.40} is not a number")
+    return float(value)

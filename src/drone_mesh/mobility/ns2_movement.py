@@ -15,9 +15,9 @@ from drone_mesh.arguments import MOST
 from drone_mesh.mobility.knots import Knots, number_in
 from drone_mesh.mobility.settings import Knot
 
-_START = re.compile(r"\$node_\((\d+)\)\s+set\s+([XYZ])_\s+([^\s;]+)\s*;?")
+_START = re.compile(r"\$node_\(([0-9]{1,9})\)\s+set\s+([XYZ])_\s+([^\s;]+)\s*;?")
 _ORDER = re.compile(
-    r'\$ns_\s+at\s+(\S+)\s+"\s*\$node_\((\d+)\)\s+'
+    r'\$ns_\s+at\s+(\S+)\s+"\s*\$node_\(([0-9]{1,9})\)\s+'
     r'(?:setdest\s+(\S+)\s+(\S+)\s+([^\s"]+)|set\s+([XYZ])_\s+([^\s"]+))\s*"\s*;?'
 )
 # god_ counts hops; a variable moves nobody.

@@ -6,7 +6,7 @@ import argparse
 import contextlib
 from dataclasses import dataclass
 
-from drone_mesh.arguments import whole
+from drone_mesh.arguments import MOST, is_up_to, whole
 from drone_mesh.nrf24.gpio import CE_GPIO, IRQ_GPIO, CePin, GpiodCe, GpiodIrq, IrqPin
 from drone_mesh.nrf24.settings import DATA_RATES, DEFAULT_RATE, RadioSettings
 from drone_mesh.nrf24.spi import SPI_HZ, SpiDevice, open_spi
@@ -92,7 +92,7 @@ def add_channel_options(group: argparse._ActionsContainer) -> None:
 
 def _spi_device(text: str) -> tuple[int, int]:
     bus, dot, device = text.partition(".")
-    if not (dot and bus.isdecimal() and device.isdecimal()):
+    if not (dot and is_up_to(bus, MOST) and is_up_to(device, MOST)):
         raise argparse.ArgumentTypeError(
             f"invalid SPI device {text!r}: must be BUS.DEVICE, as in 0.0"
         )

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import gzip
 import sqlite3
+import struct
+import tracemalloc
 from pathlib import Path
 
 import pytest
@@ -28,19 +31,19 @@ def leaflet(tmp_path, monkeypatch):
     return folder
 
 
-def mbtiles(path: Path, tile: bytes | None = PNG, **metadata: str) -> str:
+def mbtiles(path: Path, tile: object = PNG, **metadata: str) -> str:
     with sqlite3.connect(path) as file:
         file.execute("CREATE TABLE metadata (name text, value text)")
         file.executemany("INSERT INTO metadata VALUES (?, ?)", metadata.items())
         columns = "zoom_level integer, tile_column integer, tile_row integer, tile_data blob"
         file.execute(f"CREATE TABLE tiles ({columns})")
-        if tile:  # the row counts from the south: this is the north-west one
+        if tile is not None:  # the row counts from the south: this is the north-west one
             file.execute("INSERT INTO tiles VALUES (2, 0, 3, ?)", [tile])
     file.close()
     return str(path)
 
 
-def pmtiles(path: Path) -> str:
+def pmtiles(path: Path, **metadata: str) -> str:
     from pmtiles.tile import Compression, TileType, zxy_to_tileid
     from pmtiles.writer import write
 
@@ -54,7 +57,7 @@ def pmtiles(path: Path) -> str:
             },
             "center_zoom": 2,
         }
-        writer.finalize(header, {"attribution": ABOUT["attribution"]})
+        writer.finalize(header, metadata or {"attribution": ABOUT["attribution"]})
     return str(path)
 
 
@@ -76,14 +79,18 @@ def test_the_tiles_of_a_file_are_served_where_the_page_asks_for_them(tmp_path, k
     with TestClient(Starlette(routes=tiles.routes)) as client:
         found = client.get("/tiles/2/0/0")
         assert (found.content, found.headers["content-type"]) == (PNG, "image/png")
-        for elsewhere in ("2/0/3", "3/0/0", "2/4/0", "60/0/0"):
+        for elsewhere in ("2/0/3", "3/0/0", "2/4/0", "60/0/0", f"2/{'9' * 5000}/0", "2/x/0"):
             assert client.get(f"/tiles/{elsewhere}").status_code == 204
         assert client.get("/leaflet/leaflet-src.esm.js").status_code == 200
 
 
 def test_an_mbtiles_file_says_where_its_map_is(tmp_path):
     assert open_tiles(mbtiles(tmp_path / "a.mbtiles", **ABOUT)).offer.bounds == (5.1, 52, 5.2, 52.1)
-    assert open_tiles(mbtiles(tmp_path / "b.mbtiles", bounds="x")).offer.bounds == ()
+    for number, bounds in enumerate(
+        ("x", "-1e999,-90,1e999,90", "nan,1,2,3", "0,1_0,20,30", "0,1,2", "0,-91,1,0", "3,1,2,2")
+    ):
+        path = tmp_path / f"{number}.mbtiles"
+        assert open_tiles(mbtiles(path, bounds=bounds)).offer.bounds == ()
 
 
 def test_the_page_may_load_pictures_from_the_server_of_an_address_and_from_no_other():
@@ -128,3 +135,105 @@ def test_a_bad_file_is_refused_in_one_line(tmp_path):
 def test_a_console_without_the_library_says_how_to_get_it(leaflet):
     (leaflet / "leaflet-src.esm.js").unlink()
     assert "scripts/map_library of the checkout fetches it" in refusal(TEMPLATE)
+
+
+@pytest.mark.parametrize("tile", ["text", 10**9, 1.5, PNG + bytes(4_000_000)])
+def test_where_an_mbtiles_file_has_something_else_than_a_picture_the_map_ends(tmp_path, tile):
+    path = Path(mbtiles(tmp_path / "a.mbtiles", tile))
+    assert "has no tiles" in refusal(path)
+    with sqlite3.connect(path) as file:
+        file.execute("INSERT INTO tiles VALUES (2, 1, 3, ?)", [PNG])
+        file.execute("INSERT INTO tiles VALUES (2, 2, 3, NULL)")
+    file.close()
+    with TestClient(Starlette(routes=open_tiles(str(path)).routes)) as client:
+        found = [client.get(f"/tiles/2/{x}/0").status_code for x in range(3)]
+    assert found == [204, 200, 204]
+
+
+def test_where_an_mbtiles_file_is_damaged_the_map_ends(tmp_path):
+    path = Path(mbtiles(tmp_path / "a.mbtiles"))
+    with sqlite3.connect(path) as file:
+        file.execute("CREATE INDEX i ON tiles (zoom_level, tile_column, tile_row)")
+        rows = [(3, x, 7, PNG + bytes([x]) * 3000) for x in range(8)]
+        file.executemany("INSERT INTO tiles VALUES (?, ?, ?, ?)", rows)
+    file.close()
+    content = bytearray(path.read_bytes())
+    page = content.index(b"\x05" * 3000) // 4096 * 4096
+    content[page : page + 4096] = bytes(4096)
+    path.write_bytes(content)
+    with TestClient(Starlette(routes=open_tiles(str(path)).routes)) as client:
+        found = [client.get(f"/tiles/3/{x}/0").status_code for x in range(8)]
+    assert found == [200, 200, 200, 200, 200, 204, 200, 200]
+    content[100:8192] = b"\xff" * 8092
+    path.write_bytes(content)
+    assert refusal(path).startswith(f"{path}: not an MBTiles file: ")
+
+
+@pytest.mark.parametrize("zoom", ["'x'", "-1", "1e9"])
+def test_zoom_levels_that_are_none_are_refused(tmp_path, zoom):
+    path = Path(mbtiles(tmp_path / "a.mbtiles"))
+    with sqlite3.connect(path) as file:
+        file.execute(f"UPDATE tiles SET zoom_level = {zoom}")
+    file.close()
+    if zoom == "1e9":
+        assert open_tiles(str(path)).offer.max_zoom == 22
+    else:
+        assert "zoom levels" in refusal(path)
+
+
+def test_a_view_whose_query_never_ends_is_given_up(tmp_path, monkeypatch):
+    monkeypatch.setattr(tiles_module, "MOST_QUERY_S", 0.05)
+    path = tmp_path / "a.mbtiles"
+    endless = "WITH RECURSIVE n(k) AS (SELECT 1 UNION ALL SELECT k + 1 FROM n) SELECT k FROM n"
+    with sqlite3.connect(path) as file:
+        file.execute("CREATE TABLE metadata (name text, value text)")
+        columns = "k AS zoom_level, k AS tile_column, k AS tile_row, k AS tile_data"
+        file.execute(f"CREATE VIEW tiles AS SELECT {columns} FROM ({endless})")
+    file.close()
+    assert refusal(path) == f"{path}: not an MBTiles file: interrupted"
+
+
+def packed(path: Path, at: int, content: bytes) -> Path:
+    """A PMTiles file whose header's part `at` is this content, packed."""
+    file = bytearray(Path(pmtiles(path)).read_bytes())
+    part = gzip.compress(content)
+    file[at : at + 16] = struct.pack("<QQ", len(file), len(part))
+    path.write_bytes(bytes(file) + part)
+    return path
+
+
+ROOT, ABOUT_AT = 8, 24  # of the header: offset and length of the root directory, of the metadata
+
+
+@pytest.mark.parametrize(
+    ("at", "content"),
+    [
+        (ABOUT_AT, b'{"name": "' + b" " * 50_000_000 + b'"}'),
+        (ROOT, b"\x80\x80\x40" + b"\x01" * 50_000_000),
+        (ROOT, b"\x01" + b"\xff" * 900_000),  # one number of 6,300,000 bits
+    ],
+)
+def test_a_pmtiles_file_that_unpacks_to_gigabytes_is_refused_at_once(tmp_path, at, content):
+    path = packed(tmp_path / "a.pmtiles", at, content)
+    tracemalloc.start()
+    try:
+        words = refusal(path)
+        _now, most = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert words.endswith("a part unpacks to more than 1000000 bytes")
+    assert most < 10_000_000
+
+
+@pytest.mark.parametrize("content", [b"[1]", b"[" * 100_000, b'{"name": ' + b"<" * 900_000])
+def test_odd_metadata_of_a_pmtiles_file_is_one_line_or_no_credit(tmp_path, content):
+    path = packed(tmp_path / "a.pmtiles", ABOUT_AT, content)
+    if content == b"[1]":
+        assert open_tiles(str(path)).offer.credit == ""
+    else:
+        assert refusal(path).startswith(f"{path}: not a PMTiles file of version 3: ")
+
+
+def test_a_credit_is_short_whatever_a_file_says(tmp_path):
+    path = pmtiles(tmp_path / "a.pmtiles", attribution="<" * 900_000)
+    assert open_tiles(path).offer.credit == "<" * 200

@@ -221,3 +221,23 @@ def test_what_is_missing_is_said():
     assert refusal("PK", "a.kmz") == "a.kmz: a compressed file: unzip it, and give the KML in it"
     assert refusal("{}", "a.plan").startswith("a.plan: a plan of QGroundControl, not GeoJSON or")
     assert "(QGC WPL)" in refusal("QGC WPL 110", "a.waypoints")
+
+
+def test_placemarks_inside_each_other_are_refused_however_many_there_are():
+    """Each would have the shapes of all those in it: of 2,000 there would be 2,000,000."""
+    point = "<Point><coordinates>5.1214,52.0907</coordinates></Point>"
+    text = f"<kml>{'<Placemark>' * 2_000}{point * 2_000}{'</Placemark>' * 2_000}</kml>"
+    assert refusal(text, "a.kml") == "a.kml: placemark '': another placemark inside it"
+
+
+def test_far_more_points_than_drones_are_counted_and_not_compared():
+    here = Location(0, 0, 0)
+    found = Placemarks([Point(None, here)] * 100_000)
+    with pytest.raises(ConfigurationError, match="100000 points for any drone, and 200 drones"):
+        found.goals(dict.fromkeys(range(200), here))
+
+
+@pytest.mark.parametrize("number", ["5_1", "nan", "1e999", "٥", "0x5"])
+def test_what_only_python_takes_for_a_number_is_no_coordinate(number):
+    point = f"<Point><coordinates>{number},52.0907</coordinates></Point>"
+    assert f"'{number},52.0907' is not longitude,latitude" in refusal(kml(point), "a.kml")

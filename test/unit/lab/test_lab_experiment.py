@@ -346,7 +346,11 @@ def test_places_come_from_a_file_beside_the_experiment(tmp_path: Path) -> None:
     [
         ("0,0,0,gateway\n0,1,1,router\n", "line 3: id 0 is out of range or a duplicate"),
         ("0,0,0,router\n", "no gateway"),
-        ("0,0,zero,gateway\n", "line 2: expected id,x,y,role"),
+        ("0,0,gateway\n", "line 2: expected id,x,y,role"),
+        ("0,0,zero,gateway\n", "line 2: expected finite x, y"),
+        ("0,1_0,0,gateway\n", "line 2: expected finite x, y"),
+        ("0,0,\u0663,gateway\n", "line 2: expected finite x, y"),
+        ("0_0,0,0,gateway\n", "line 2: id 0_0 is out of range"),
         ("0,0,inf,gateway\n", "line 2: expected finite x, y"),
     ],
 )

@@ -73,6 +73,13 @@ def test_a_damaged_or_cut_off_compressed_file_is_named(tmp_path):
             read_trace(path)
 
 
+def test_a_compressed_file_that_unpacks_to_gigabytes_is_refused_at_once(tmp_path):
+    path = tmp_path / "scenario.movements.gz"
+    path.write_bytes(gzip.compress(bytes(50_000_001)))
+    with pytest.raises(ConfigurationError, match="larger than 50000000 bytes"):
+        read_trace(path)
+
+
 def test_ns2_nodes_fly_to_their_destinations_until_a_new_one_comes(tmp_path):
     knots = read(
         tmp_path,
@@ -187,7 +194,18 @@ NS2 = "$node_(1) set X_ 4.0\n"
         ("0.0 1e308 1e308\n", "line 1: expected numbers, not 1e308"),
         ("t,id,x,y,z\n1,2,3\n", "line 2: expected t,id,x,y,z"),
         ("t,id,x,y,z\n1,2,nan,0,0\n", "line 2"),
+        ("t,id,x,y,z\n0,1,1_0,0,2\n", "line 2: expected numbers, not x 1_0"),
+        ("t,id,x,y,z\n0,٣,0,0,2\n", "line 2: id ٣ must be a whole number"),
         ("0.0 1.0 two\n", "line 1: expected numbers"),
+        ("0.0 1.0 ٣\n", "line 1: expected numbers"),
+        ("0.0 1e999 2.0\n", "line 1: expected numbers"),
+        ("$node_(٣) set X_ 1\n", "line 1: expected .node_"),
+        (
+            '{"uptime_s": 1, "nodes": [{"id": 1, "place": ["nan", 0, 0]}]}\n',
+            "must be three numbers",
+        ),
+        ('{"uptime_s": 1, "nodes": [{"id": 1, "place": [NaN, 0, 0]}]}\n', "must be three numbers"),
+        ("{" + '"a":[' * 9_000 + "\n", "no line is an answer"),
         ("5.0 1.0 2.0 4.0 1.0 2.0\n", "rising t"),
         (FITS_BOTH, "fits both t x y and t x y z: .* first line #2D or #3D"),
         ("0 1 1 9 2 2\n0 1 1 2 9 2 2 2\n", "lines of t x y and lines of t x y z"),

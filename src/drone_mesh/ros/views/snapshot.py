@@ -46,7 +46,7 @@ def _png(text: str) -> Path:
 
 
 def _size(text: str) -> tuple[int, int]:
-    match = re.fullmatch(r"(\d+)x(\d+)", text)
+    match = re.fullmatch(r"([0-9]{1,9})x([0-9]{1,9})", text)
     size = (int(match[1]), int(match[2])) if match else (0, 0)
     if not all(SMALLEST <= pixels <= LARGEST for pixels in size):
         raise argparse.ArgumentTypeError(
