@@ -205,10 +205,11 @@ def _open_pmtiles(path: Path) -> Tiles:
 
     def read(z: int, x: int, y: int) -> bytes | None:
         try:
-            return reader.get(z, x, y)
+            picture: bytes | None = reader.get(z, x, y)
         except Exception as error:
             _log.warning("the tile %d/%d/%d of %s is damaged: %s", z, x, y, path, error)
             return None
+        return picture
 
     zooms = header["min_zoom"], header["max_zoom"]
     return _of_pictures(some, zooms, about, bounds, read)

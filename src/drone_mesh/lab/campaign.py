@@ -35,8 +35,10 @@ class Campaign:
     ) -> None:
         """Execute missing runs; add seeds if the experiment requests it.
 
-        Raises StoreError or EngineError; completed runs are kept, in order.
+        Loads the modules that the experiment names. Raises ConfigurationError for one that fails,
+        StoreError or EngineError; completed runs are kept, in order.
         """
+        self.loaded.check_own_code()
         plan = Plan(self.loaded)
         store = Store(self.folder, plan)
         try:

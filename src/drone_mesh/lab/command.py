@@ -61,7 +61,13 @@ def _parser() -> argparse.ArgumentParser:
 
     plan = commands.add_parser("plan", help="show cells, runs and estimated time; writes nothing")
     _add_experiment(plan)
-    plan.add_argument("--no-estimate", action="store_true", help="skip the trial runs")
+    trials = plan.add_mutually_exclusive_group()
+    trials.add_argument("--no-estimate", action="store_true", help="skip the trial runs")
+    trials.add_argument(
+        "--estimate",
+        action="store_true",
+        help="make them also if the file names modules of its own, whose code they run",
+    )
     _add_workers(plan)
     plan.set_defaults(run=_plan)
 
@@ -190,7 +196,10 @@ def _plan(options: argparse.Namespace) -> int:
     stop = loaded.experiment.stop
     if stop is not None:
         print(f"more seeds, up to {stop.max_seeds}, until {stop.metric} is precise enough")
-    if not options.no_estimate:
+    if loaded.own_modules and not options.estimate:
+        print(f"no trial runs: they would import {', '.join(loaded.own_modules)}; see --estimate")
+    elif not options.no_estimate:
+        loaded.check_own_code()
         guess = estimate(plan, options.workers)
         workers = max(1, options.workers)
         print(
@@ -210,6 +219,7 @@ def _milliseconds(guess: Estimate) -> str:
 
 def _run(options: argparse.Namespace) -> int:
     loaded = load_experiment(options.file, options.overrides)
+    loaded.announce_own_code()
     folder = options.out or Path("results") / loaded.experiment.name
     if options.out is None and options.shard is not None:
         folder = folder.with_name(f"{folder.name}-shard-{options.shard[0]}-of-{options.shard[1]}")

@@ -4,6 +4,7 @@ import copy
 import hashlib
 import itertools
 import json
+import math
 from pathlib import Path
 from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
@@ -22,6 +23,12 @@ from drone_mesh.lab.scenario import Scenario
 from drone_mesh.lab.scenario_checks import check_scenario
 from drone_mesh.yaml_file import KeyPath, read_mapping, read_value
 
+# Our choices.
+MOST_CELLS = 10_000
+MOST_COMBINATIONS = 1_000_000  # of the axes, before `where`
+MOST_RUNS = 10_000_000  # docs/lab.md: shards keep the memory small
+
+_TECHNIQUES = ("routing", "repair")
 NAME_PATTERN = r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$"  # used as the name of a folder
 
 
@@ -31,7 +38,7 @@ class Stop(Part):
     metric: str
     half_width: Optional[Annotated[float, Field(gt=0)]] = None
     relative_half_width: Optional[Annotated[float, Field(gt=0)]] = None
-    max_seeds: Annotated[int, Field(ge=1)] = 400
+    max_seeds: Annotated[int, Field(ge=1, le=1_000_000)] = 400
 
 
 class Compare(Part):
@@ -89,6 +96,41 @@ class LoadedExperiment(NamedTuple):
         return list(self.cells[0].values) if self.cells else []
 
     @property
+    def own_modules(self) -> List[str]:
+        """The modules of techniques and metrics that are no part of this package."""
+        names = [*(name for _kind, name in self._own_techniques), *self._own_metrics]
+        return sorted({name.partition(":")[0] for name in names})
+
+    def announce_own_code(self) -> None:
+        """Print which of these modules a run is about to import, if there are any."""
+        if self.own_modules:
+            modules, folder = ", ".join(self.own_modules), self.folder.resolve()
+            print(f"imports {modules}, installed or in {folder}: their code runs here", flush=True)
+
+    def check_own_code(self) -> None:
+        """Load these modules. Raises ConfigurationError for one without what the file names."""
+        if not self.own_modules:
+            return
+        extensions.add_search_path(str(self.folder.resolve()))
+        try:
+            extensions.check_own(self._own_techniques, self._own_metrics)
+        except ConfigurationError as error:
+            raise ConfigurationError(f"{self.path}: {error}") from None
+
+    @property
+    def _own_techniques(self) -> List[Tuple[str, str]]:
+        found = {
+            (kind, getattr(cell.scenario, kind)) for cell in self.cells for kind in _TECHNIQUES
+        }
+        return sorted(one for one in found if extensions.is_own(one[1]))
+
+    @property
+    def _own_metrics(self) -> List[str]:
+        stop = self.experiment.stop
+        names = {*self.experiment.metrics, *([stop.metric] if stop else [])}
+        return sorted(filter(extensions.is_own, names))
+
+    @property
     def digest(self) -> str:
         """A hash of the file's content, independent of comments and the order of keys."""
         content = self.experiment.model_dump(mode="json")
@@ -100,6 +142,7 @@ def load_experiment(
 ) -> LoadedExperiment:
     """Read and check the file. Raises ConfigurationError: file, line, key and what is wrong.
 
+    Loads no code that it names: `LoadedExperiment.check_own_code` does.
     `folder`: the location of the files and modules that it names, if not beside it.
     """
     file = read_mapping(path, shares=True)
@@ -109,13 +152,19 @@ def load_experiment(
         raise source.error((), "expected 'key: value' lines")
     for override in overrides:
         _override(content, override, source)
-    extensions.add_search_path(str(source.folder.resolve()))
     try:
         experiment = Experiment.model_validate(content)
     except ValidationError as error:
         raise source.error_of(error, (), Experiment) from None
     _check_metrics(experiment, source)
-    cells = list(_cells(experiment, source))
+    cells = list(itertools.islice(_cells(experiment, source), MOST_CELLS + 1))
+    if len(cells) > MOST_CELLS:
+        raise source.error(("sweep",), f"more than {MOST_CELLS} cells")
+    seeds = max(experiment.seeds, experiment.stop.max_seeds if experiment.stop else 0)
+    if len(cells) * seeds > MOST_RUNS:
+        raise source.error(
+            ("seeds",), f"{len(cells)} cells x {seeds} seeds: more than {MOST_RUNS} runs"
+        )
     if not cells:
         raise source.error(("where",), "where excludes every cell of the sweep")
     _check_compare(experiment, cells, source)
@@ -184,6 +233,8 @@ def _cells(experiment: Experiment, source: Source) -> Iterator[Cell]:
             where = Where(experiment.where, list(named))
         except ExpressionError as error:
             raise source.error(("where",), f"where: {error}") from None
+    if math.prod(map(len, axes)) > MOST_COMBINATIONS:
+        raise source.error(("sweep",), f"more than {MOST_COMBINATIONS} combinations of the axes")
     for combination in itertools.product(*axes):
         point = {axis: value for part in combination for axis, value in part.items()}
         try:
@@ -213,7 +264,7 @@ def _scenario(
             if inside[: len(place)] == place:
                 raise source.error_of(error, (), Scenario, shown=named[axis]) from None
         raise source.error_of(error, ("base",), Scenario) from None
-    for key in ("routing", "repair"):
+    for key in _TECHNIQUES:
         try:
             extensions.check_technique(key, getattr(scenario, key), scenario.model)
         except ConfigurationError as error:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+import reprlib
 from typing import Any, Mapping, Sequence
 
 _ALLOWED = (
@@ -12,6 +13,10 @@ _ALLOWED = (
     ast.BinOp, ast.Add, ast.Sub, ast.Mult, ast.Div,
     ast.Compare, ast.Eq, ast.NotEq, ast.Lt, ast.LtE, ast.Gt, ast.GtE, ast.In, ast.NotIn,
 )  # fmt: skip
+
+
+MOST_CHARACTERS = 1_000  # our choice
+_TIMES = "times()"  # no axis has such a name
 
 
 class ExpressionError(Exception):
@@ -23,14 +28,20 @@ class Where:
 
     def __init__(self, text: str, axes: Sequence[str]) -> None:
         """Raise ExpressionError for an unsupported expression, before any cell is expanded."""
+        if len(text) > MOST_CHARACTERS:
+            raise ExpressionError(f"longer than {MOST_CHARACTERS} characters")
         try:
             tree = ast.parse(text, mode="eval")
-        except (SyntaxError, ValueError) as error:
+        except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
             hint = ""
             if re.search(r"\w\.\d+\.", text):  # as in faults.0.kill.share
                 hint = "; name the action, not the number of a fault, as in faults.kill.share"
             raise ExpressionError(f"{text!r} is not an expression{hint}") from error
-        self._code = compile(_OverAxes(axes).visit(tree), "where", "eval")
+        try:
+            checked = ast.fix_missing_locations(_OverAxes(axes).visit(tree))
+            self._code = compile(checked, "where", "eval")
+        except (ValueError, RecursionError, MemoryError) as error:
+            raise ExpressionError("nested too deeply") from error
 
     def holds(self, values: Mapping[str, Any]) -> bool:
         """Whether a cell with these axis values is part of the experiment.
@@ -38,9 +49,10 @@ class Where:
         Raises ExpressionError for values that it cannot compare or compute with.
         """
         try:
-            return bool(eval(self._code, {"__builtins__": {}}, dict(values)))  # without any call
-        except (TypeError, ArithmeticError) as error:
-            raise ExpressionError(f"{error}, with {dict(values)}") from error
+            names = {"__builtins__": {}, _TIMES: _times}
+            return bool(eval(self._code, names, dict(values)))  # calls nothing but _times
+        except (TypeError, ArithmeticError, RecursionError) as error:
+            raise ExpressionError(f"{error}, with {reprlib.repr(dict(values))}") from error
 
 
 class _OverAxes(ast.NodeTransformer):
@@ -61,7 +73,18 @@ class _OverAxes(ast.NodeTransformer):
             )
         if isinstance(node, ast.Tuple):  # the values of axes are lists
             node = ast.copy_location(ast.List(node.elts, node.ctx), node)
-        return self.generic_visit(node)
+        self.generic_visit(node)
+        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult):
+            call = ast.Call(ast.Name(_TIMES, ast.Load()), [node.left, node.right], [])
+            return ast.copy_location(call, node)
+        return node
+
+
+def _times(left: Any, right: Any) -> Any:
+    """The product of numbers: that of a text or a list and a number may fill the memory."""
+    if not (isinstance(left, (int, float)) and isinstance(right, (int, float))):
+        raise TypeError("only numbers can be multiplied")
+    return left * right
 
 
 def _dotted(node: ast.AST) -> str | None:

@@ -48,7 +48,7 @@ class Plan:
 
     def __iter__(self) -> Iterator[PlannedRun]:
         experiment = self.loaded.experiment
-        folder = str(self.loaded.folder.resolve())
+        folder = str(self.loaded.folder.resolve()) if self.loaded.own_modules else ""
         for repetition in range(self.seeds):
             for cell, (text, what) in enumerate(zip(self._texts, self._identities)):
                 run = run_id(what, experiment.seed, repetition, self.own_metrics)

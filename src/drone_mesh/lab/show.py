@@ -63,6 +63,7 @@ def show_run(options: argparse.Namespace) -> int:
     if options.rviz:
         _show_in_rviz(options)
     results = load_results(options.results)
+    results.loaded.announce_own_code()
     shown = replay(results, options.run_id)
     title = f"{results.loaded.experiment.name} {shown.planned.spec.run}"
     verdict = explain_hash(results, shown)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import sys
 import threading
@@ -11,8 +12,11 @@ from typing import Any, Iterator
 import pytest
 
 from drone_mesh.errors import ConfigurationError
+from drone_mesh.lab import experiment
+from drone_mesh.lab.command import main
 from drone_mesh.lab.experiment import load_experiment
 from drone_mesh.lab.plan import Plan
+from drone_mesh.lab.results import load_results
 from drone_mesh.lab.scenario import Part, Scenario
 
 GOOD = """\
@@ -147,8 +151,7 @@ def test_a_default_that_is_written_out_is_the_same_run(tmp_path: Path) -> None:
         ("radio.loss: [0, 0.2, 0.4]", "radio.loss: []", 13, "sweep.radio.loss: no values"),
         ("radio.loss: [0, 0.2, 0.4]", "radio.loss: 1", 13, "sweep.radio.loss: input should be a"),
         ("radio.loss: [0, 0.2, 0.4]", "routing: [no_such]", 13, "routing technique 'no_such'"),
-        ("radio.loss: [0, 0.2, 0.4]", "routing: [no.such:X]", 13, "cannot be loaded"),
-        ("radio.loss: [0, 0.2, 0.4]", "routing: ['json:JSONDecoder']", 13, "ITechnique"),
+        ("radio.loss: [0, 0.2, 0.4]", "routing: [no such:X]", 13, "expected a name, or package."),
     ],
 )
 def test_each_mistake_is_one_line_with_file_line_and_key(
@@ -168,8 +171,11 @@ def test_each_mistake_is_one_line_with_file_line_and_key(
     ("added", "line", "words"),
     [
         ("metrics: [healed, t_totl_s]", 14, "unknown metric t_totl_s; did you mean t_total_s?"),
-        ("metrics: ['no_module:f']", 14, "metric no_module:f cannot be loaded"),
-        ("metrics: ['os:getcwd']", 14, "must take one argument"),
+        ("metrics: ['a/b:f']", 14, "'a/b:f': expected a name, or package.module:Name"),
+        ("where: radio.loss < 'a' * 100000000000", 14, "where: only numbers can be multiplied"),
+        ("where: radio.loss in [0] * 10 * 10", 14, "where: only numbers can be multiplied"),
+        (f"where: {'(' * 480}1{')' * 480}", 14, "where: "),
+        (f"where: 1 {'+ 1' * 400}", 14, "where: longer than 1000 characters"),
         ("where: radio.los > 1", 14, "where: no axis radio.los"),
         ("where: __import__('os')", 14, "where: use axes, numbers"),
         ("where: radio.loss > 5", 14, "where excludes every cell"),
@@ -275,6 +281,10 @@ class Fails(IRepairStrategy):
         ("metrics", "syntax:f", "metric syntax:f cannot be loaded: SyntaxError: invalid syntax"),
         ("metrics", "ends:f", "metric ends:f cannot be loaded: SystemExit: 3"),
         ("metrics", "parts:f", "has no attribute 'f'"),
+        ("metrics", "no_module:f", "metric no_module:f cannot be loaded"),
+        ("metrics", "os:getcwd", "must take one argument"),
+        ("routing", "no.such:X", "cannot be loaded"),
+        ("routing", "json:JSONDecoder", "ITechnique"),
     ],
 )
 def test_a_users_module_that_fails_gives_one_line(
@@ -288,12 +298,79 @@ def test_a_users_module_that_fails_gives_one_line(
     monkeypatch.syspath_prepend(str(folder))
     added = f"metrics: ['{value}']" if key == "metrics" else f"base:\n  {key}: '{value}'"
     path = write(tmp_path, f"name: trial\n{added}\n")
+    loaded = load_experiment(path)
     with pytest.raises(ConfigurationError) as caught:
-        load_experiment(path)
-    line = 2 if key == "metrics" else 3
-    assert str(caught.value).startswith(f"{path}, line {line}: ")
+        loaded.check_own_code()
+    assert str(caught.value).startswith(f"{path}: ")
     assert words in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.fixture
+def evil(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An experiment, and modules beside it that leave a trace when their code runs."""
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    trace = tmp_path / "code ran"
+    for name in ("evil_metric", "evil_repair", "colorsys"):
+        monkeypatch.delitem(sys.modules, name, raising=False)
+        code = (
+            f"open({str(trace)!r}, 'a').write({name!r} + ' ')\ndef f(record): return 1.0\ng = f\n"
+        )
+        (tmp_path / f"{name}.py").write_text(code)
+    metrics = "metrics: ['evil_metric:f', 'evil_repair:g']\n"
+    base = "base: {layout: {kind: line, drones: 2}, duration_s: 1}\nseeds: 1\n"
+    return write(tmp_path, f"name: trial\n{base}{metrics}")
+
+
+def test_only_a_run_loads_code_and_says_so_before(
+    evil: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    trace = evil.parent / "code ran"
+    monkeypatch.chdir(evil.parent)
+    assert main(["plan", str(evil)]) == 0
+    words = "no trial runs: they would import evil_metric, evil_repair; see --estimate"
+    assert words in capsys.readouterr().out
+    assert not trace.exists()
+    assert main(["run", str(evil), "--workers", "0"]) == 0
+    out = capsys.readouterr().out
+    assert f"imports evil_metric, evil_repair, installed or in {evil.parent}: their code" in out
+    assert trace.read_text() == "evil_metric evil_repair "
+    trace.unlink()
+    for name in ("evil_metric", "evil_repair"):
+        monkeypatch.delitem(sys.modules, name)
+    assert main(["status", "results/trial"]) == 0
+    assert len(load_results(evil.parent / "results/trial").rows) == 1
+    assert main(["new", "another"]) == 0
+    assert not trace.exists()
+
+
+def test_a_file_beside_the_experiment_does_not_stand_in_for_an_installed_module(
+    evil: Path,
+) -> None:
+    load_experiment(evil).check_own_code()
+    importlib.import_module("colorsys")
+    assert "colorsys" not in (evil.parent / "code ran").read_text()
+
+
+def test_an_experiment_has_a_bounded_number_of_cells_and_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    many = f"[{', '.join(map(str, range(1, 1001)))}]"
+    axes = f"sweep: {{layout.drones: {many}, duration_s: {many}, sample_s: {many}}}\n"
+    wrong = [
+        (axes, "line 2: more than 1000000 combinations of the axes"),
+        (
+            "seeds: 1000000\nsweep: {duration_s: [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11]}",
+            "line 2: 11 cells x 1000000 seeds: more than 10000000 runs",
+        ),
+        ("stop: {metric: healed, half_width: 1, max_seeds: 2000000}", "less than or equal to"),
+    ]
+    for text, words in wrong:
+        with pytest.raises(ConfigurationError, match=words):
+            load_experiment(write(tmp_path, f"name: trial\n{text}\n"))
+    monkeypatch.setattr(experiment, "MOST_CELLS", 5)
+    with pytest.raises(ConfigurationError, match="more than 5 cells"):
+        load_experiment(write(tmp_path, GOOD))
 
 
 def keys_of(part: Any, before: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
