@@ -36,6 +36,7 @@ class Neighbours:
         self._noticed_late = noticed_late
         self.motion = motion
         self._heard_s: dict[int, float] = {}
+        self._deaf: set[int] = set()  # heard, but no neighbours: they do not hear this node
         self._fell_silent_s: dict[int, float] = {}  # when each of those lost did so
         self._out_of_reach: set[int] = set()  # of these
         self._stands_since_s = -math.inf  # infinity: this node flies
@@ -47,6 +48,8 @@ class Neighbours:
     def heard(self, node: int, now_s: float) -> bool:
         """A packet arrived from `node`. Returns whether it is a new neighbour."""
         is_new = node not in self._heard_s
+        if is_new and node in self._deaf:
+            return False
         self._heard_s[node] = now_s
         if is_new:
             self._fell_silent_s.pop(node, None)
@@ -56,6 +59,7 @@ class Neighbours:
 
     def lost(self, node: int, now_s: float) -> bool:
         """`node` is out of reach. Returns whether it was a neighbour."""
+        self._deaf.discard(node)
         heard_s = self._heard_s.pop(node, None)
         if heard_s is None:
             return False
@@ -69,6 +73,22 @@ class Neighbours:
     def forget(self, node: int) -> None:
         """`node` is no neighbour, and perhaps never was: its silence says nothing."""
         self._heard_s.pop(node, None)
+
+    def is_deaf(self, node: int) -> bool:
+        """`node` does not hear this one, until `hears`; it is not silent for that.
+
+        Returns whether it was a neighbour.
+        """
+        self._deaf.add(node)
+        return self._heard_s.pop(node, None) is not None
+
+    def hears(self, node: int) -> None:
+        """`node` hears this one."""
+        self._deaf.discard(node)
+
+    def deaf(self) -> frozenset[int]:
+        """The nodes that are heard and do not hear this one."""
+        return frozenset(self._deaf)
 
     def takes_off(self, by_order: bool) -> None:
         """This node flies: if it no longer hears its neighbours, its medium still works.
@@ -87,6 +107,7 @@ class Neighbours:
     def forget_all(self) -> None:
         """This node moved and may have other neighbours."""
         self._heard_s.clear()
+        self._deaf.clear()
         self._fell_silent_s.clear()
         self._out_of_reach.clear()
 

@@ -55,6 +55,8 @@ class InProcessAir(IInProcessAir):
         self.jammed = False  # a jammer, heard everywhere: no packet arrives; set by experiments
         # Whether two places within range hear each other; set if there are obstacles.
         self.sees: Callable[[Location, Location], bool] | None = None
+        # Whether the second node hears the first one, if they are in range; set for one-way links.
+        self.hears: Callable[[int, int], bool] | None = None
         # Whether a packet may arrive at all; set by experiments that count packets or lose some.
         self.carries: Callable[[bytes], bool] | None = None
         # The links between nodes at rest: looked up for each packet, and changed only when a node
@@ -191,22 +193,28 @@ class InProcessAir(IInProcessAir):
             del self._links[other][node]
 
     def send(self, payload: bytes) -> bool:
-        """Send a packet; returns whether the receiver gets it, now or after the delay."""
+        """Send a packet; returns whether the sender learns that the receiver gets it."""
         if self.carries is not None and not self.carries(payload):
             return False
         from_, to = hop(payload)
+        if self.hears is not None and not self.hears(from_, to):
+            return False
         if self._flying and (from_ in self._flying or to in self._flying):
             other = self._heard_by(from_, self._places((to,))).get(to)
-            return other is not None and self._hand_over(payload, other)
-        try:
-            other = self._links[from_][to]
-        except KeyError:  # rarely: most packets are for a neighbour
-            return False
-        return self._hand_over(payload, other)
+            taken = other is not None and self._hand_over(payload, other)
+        else:
+            try:
+                other = self._links[from_][to]
+            except KeyError:  # rarely: most packets are for a neighbour
+                return False
+            taken = self._hand_over(payload, other)
+        return taken and (self.hears is None or self.hears(to, from_))  # its acknowledgement
 
     def broadcast(self, payload: bytes, node: int) -> None:
         """Hand a packet to each antenna in range of `node`, with its id in byte 3."""
         others, carries = self.in_range(node), self.carries
+        if self.hears is not None:
+            others = {other: others[other] for other in others if self.hears(node, other)}
         for copy, other in zip(copies_for(payload, others), others.values()):
             if carries is None or carries(copy):
                 self._hand_over(copy, other)

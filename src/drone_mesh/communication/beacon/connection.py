@@ -6,7 +6,7 @@ import math
 
 from drone_mesh.communication.beacon.own_motion import OwnMotion
 from drone_mesh.communication.beacon.packets import newer
-from drone_mesh.communication.beacon.routes import BeaconRoutes
+from drone_mesh.communication.beacon.routes import PROVEN_S, BeaconRoutes
 from drone_mesh.communication.control_plane import IControlHost
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.observer import MeshEventKind, in_hops
@@ -37,11 +37,15 @@ class Connection:
     @property
     def due_s(self) -> float:
         """When to call `check` next."""
-        return math.inf if self._states.connected else self._check_s
+        if self._was_connected:
+            return self._routes.proved_s + PROVEN_S + 1e-3
+        return self._check_s
 
     def check(self) -> None:
-        """Without a gateway, the repair may be due."""
+        """The parent may not have heard this node for too long; the repair may be due."""
         now_s = self._routes.now_s
+        if self._was_connected and not self._reaches_gateway:
+            self.show()
         if not self._states.connected and now_s >= self._check_s:
             self._check_s = now_s + CHECK_S
             if self._may_repair():
@@ -54,15 +58,15 @@ class Connection:
     def show(self) -> bool:
         """Tell the node whether a gateway is reached. Returns whether that is new."""
         states, parent = self._states, self._routes.parent
-        connected = parent != NO_ROUTE and not self._routes.offline
+        connected = self._reaches_gateway
         if self._unproven is not None and newer(self._routes.number, self._unproven) > 0:
             self._unproven = None
         flies = states.repair is RepairState.FLYING  # over links that it leaves behind
         places, here = self._basics.places, self._routes.motion
-        if parent != NO_ROUTE and not flies:
+        if parent != NO_ROUTE and self._routes.is_proved and not flies:
             places.connected_here(None if here is None else here.place, self._routes.hops)
-        is_proven = self._unproven is None or places.good is None
-        if parent != NO_ROUTE and is_proven and not flies:
+        is_good = self._unproven is None and self._routes.is_proved
+        if parent != NO_ROUTE and not flies and (is_good or places.good is None):
             neighbour = self._routes.neighbours[parent]
             if neighbour.motion is not None:
                 place, seen_s = neighbour.motion.place, neighbour.reported_s
@@ -93,9 +97,14 @@ class Connection:
     def end(self, event: RouterEvent) -> None:
         """A flight or an election begins or ends: the connection is what the beacons say."""
         self._states.happened(event)
-        reached = self._routes.parent != NO_ROUTE and not self._routes.offline
-        if reached and event is not RouterEvent.ANTENNA_OFF:
+        if self._reaches_gateway and event is not RouterEvent.ANTENNA_OFF:
             self._states.happened(RouterEvent.GATEWAY_ANSWERED)
+
+    @property
+    def _reaches_gateway(self) -> bool:
+        """Whether packets pass in both directions, to a gateway with internet."""
+        routes = self._routes
+        return routes.parent != NO_ROUTE and not routes.offline and routes.is_proved
 
     def _may_repair(self) -> bool:
         """Whether a lost connection counts: not in flight, whoever flies the drone."""
@@ -103,6 +112,6 @@ class Connection:
             return False
         if not self._motion.stands(self._routes.now_s):
             return False
-        if self._routes.parent != NO_ROUTE:
+        if self._routes.offline:
             return False  # its gateway is in reach and has no internet: a flight repairs nothing
         return self._basics.antenna.on() and self._host.may_connect(NO_ROUTE, False)

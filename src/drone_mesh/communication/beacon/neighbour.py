@@ -7,14 +7,17 @@ import math
 from drone_mesh.communication.beacon.packets import Beacon, Motion
 
 FRESH = 2.5  # intervals: a neighbour that was silent for longer is none
+MOST_REFUSED = 3  # our choice: packets that it did not take, since it showed that it hears this node
+REFUSED_S = 3.0  # our choice: within which; a burst of losses is shorter
 
 
 class Neighbour:
     """What is known of one neighbour."""
 
     __slots__ = (
-        "alive_s", "announced_s", "apart_m", "beacon", "doubted_s", "failed_s", "heard_s",
-        "listed_s", "loss", "motion", "near_s", "node", "reported_s", "until_s",
+        "alive_s", "announced_s", "apart_m", "beacon", "deaf", "doubted_s", "failed_s", "heard_s",
+        "listed_s", "loss", "motion", "near_s", "node", "proved_s", "refused", "refuses_s",
+        "reported_s", "until_s",
     )  # fmt: skip
 
     def __init__(self, node: int, beacon: Beacon) -> None:
@@ -22,6 +25,9 @@ class Neighbour:
         self.beacon = beacon
         self.heard_s = self.alive_s = self.failed_s = -math.inf
         self.doubted_s = -math.inf  # when it did not take a packet
+        self.proved_s = -math.inf  # when it showed that it hears this node
+        self.refused, self.refuses_s = 0, math.inf  # packets that it did not take since; the first
+        self.deaf = False  # to this node: the link works one way only
         self.until_s = -math.inf  # it counts as a neighbour without a further sign of life
         self.motion: Motion | None = None  # the last one that it reported
         self.reported_s = -math.inf
@@ -33,8 +39,8 @@ class Neighbour:
 
     @property
     def usable(self) -> bool:
-        """Whether it was alive since it failed."""
-        return self.alive_s > self.failed_s
+        """Whether it was alive since it failed, and hears this node."""
+        return self.alive_s > self.failed_s and not self.deaf
 
     def heard(self, beacon: Beacon, own: Motion | None, now_s: float) -> None:
         """Its beacon arrived, while this node was where `own` says."""
@@ -57,6 +63,22 @@ class Neighbour:
         if new:
             announced_s.update(dict.fromkeys(new, now_s))
             self.listed_s.update(dict.fromkeys(new, now_s))
+
+    def proved(self, now_s: float) -> None:
+        """It took a packet of this node or names it: the link works both ways."""
+        self.proved_s = now_s
+        self.hears_perhaps()
+
+    def hears_perhaps(self) -> None:
+        """What it did not take before says nothing now."""
+        self.refused, self.refuses_s, self.deaf = 0, math.inf, False
+
+    def refuses(self, now_s: float) -> None:
+        """It did not take a packet. Its beacons say only that this node hears it."""
+        self.refused += 1
+        self.refuses_s = min(self.refuses_s, now_s)
+        is_burst = now_s - self.refuses_s < REFUSED_S
+        self.deaf = self.deaf or (self.refused >= MOST_REFUSED and not is_burst)
 
     def alive(self, now_s: float) -> None:
         """A sign of life."""

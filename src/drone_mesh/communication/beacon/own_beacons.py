@@ -37,18 +37,19 @@ class OwnBeacons:
         self._sent += 1
         if routes.is_root:
             routes.next_number()
+        gateway, hops, offline = routes.shown
         beacon = Beacon(
-            routes.gateway if routes.hops != NO_ROUTE else NO_ROUTE,
+            gateway,
             routes.number,
-            routes.hops,
+            hops,
             routes.parent,
             routes.ancestors,
             interval_s,
             routes.motion,
             self._next_gateway_place(),
             self._frame.digest if self.asks or self._is_digests_turn() else 0,
-            self.asks or routes.hops == NO_ROUTE,
-            offline=routes.offline,
+            self.asks or hops == NO_ROUTE,
+            offline=offline,
         )
         self.asks = False
         below, is_sealed = self._below, self.room <= SEALED_ROOM  # a seal leaves room for less

@@ -128,6 +128,12 @@ class Beacon(NamedTuple):
     near: tuple[int, ...] = ()  # some of its neighbours
     offline: bool = False  # the gateway has no internet
 
+    def shows_that_it_hears(self, node: int, as_child: bool) -> bool:
+        """Whether the sender hears `node`; of those below it, it does only if they are children."""
+        if node == self.parent or node in self.near:
+            return True
+        return as_child and (node in self.below.listed or node in self.below.new)
+
     def named(self) -> tuple[int, ...]:
         """The nodes that the sender hears or leads to, as far as they fit this beacon."""
         return (*self.below.listed, *self.below.new, *self.near)

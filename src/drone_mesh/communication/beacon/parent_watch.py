@@ -1,4 +1,4 @@
-"""ParentWatch: when a node asks whether its silent parent lives."""
+"""ParentWatch: when a node asks whether its parent lives, and hears it."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from drone_mesh.communication.beacon.routes import BeaconRoutes
 
 LATE = 1.25  # intervals, with their jitter: then a beacon of the parent was lost, or it is dead
 LATE_S = 2.0  # our choice: one lost beacon of a frequent sender says little
+PROOF_S = 5.0  # our choice: for so long a parent that names its children in turn is not asked
 TURN_HOPS = 8  # for each neighbour: children ask one after the other, and the answer is for all
 
 
@@ -22,6 +23,10 @@ class ParentWatch:
         self._probed_s = -math.inf
         self._turn = rng.random()  # among the children of its parent
 
+    def has_new_parent(self) -> None:
+        """The next question is for another node."""
+        self._probed_s = -math.inf
+
     def draw_turn(self) -> None:
         """Take another turn among the children of the parent."""
         self._turn = self._rng.random()
@@ -30,15 +35,18 @@ class ParentWatch:
         """Whether it is time to probe the parent, again perhaps. If so, it counts as probed."""
         now_s = self._routes.now_s
         again_s = self._probed_s + parent.beacon.interval_s
-        if not parent.usable or now_s < self._late_s(parent) or now_s <= again_s:
+        if not parent.usable or now_s < self._wanted_s(parent) or now_s <= again_s:
             return False
         self._probed_s = now_s
         return True
 
     def due_s(self, parent: Neighbour) -> float:
-        """When that will be, if it stays silent."""
+        """When that will be, if it stays silent, or does not name this node."""
         again_s = self._probed_s + parent.beacon.interval_s + 1e-3
-        return max(self._late_s(parent), again_s)
+        return max(self._wanted_s(parent), again_s)
+
+    def _wanted_s(self, parent: Neighbour) -> float:
+        return min(self._late_s(parent), self._routes.proved_s + PROOF_S)
 
     def _late_s(self, parent: Neighbour) -> float:
         interval_s = parent.beacon.interval_s

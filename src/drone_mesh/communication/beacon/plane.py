@@ -32,6 +32,7 @@ BIDS_WITHIN_S = 3.0  # our choice: routers that lose one parent notice it within
 WITHOUT_BEACONS_S = 5.0  # our choice: 2.5 of the longest intervals, and more
 MOVED = 0.05  # of the range: a drone that is further from where it stood flies; from where the
 # others expect it, it has turned
+DEAF_AGAIN_S = 10.0  # our choice: a neighbour that does not hear this node is asked so often
 DRIVER_TRIES = 4  # per hop: more delay the packet, which another neighbour may take at once
 
 
@@ -65,7 +66,7 @@ class BeaconPlane(IControlPlane):
             self._deadlines,
             basics.timing.send_attempts,
             self._verdicts.of,
-            self._routes.alive,
+            self._took,
             self._failed,
             lambda from_, node: self._routes.leads_not_to(node, from_),
             basics.seals.without_proof,
@@ -150,33 +151,42 @@ class BeaconPlane(IControlPlane):
             self._trickle.reset(now_s)
             self._lost(node)
         heard = self._basics.neighbours
+        for node in heard.deaf() & routes.neighbours.keys():
+            neighbour = routes.neighbours[node]
+            if now_s - neighbour.doubted_s >= DEAF_AGAIN_S:
+                neighbour.doubted_s = now_s
+                self._probe(node)
         for node in heard.ids().difference(routes.neighbours):  # it has sent other packets
             if now_s - heard.last_heard_s(node, now_s) > WITHOUT_BEACONS_S:
                 heard.forget(node)
-                self._left(node)
+                self._gone(node, was_neighbour=True)
         parent = routes.neighbours.get(routes.parent)
         if parent is not None and self._watch.is_due(parent):
-            me, to = self._me, parent.node
-            self._courier.send(messages.packet(MessageType.PROBE, me, me, to, to), to)
+            self._probe(parent.node)
         self._choose()
         if self._connection is not None:
             self._connection.check()
 
+    def _probe(self, to: int) -> None:
+        me = self._me
+        self._courier.send(messages.packet(MessageType.PROBE, me, me, to, to), to)
+
     def _choose(self) -> None:
-        before = self._routes.gateway, self._routes.hops, self._routes.offline
-        parent = self._routes.parent
-        if not self._routes.choose():
+        routes = self._routes
+        gateway, parent, shown = routes.gateway, routes.parent, routes.shown
+        if not routes.choose():
             if self._connection is not None:
                 self._connection.tell_repair()
             return
-        now_s, gateway = self._routes.now_s, self._routes.gateway
-        if self._connection is not None and self._routes.parent != parent:
-            self._connection.has_new_parent()
-        if (gateway, self._routes.hops, self._routes.offline) != before:
-            self._trickle.hurry(now_s)
+        if routes.parent != parent:
+            self._watch.has_new_parent()
+            if self._connection is not None:
+                self._connection.has_new_parent()
+        if routes.shown != shown:
+            self._trickle.hurry(routes.now_s)
         else:
-            self._trickle.reset(now_s)
-        self._gateway_was(before[0])
+            self._trickle.reset(routes.now_s)
+        self._gateway_was(gateway)
         self._show()
 
     def _gateway_was(self, before: int) -> None:
@@ -253,6 +263,8 @@ class BeaconPlane(IControlPlane):
         is_quiet = now_s < self._look_s and not routes.is_news(creator, beacon)
         self._below.heard(creator, beacon)
         is_new = routes.heard(creator, beacon)
+        if not routes.neighbours[creator].deaf:
+            self._basics.neighbours.hears(creator)
         self._take_place(creator, beacon)
         if self._courier.holds or not is_quiet:  # few beacons
             self._consider(creator, beacon, is_new)
@@ -338,9 +350,8 @@ class BeaconPlane(IControlPlane):
         return kind == MessageType.BEACON and names_gateway(payload)
 
     def on_delivered(self, neighbour: int, tries: int) -> None:
-        """It is alive."""
-        self._routes.now_s = self._deadlines.now_s
-        self._routes.alive(neighbour)
+        """It is alive, and hears this node."""
+        self._took(neighbour)
 
     def on_undelivered(self, payload: bytes, tries: int) -> None:
         """Send it another way."""
@@ -351,19 +362,30 @@ class BeaconPlane(IControlPlane):
     def _failed(self, node: int) -> None:
         """A neighbour did not take a packet: do without it until it is heard again."""
         self._routes.now_s = self._deadlines.now_s
-        self._routes.failed(node)
+        if self._routes.failed(node):
+            self._gone(node, self._basics.neighbours.is_deaf(node))
         if node == self._routes.parent:
             self._choose()
             self._plan()
 
-    def _lost(self, node: int) -> None:
-        if self._basics.neighbours.lost(node, self._routes.now_s):
-            self._left(node)
-        else:
-            self._host.on_neighbour_lost(node)
+    def _took(self, node: int) -> None:
+        """A neighbour acknowledged a packet."""
+        routes = self._routes
+        routes.now_s = self._deadlines.now_s
+        was_proved = routes.is_proved
+        routes.took(node)
+        self._basics.neighbours.hears(node)
+        if routes.is_proved and not was_proved:
+            self._trickle.hurry(routes.now_s)  # it leads to the gateway
+            self._show()
+            self._plan()
 
-    def _left(self, node: int) -> None:
-        self._basics.report(MeshEventKind.NEIGHBOUR_LOST, node)
+    def _lost(self, node: int) -> None:
+        self._gone(node, self._basics.neighbours.lost(node, self._routes.now_s))
+
+    def _gone(self, node: int, was_neighbour: bool) -> None:
+        if was_neighbour:
+            self._basics.report(MeshEventKind.NEIGHBOUR_LOST, node)
         self._host.on_neighbour_lost(node)
 
     # Searches --------------------------------------------------------------------------------
@@ -400,8 +422,9 @@ class BeaconPlane(IControlPlane):
 
     @property
     def hops(self) -> int:
-        """Hops to it; NO_ROUTE also if it has no internet."""
-        return NO_ROUTE if self._routes.offline else self._routes.hops
+        """Hops to it; NO_ROUTE also if it has no internet, or does not hear this node."""
+        _gateway, hops, offline = self._routes.shown
+        return NO_ROUTE if offline else hops
 
     def next_hop(self) -> int:
         """The parent."""

@@ -30,6 +30,7 @@ _UNTIL_S = attrgetter("until_s")
 
 DUE = 1.2  # intervals, with their jitter: until then a neighbour's next beacon is not late
 BACK = 2  # sequence numbers: a new neighbour that is further behind the others may lead nowhere
+PROVEN_S = 12.0  # our choice: a router is connected for so long after its parent has heard it
 STALE = 5.0  # intervals: a neighbour whose number was not a new one for longer leads nowhere
 REACH = 0.97  # of the range: two nodes further apart are expected to lose each other
 LEAVES, GONE = 1.0, 3.0  # hops that a detour may cost around a link that will break, or should have
@@ -74,6 +75,7 @@ class BeaconRoutes(IRoutes):
         self.number = 0
         self.offline = False  # the preferred gateway has no internet
         self._own_number = 0  # of the latest beacon as a gateway
+        self.proved_s = -math.inf  # when the parent, at that time, last showed that it hears this node
         self.motion: Motion | None = None  # this node's own
         self.now_s = 0.0
         # By neighbour and gateway: the newest number, and when it came. A number counts only for
@@ -97,6 +99,8 @@ class BeaconRoutes(IRoutes):
             neighbour = Neighbour(node, beacon)
             self.neighbours[node] = neighbour
         neighbour.heard(beacon, self.motion, self.now_s)
+        if beacon.shows_that_it_hears(self._node_id, as_child=node == self.parent):
+            self._proved(neighbour)
         if self.motion is not None and neighbour.motion is not None:  # maybe of an earlier beacon
             neighbour.loss = self._losses.heard(
                 node, beacon.interval_s, self.motion.place, neighbour.motion.place, self.now_s
@@ -160,15 +164,45 @@ class BeaconRoutes(IRoutes):
         if neighbour is not None:
             neighbour.alive(self.now_s)
 
-    def failed(self, node: int) -> None:
-        """A neighbour did not take a packet. On a shared channel that says little, once."""
+    def took(self, node: int) -> None:
+        """A neighbour acknowledged a packet of this node."""
+        neighbour = self.neighbours.get(node)
+        if neighbour is not None:
+            neighbour.alive(self.now_s)
+            self._proved(neighbour)
+
+    def _proved(self, neighbour: Neighbour) -> None:
+        neighbour.proved(self.now_s)
+        if neighbour.node == self.parent:
+            self.proved_s = self.now_s
+
+    @property
+    def is_proved(self) -> bool:
+        """Whether the way up works in both directions, or ends here."""
+        return self.is_root or self.now_s - self.proved_s <= PROVEN_S
+
+    @property
+    def shown(self) -> tuple[int, int, bool]:
+        """The gateway, the hops to it, and whether it is offline, as others may count on it."""
+        if self.hops == NO_ROUTE or not self.is_proved:
+            return NO_ROUTE, NO_ROUTE, False
+        return self.gateway, self.hops, self.offline
+
+    def failed(self, node: int) -> bool:
+        """A neighbour did not take a packet. On a shared channel that says little, once.
+
+        Returns whether it is now known to be deaf to this node.
+        """
         neighbour, now_s = self.neighbours.get(node), self.now_s
         if neighbour is None:
-            return
+            return False
+        was_deaf = neighbour.deaf
+        neighbour.refuses(now_s)
         is_due = now_s - neighbour.alive_s <= DUE * neighbour.beacon.interval_s
         if not self._shared or not is_due or neighbour.doubted_s > neighbour.alive_s:
             neighbour.failed_s = now_s
         neighbour.doubted_s = now_s
+        return neighbour.deaf and not was_deaf
 
     def leads_not_to(self, node: int, neighbour: int) -> None:
         """A neighbour returned a packet for `node`."""
@@ -234,6 +268,7 @@ class BeaconRoutes(IRoutes):
             self.hops, self.number = beacon.hops + 1, beacon.number
             self.ancestors = (beacon.parent, *beacon.ancestors)[:ANCESTORS]
             self.offline = self._is_offline(beacon)
+            self.proved_s = max(self.proved_s, parent.proved_s)
         return before != (self.gateway, self.parent, self.hops, self.offline)
 
     def set_internet(self, works: bool) -> None:
@@ -341,7 +376,7 @@ class BeaconRoutes(IRoutes):
         if parent is not None and self._comes_from_below(came_from):
             yield Way(parent.node, parent.heard_s)
         yield from self._nearer(node)
-        if direct is not None and is_doubtful:
+        if direct is not None and is_doubtful and not direct.deaf:
             yield Way(node, direct.alive_s)
 
     def _next_to(self, node: int) -> list[Way]:
@@ -405,8 +440,10 @@ class BeaconRoutes(IRoutes):
         return sum(1 + len(n.announced_s) for n in list(self.neighbours.values()))
 
     def get_set_of_children(self) -> frozenset[int]:
-        """Ids of the nodes in direct reach."""
-        return frozenset(self.neighbours)
+        """Ids of the nodes in direct reach, in both directions."""
+        return frozenset(n.node for n in self._all() if not n.deaf)
 
     def node_moved_location(self) -> None:
-        """Nothing to forget: the next beacons show where everybody is."""
+        """The next beacons show where everybody is; who is deaf there must show anew."""
+        for neighbour in self.neighbours.values():
+            neighbour.hears_perhaps()

@@ -104,6 +104,10 @@ class RepairActions(abc.ABC):
         """The nodes in direct reach."""
         return {node: self._view(node) for node in self._parts.routing.get_set_of_children()}
 
+    def is_unheard(self) -> bool:
+        """Whether it hears nodes, and none of them hears it."""
+        return bool(self._parts.neighbours.deaf()) and not self.neighbours()
+
     def reachable(self) -> Mapping[int, NeighbourView]:
         """All nodes with a route to them and a reported place."""
         places = self._parts.neighbours.places()

@@ -83,6 +83,9 @@ class GroupRepair(LoneRepair):
         mesh.happened(RouterEvent.NO_NEIGHBOURS)
         step, self.reason = self._next_step(alone=True)
         if step is None and self._was_everywhere:
+            if mesh.is_unheard():
+                self.reason = "hears others and is not heard: its transmitter may be broken"
+                return
             self._was_everywhere = False
             mesh.try_again()
             step, self.reason = self._next_step(alone=True)
