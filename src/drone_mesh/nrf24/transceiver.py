@@ -14,6 +14,7 @@ from drone_mesh.nrf24.errors import RadioError
 from drone_mesh.nrf24.gpio import CePin
 from drone_mesh.nrf24.link import ChipLink
 from drone_mesh.nrf24.registers import (
+    ADDRESS_BYTES,
     ARC,
     ARC_CNT,
     ARD,
@@ -21,8 +22,10 @@ from drone_mesh.nrf24.registers import (
     ERX,
     MAX_PAYLOAD_BYTES,
     MAX_RT,
+    RESET_VALUES,
     RX_DR,
     RX_EMPTY,
+    RX_FIFO_IS_EMPTY,
     RX_P_NO,
     STATUS_FLAGS,
     TX_DS,
@@ -42,6 +45,7 @@ POWER_UP_S = 5e-3  # Tpd2stby is up to 4.5 ms, depending on the crystal [DS Tabl
 CE_PULSE_S = 20e-6  # Thce is 10 us; a pulse sends one packet and does not keep the chip in TX
 CE_TO_CSN_S = 5e-6  # Tpece2csn is 4 us
 TIMEOUT_S = 95e-3  # the longest transaction takes 87.1 ms
+_REMEMBERED = 64  # our choice: payloads whose PID is known; with others between, one may be lost
 _DRAIN_LIMIT = 32  # payloads at a time; the FIFO holds three, more arrive only while we read
 # How long an acknowledgement in progress may still take after CE went low.
 TX_DELAY_S = {DataRate.KBPS_250: 505e-6, DataRate.MBPS_1: 280e-6, DataRate.MBPS_2: 240e-6}
@@ -85,13 +89,15 @@ class Transceiver:
         self.inbox: deque[PipePayload] = deque()
         self._loaded: tuple[bytes, bytes] | None = None  # address and payload in the TX FIFO
         self._pid = 0  # of the last payload written, relative to an unknown start
-        self._last_sent: dict[bytes, tuple[int, bytes]] = {}  # address -> PID and payload
+        self._pids: dict[tuple[bytes, bytes], int] = {}  # of the latest payloads to each address
 
     def set_up(self) -> None:
         """Write every register that matters, because only power resets the chip; then listen."""
         settings = self._settings
         self._ce.value = False
         self._retries = (settings.retransmit_delay, settings.retransmits)
+        if self._link.read(Register.TX_ADDR, ADDRESS_BYTES) == RESET_VALUES[Register.TX_ADDR]:
+            self._pid = 0  # the supply failed, or nothing was sent yet: the chip counts anew
         self._link.write_byte(Register.CONFIG, settings.config_power_down)
         self._link.write_and_verify(self._registers)
         self._link.command(Command.FLUSH_TX)
@@ -148,29 +154,40 @@ class Transceiver:
         self._link.write(Register.RX_ADDR_P0, address)
         self._link.write_byte(Register.EN_RXADDR, self._settings.listening_pipes | ERX[0].mask)
 
-    def load(self, address: bytes, payload: bytes, *, again: bool = False) -> None:
+    def load(
+        self,
+        address: bytes,
+        payload: bytes,
+        *,
+        again: bool = False,
+        command: Command = Command.W_TX_PAYLOAD,
+    ) -> None:
         """Load the payload into the chip with the right packet number (PID).
 
-        The receiver's chip treats a packet with the PID and CRC of the previous one as a
-        repetition: it acknowledges it and drops it. So `again`, another try of a packet that may
-        have arrived while its acknowledgement was lost, has the PID of the previous try, and any
-        other packet has another PID than the same bytes had before. The PID has two bits and counts
-        written payloads: writing one and flushing it uses up a PID.
+        The receiver's chip treats a packet with the PID and CRC of the previous one that it
+        received as a repetition: it drops it, although it acknowledges it if that was requested. So
+        `again`, another try of a packet that may have arrived while its acknowledgement was lost,
+        has the PID of the previous try, and any other packet has another PID than the same bytes
+        had before, even if other packets were sent since: these may all be lost. The PID has two
+        bits and counts written payloads: writing one and flushing it uses up a PID.
         """
-        before = self._last_sent.get(address)
-        if again and self._loaded == (address, payload):
+        packet = (address, payload)
+        if again and self._loaded == packet:
             return  # it is still loaded
         self.drop()
         pid = self._pid + 1 & 3
-        if before is not None and before[1] == payload:
-            wanted = before[0] if again else pid + (before[0] == pid) & 3
+        before = self._pids.pop(packet, None)
+        if before is not None:
+            wanted = before if again else pid + (before == pid) & 3
             while pid != wanted:
                 self._write_payload(payload)
                 self._link.command(Command.FLUSH_TX)
                 pid = self._pid + 1 & 3
-        self._write_payload(payload)
-        self._loaded = (address, payload)
-        self._last_sent[address] = (pid, payload)
+        self._write_payload(payload, command)
+        self._loaded = packet
+        self._pids[packet] = pid
+        if len(self._pids) > _REMEMBERED:
+            del self._pids[next(iter(self._pids))]
 
     def transmit(self) -> Try:
         """Send the loaded payload to a node; without an acknowledgement it stays in the chip."""
@@ -191,10 +208,11 @@ class Transceiver:
         self.become_transmitter(settings.broadcast_address)
         if plain:
             self._link.write_byte(Register.EN_AA, settings.auto_ack_pipes & ~ENAA[0].mask)
-        self.drop()
         # On a pipe without auto-acknowledgement an ordinary payload requests none.
-        self._write_payload(payload, Command.W_TX_PAYLOAD if plain else Command.W_TX_PAYLOAD_NO_ACK)
+        command = Command.W_TX_PAYLOAD if plain else Command.W_TX_PAYLOAD_NO_ACK
+        self.load(settings.broadcast_address, payload, command=command)
         self._pulse(settings.broadcast_s)
+        self._loaded = None
         self._statistics.airtime_s += settings.frame_s
         self._link.write_byte(Register.STATUS, TX_DS.mask)
         if plain:
@@ -216,6 +234,11 @@ class Transceiver:
                 continue
             found = True
             width = self._link.command(Command.R_RX_PL_WID, b"\0")[0]
+            if RX_P_NO.get(self._link.status) == RX_FIFO_IS_EMPTY:
+                raise RadioError(
+                    f"FIFO_STATUS reads 0x{fifo:02X}, which means that a payload waits, and STATUS "
+                    f"0x{self._link.status:02X}, which means that none does: check MISO"
+                )
             if width > MAX_PAYLOAD_BYTES:
                 self._statistics.corrupt += 1
                 self._link.command(Command.FLUSH_RX)

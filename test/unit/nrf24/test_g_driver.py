@@ -168,6 +168,32 @@ def test_a_chip_that_disappears_costs_sends_and_is_found_when_it_is_back(lab):
     assert sender.statistics().restarts == 1
 
 
+@pytest.mark.parametrize("bytes_after_status", [1, 32])
+def test_zeros_behind_a_right_status_are_no_payloads(lab, caplog, bytes_after_status):
+    """A bad MISO: FIFO_STATUS reads 0, "a payload waits", and RX_P_NO says that none does."""
+    driver = lab.driver(5)
+    spi = driver.chip.spi
+    transfer = spi.xfer2
+
+    def without_data(out):
+        answer = transfer(out)
+        return [answer[0], *bytes(len(out) - 1)] if len(out) <= 1 + bytes_after_status else answer
+
+    spi.xfer2 = without_data
+    with caplog.at_level(logging.WARNING):
+        assert driver.receive(0.05) == []
+    assert not driver.working
+    assert driver.statistics().received == 0
+    assert "FIFO_STATUS reads 0x00" in caplog.text
+    assert "check MISO" in caplog.text
+    spi.xfer2 = transfer
+    lab.wait_us(1_100_000)
+    sender = lab.driver(10, 100.0)
+    assert driver.receive(0.05) == []
+    assert sender.send(5, PAYLOAD)
+    assert driver.receive(0.05) == [(2, PAYLOAD)]
+
+
 @pytest.mark.parametrize("level", [True, False], ids=["high", "low"])
 def test_an_irq_pin_that_is_stuck_is_given_up_for_polling(lab, level):
     sender, receiver = lab.driver(5), lab.driver(10, 100.0)
