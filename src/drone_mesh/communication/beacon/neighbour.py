@@ -7,7 +7,7 @@ import math
 from drone_mesh.communication.beacon.packets import Beacon, Motion
 
 FRESH = 2.5  # intervals: a neighbour that was silent for longer is none
-MOST_REFUSED = 3  # our choice: packets that it did not take, since it showed that it hears this node
+MOST_REFUSED = 3  # our choice: packets that it did not take, since it last proved that it hears
 REFUSED_S = 3.0  # our choice: within which; a burst of losses is shorter
 
 

@@ -75,7 +75,7 @@ class BeaconRoutes(IRoutes):
         self.number = 0
         self.offline = False  # the preferred gateway has no internet
         self._own_number = 0  # of the latest beacon as a gateway
-        self.proved_s = -math.inf  # when the parent, at that time, last showed that it hears this node
+        self.proved_s = -math.inf  # when the parent, at that time, last proved that it hears
         self.motion: Motion | None = None  # this node's own
         self.now_s = 0.0
         # By neighbour and gateway: the newest number, and when it came. A number counts only for
