@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Mapping
+from typing import Iterator, Mapping
 
 from drone_mesh.nrf24.errors import RadioError
-from drone_mesh.nrf24.registers import Command, Register
+from drone_mesh.nrf24.registers import RF_DR_LOW, Command, Register
 from drone_mesh.nrf24.spi import SpiDevice
 
 _NO_CHIP = (0x00, 0xFF)  # STATUS if nothing drives MISO, or nothing is connected
+_BAD_SPI = "check wiring and supply, or use a slower SPI clock"
+_NOT_IN_OLD_CHIPS = {Register.RF_SETUP: RF_DR_LOW.mask, Register.FEATURE: 0xFF}
+_OLD_CHIP = (
+    'this is an nRF24L01 without "+", or a clone of it: no 250 kbit/s, no FEATURE. '
+    "It works with --rate 1M --broadcast shockburst, on all nodes"
+)
 
 
 class ChipLink:
@@ -49,21 +55,31 @@ class ChipLink:
         self.command(Command.W_REGISTER | register, bytes((value,)))
 
     def write_and_verify(self, values: Mapping[Register, bytes]) -> None:
-        """Write registers and read each back; RadioError names the one that differs."""
+        """Write registers and read each back; RadioError names the first that differs, and why."""
         for register, value in values.items():
             self.write(register, value)
-        wrong = self.first_difference(values)
-        if wrong is not None:
-            register, found = wrong
+        wrong = dict(self._differences(values))
+        for register, found in wrong.items():
+            written = values[register]
             raise RadioError(
-                f"{register.name} was written as {values[register].hex()} and reads as "
-                f"{found.hex()}: check wiring and supply, or use a slower SPI clock"
+                f"{register.name} was written as {written.hex()} and reads as {found.hex()}: "
+                + (_OLD_CHIP if _is_old_chip(values, wrong) else _BAD_SPI)
             )
 
     def first_difference(self, values: Mapping[Register, bytes]) -> tuple[Register, bytes] | None:
         """The first register that does not hold its value, with the value found, or None."""
+        return next(self._differences(values), None)
+
+    def _differences(self, values: Mapping[Register, bytes]) -> Iterator[tuple[Register, bytes]]:
         for register, value in values.items():
             found = self.read(register, len(value))
             if found != value:
-                return register, found
-        return None
+                yield register, found
+
+
+def _is_old_chip(values: Mapping[Register, bytes], wrong: Mapping[Register, bytes]) -> bool:
+    """Whether all that does not hold is what a chip without "+" does not have."""
+    return all(
+        found[0] == values[register][0] & ~_NOT_IN_OLD_CHIPS.get(register, 0)
+        for register, found in wrong.items()
+    )

@@ -138,11 +138,37 @@ def test_chips_without_plus_work_beside_plus_chips_in_shockburst_mode(lab):
     assert plain.chip.registers.read(Register.FEATURE) == b"\0"
 
 
-def test_a_chip_without_plus_is_refused_in_the_mode_that_it_cannot_do(lab):
-    with pytest.raises(RadioError, match="FEATURE was written as 01 and reads as 00"):
-        lab.driver(1, plus=False, data_rate=DataRate.MBPS_1)
+OLD_CHIP = (
+    'this is an nRF24L01 without "+", or a clone of it: no 250 kbit/s, no FEATURE. '
+    "It works with --rate 1M --broadcast shockburst, on all nodes"
+)
 
 
-def test_a_chip_without_plus_is_refused_at_the_rate_that_it_does_not_have(lab):
-    with pytest.raises(RadioError, match="RF_SETUP was written as 26 and reads as 06"):
-        lab.driver(1, plus=False, broadcast_mode=BroadcastMode.SHOCKBURST)
+@pytest.mark.parametrize(
+    ("settings", "found"),
+    [
+        ({}, "RF_SETUP was written as 26 and reads as 06"),
+        (
+            {"data_rate": DataRate.MBPS_1},
+            "FEATURE was written as 01 and reads as 00",
+        ),
+        (
+            {"broadcast_mode": BroadcastMode.SHOCKBURST},
+            "RF_SETUP was written as 26 and reads as 06",
+        ),
+    ],
+)
+def test_a_chip_without_plus_is_named_with_the_options_that_work_with_it(lab, settings, found):
+    with pytest.raises(RadioError) as refused:
+        lab.driver(1, plus=False, **settings)
+    assert str(refused.value) == f"{found}: {OLD_CHIP}"
+
+
+def test_a_register_that_every_chip_has_blames_the_wiring(lab):
+    driver = lab.driver(1, begin=False)
+    write = driver.chip.registers.write
+    driver.chip.registers.write = lambda register, data: write(
+        register, bytes(len(data)) if register in (Register.RF_CH, Register.FEATURE) else data
+    )
+    with pytest.raises(RadioError, match="RF_CH was written as 01 .* check wiring and supply"):
+        driver.begin()
