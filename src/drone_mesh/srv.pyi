@@ -29,6 +29,7 @@ class AddDroneResponse(Message):
 class AddDrone:
     _request_class = AddDroneRequest
     _response_class = AddDroneResponse
+    _md5sum = ""
 
 class AreaScanRequest(Message):
     id: int
@@ -41,6 +42,7 @@ class AreaScanResponse(Message):
 class AreaScan:
     _request_class = AreaScanRequest
     _response_class = AreaScanResponse
+    _md5sum = ""
 
 class BroadcastRequest(Message):
     from_: int
@@ -54,6 +56,7 @@ class BroadcastResponse(Message):
 class Broadcast:
     _request_class = BroadcastRequest
     _response_class = BroadcastResponse
+    _md5sum = ""
 
 class CasusRequest(Message):
     caseID: int
@@ -64,6 +67,7 @@ class CasusResponse(Message): ...
 class Casus:
     _request_class = CasusRequest
     _response_class = CasusResponse
+    _md5sum = ""
 
 class FlyMissionRequest(Message):
     FLY: Final = 0
@@ -90,6 +94,7 @@ class FlyMissionResponse(Message):
 class FlyMission:
     _request_class = FlyMissionRequest
     _response_class = FlyMissionResponse
+    _md5sum = ""
 
 class OrderFlightRequest(Message):
     id: int
@@ -114,6 +119,7 @@ class OrderFlightResponse(Message):
 class OrderFlight:
     _request_class = OrderFlightRequest
     _response_class = OrderFlightResponse
+    _md5sum = ""
 
 class OrderFormationRequest(Message):
     name: str
@@ -150,6 +156,7 @@ class OrderFormationResponse(Message):
 class OrderFormation:
     _request_class = OrderFormationRequest
     _response_class = OrderFormationResponse
+    _md5sum = ""
 
 class OrderLayoutRequest(Message):
     caseID: int
@@ -176,6 +183,7 @@ class OrderLayoutResponse(Message):
 class OrderLayout:
     _request_class = OrderLayoutRequest
     _response_class = OrderLayoutResponse
+    _md5sum = ""
 
 class PowerSwitchRequest(Message):
     power: bool
@@ -186,6 +194,7 @@ class PowerSwitchResponse(Message): ...
 class PowerSwitch:
     _request_class = PowerSwitchRequest
     _response_class = PowerSwitchResponse
+    _md5sum = ""
 
 class PreviewLayoutRequest(Message):
     caseID: int
@@ -216,6 +225,7 @@ class PreviewLayoutResponse(Message):
 class PreviewLayout:
     _request_class = PreviewLayoutRequest
     _response_class = PreviewLayoutResponse
+    _md5sum = ""
 
 class RemoveDroneRequest(Message):
     id: int
@@ -229,6 +239,7 @@ class RemoveDroneResponse(Message):
 class RemoveDrone:
     _request_class = RemoveDroneRequest
     _response_class = RemoveDroneResponse
+    _md5sum = ""
 
 class RequestDroneFlightRequest(Message):
     ID: int
@@ -250,6 +261,7 @@ class RequestDroneFlightResponse(Message):
 class RequestDroneFlight:
     _request_class = RequestDroneFlightRequest
     _response_class = RequestDroneFlightResponse
+    _md5sum = ""
 
 class RequestGPSRequest(Message): ...
 
@@ -267,6 +279,7 @@ class RequestGPSResponse(Message):
 class RequestGPS:
     _request_class = RequestGPSRequest
     _response_class = RequestGPSResponse
+    _md5sum = ""
 
 class SendDataRequest(Message):
     to: int
@@ -292,6 +305,7 @@ class SendDataResponse(Message):
 class SendData:
     _request_class = SendDataRequest
     _response_class = SendDataResponse
+    _md5sum = ""
 
 class SetSpeedRequest(Message):
     paused: bool
@@ -306,6 +320,7 @@ class SetSpeedResponse(Message):
 class SetSpeed:
     _request_class = SetSpeedRequest
     _response_class = SetSpeedResponse
+    _md5sum = ""
 
 class WirelessMessageRequest(Message):
     from_: int
@@ -320,6 +335,7 @@ class WirelessMessageResponse(Message):
 class WirelessMessage:
     _request_class = WirelessMessageRequest
     _response_class = WirelessMessageResponse
+    _md5sum = ""
 
 class WirelessMessagesRequest(Message):
     from_: int
@@ -333,6 +349,7 @@ class WirelessMessagesResponse(Message):
 class WirelessMessages:
     _request_class = WirelessMessagesRequest
     _response_class = WirelessMessagesResponse
+    _md5sum = ""
 
 class WithdrawLayoutRequest(Message):
     id: int
@@ -346,3 +363,4 @@ class WithdrawLayoutResponse(Message):
 class WithdrawLayout:
     _request_class = WithdrawLayoutRequest
     _response_class = WithdrawLayoutResponse
+    _md5sum = ""

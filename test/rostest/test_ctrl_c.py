@@ -7,6 +7,7 @@ takes: about 4 s on an idle machine, most of it in roslaunch.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 import signal
@@ -17,6 +18,7 @@ import time
 import unittest
 from pathlib import Path
 
+import rosgraph
 import rostest
 from rostest_support import free_port, wait_for
 
@@ -39,9 +41,9 @@ while not rospy.is_shutdown():
 """
 
 
-def processes_of(port: int) -> list[str]:
-    """Command lines of our nodes that talk to the master on this port."""
-    found = []
+def processes_of(port: int) -> dict[int, str]:
+    """Command lines of our nodes that talk to the master on this port, by process id."""
+    found = {}
     for process in Path("/proc").glob("[0-9]*"):
         try:
             command = (process / "cmdline").read_bytes().replace(b"\0", b" ").decode()
@@ -49,15 +51,18 @@ def processes_of(port: int) -> list[str]:
         except OSError:
             continue  # it has ended meanwhile, or is not ours
         if f":{port}" in environment and any(node in command for node in NODES):
-            found.append(command)
+            found[int(process.name)] = command
     return found
 
 
 class CtrlCTest(unittest.TestCase):
-    def run_and_interrupt(self, ready: tuple[str, ...], *arguments: str) -> None:
+    def run_and_interrupt(
+        self, ready: tuple[str, ...], *arguments: str, hangs: str = "", last_line: str = ""
+    ) -> None:
+        """`hangs`: a node of others, which hangs until `last_line` is in the output."""
         port = free_port()
         environment = {**os.environ, "ROS_MASTER_URI": f"http://127.0.0.1:{port}"}
-        with tempfile.TemporaryFile("w+") as output:
+        with tempfile.TemporaryFile("w+") as output, contextlib.ExitStack() as others:
 
             def said() -> str:
                 output.seek(0)
@@ -71,8 +76,16 @@ class CtrlCTest(unittest.TestCase):
                 start_new_session=True,
             )
             try:
+                if hangs:
+                    wait_for("a node", 60, lambda: processes_of(port))
+                    command = [sys.executable, str(Path(__file__).with_name(hangs))]
+                    other = others.enter_context(subprocess.Popen(command, env=environment))
+                    others.callback(other.kill)
                 for line in ready:
                     wait_for(f"'{line}' in the output", 60, lambda line=line: line in said())
+                if hangs:
+                    other.send_signal(signal.SIGSTOP)
+                    wait_for(f"'{last_line}' in the output", 60, lambda: last_line in said())
                 begun_s = time.monotonic()
                 os.killpg(launch.pid, signal.SIGINT)  # as a terminal does: to all processes
                 launch.wait(timeout=30)
@@ -83,7 +96,7 @@ class CtrlCTest(unittest.TestCase):
             self.assertNotIn("Traceback", ROSLAUNCHS_OWN.sub("", said()))
             self.assertNotIn("escalating", said())
             print(f"ended after {took_s:.1f} s")
-            self.assertEqual(processes_of(port), [])
+            self.assertEqual(processes_of(port), {})
 
     def test_while_the_mesh_runs(self) -> None:
         ready = ("started 31 nodes", "offering the flights of 31 drones as actions")
@@ -97,6 +110,48 @@ class CtrlCTest(unittest.TestCase):
 
     def test_while_emulated_radios_are_in_each_others_way(self) -> None:
         self.run_and_interrupt(("started 18 nodes",), "radio:=nrf24")
+
+    def test_while_a_simulator_of_others_hangs(self) -> None:
+        self.run_and_interrupt(
+            ("connected to the simulator", "started 3 nodes"),
+            "routers:=2",
+            "simulator:=false",
+            hangs="simple_simulator.py",
+            last_line="lost the simulator",
+        )
+
+    def test_while_the_master_hangs(self) -> None:
+        """roslaunch would wait for it as well, so the nodes are told themselves."""
+        port = free_port()
+        uri = f"http://127.0.0.1:{port}"
+        launch = subprocess.Popen(
+            ["roslaunch", "-p", str(port), "drone_mesh", "factory.launch", "actions:=true"],
+            env={**os.environ, "ROS_MASTER_URI": uri},
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        master = 0
+        try:
+            assert launch.stdout is not None
+            wanted = {"started 18 nodes", "offering the flights"}
+            while wanted:
+                line = launch.stdout.readline()
+                self.assertTrue(line, f"it ended without '{wanted}'")
+                wanted = {part for part in wanted if part not in line}
+            nodes = processes_of(port)
+            self.assertEqual(len(nodes), len(NODES), nodes)
+            master = rosgraph.Master("/test_ctrl_c", uri).getPid()
+            os.kill(master, signal.SIGSTOP)
+            begun_s = time.monotonic()
+            for pid in nodes:
+                os.kill(pid, signal.SIGINT)
+            wait_for("they end", 15, lambda: not processes_of(port).keys() & nodes.keys())
+            print(f"ended after {time.monotonic() - begun_s:.1f} s")
+        finally:
+            if master:
+                os.kill(master, signal.SIGCONT)
+            launch.send_signal(signal.SIGINT)
+            launch.communicate(timeout=60)
 
     def test_while_a_node_asks_the_master(self) -> None:
         """rospy's own handler would wait for the call that it interrupts, for ever."""

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import http.client
 import inspect
 import os
 import signal
-import socket
 import sys
 import threading
-import xmlrpc.client
 from pathlib import Path
 from typing import Callable
 
@@ -19,16 +16,23 @@ import rospy
 
 from drone_mesh.errors import MeshError
 from drone_mesh.ros.graph import names
+from drone_mesh.ros.graph.bounded_master import (
+    ANSWER_TIMEOUT_S,
+    NO_ANSWER,
+    bounded_master,
+    bounded_proxy,
+    master_answers,
+)
+from drone_mesh.ros.graph.orderly_stop import end_without_dead_master
 from drone_mesh.stopping import ends_as
 
 SPEAKER_VARIABLE = "DRONE_MESH_SPEAKER"  # the node of a launch file that says why it cannot start
-ANSWER_TIMEOUT_S = 5.0  # wall; our choice: a node that is silent for longer is dead
 FAILED = 2  # exit code: the tool could not do its work; 1 means that it did, with a bad result
 
 
 def require_master() -> None:
     """Raises MeshError, which names the address that was tried and the remedy."""
-    if not rosgraph.is_master_online():
+    if not master_answers():
         uri = os.environ.get("ROS_MASTER_URI", "ROS_MASTER_URI (not set)")
         raise MeshError(
             f"no ROS master at {uri}: start the simulation (roslaunch drone_mesh factory.launch), "
@@ -63,15 +67,11 @@ def _require_free_name(name: str) -> None:
 
 
 def _is_taken(full: str) -> bool:
-    before_s = socket.getdefaulttimeout()
-    socket.setdefaulttimeout(ANSWER_TIMEOUT_S)
     try:
-        uri = rosgraph.Master(full).lookupNode(full)
-        answer = xmlrpc.client.ServerProxy(uri).getName(full)  # code, text, name
-    except (OSError, http.client.HTTPException, xmlrpc.client.Error, rosgraph.MasterException):
+        uri = bounded_master(full, ANSWER_TIMEOUT_S).lookupNode(full)
+        answer = bounded_proxy(uri, ANSWER_TIMEOUT_S).getName(full)  # code, text, name
+    except (rosgraph.MasterException, *NO_ANSWER):
         return False  # it never ran, or it died
-    finally:
-        socket.setdefaulttimeout(before_s)
     return isinstance(answer, list) and full in answer
 
 
@@ -81,6 +81,7 @@ def _shut_down_beside(number: int, _frame: object) -> None:
     rospy's own handler calls the master while the interrupted thread may hold the lock of the
     connection to it. Then the node, mostly one that starts, would hang for ever.
     """
+    end_without_dead_master()
     threading.Thread(
         target=rospy.signal_shutdown, args=(f"signal {number}",), name="shutdown"
     ).start()

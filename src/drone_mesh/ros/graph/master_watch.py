@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import http.client
 import logging
-import xmlrpc.client
 from typing import Any
 
 import rosgraph
@@ -16,10 +14,10 @@ from rospy.impl.registration import (
     get_topic_manager,
 )
 
+from drone_mesh.ros.graph.bounded_master import NO_ANSWER
 from drone_mesh.ros.graph.periodic import Periodic
 
 PERIOD_S = 2.0  # wall; our choice
-NO_ANSWER = (OSError, http.client.HTTPException, xmlrpc.client.Error, rospy.ROSException)
 
 _log = logging.getLogger(__name__)
 

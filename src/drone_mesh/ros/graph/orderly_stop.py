@@ -5,17 +5,39 @@ from __future__ import annotations
 import logging
 import os
 import signal
+import socket
 import sys
 import threading
 
 import rospy
 
+from drone_mesh.ros.graph.bounded_master import NO_ANSWER, bounded_master
 from drone_mesh.stopping import StopRequest
 
+MASTER_TIMEOUT_S = 2.0  # our choice, wall: asked twice, a master that is silent for so long hangs
 FINISH_TIMEOUT_S = 3.0  # our choice: `rosnode kill` waits this long (wall) for our threads
 
 
 _log = logging.getLogger(__name__)
+
+
+def end_without_dead_master() -> None:
+    """Call when the program was told to end: ROS would wait for a master that hangs for ever."""
+    threading.Thread(target=_end_without_dead_master, name="dead master", daemon=True).start()
+
+
+def _end_without_dead_master() -> None:
+    for _try in range(2):
+        try:
+            bounded_master(rospy.get_name(), MASTER_TIMEOUT_S).getPid()
+        except socket.timeout:
+            continue
+        except NO_ANSWER:  # it has ended, and nobody waits for it
+            return
+        else:
+            return
+    print(f"{rospy.get_name()}: the ROS master does not answer: ending without it", file=sys.stderr)
+    os._exit(1)
 
 
 class OrderlyStop:
@@ -80,5 +102,7 @@ class OrderlyStop:
             self._finished.wait(FINISH_TIMEOUT_S)
 
     def _tell(self) -> None:
-        self._told = True
+        if not self._told:
+            self._told = True
+            end_without_dead_master()
         self._request.make()

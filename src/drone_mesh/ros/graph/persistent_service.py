@@ -11,12 +11,15 @@ from typing import Generic, Protocol, TypeVar
 import rosgraph
 import rospy
 from genpy import Message
-from rospy.exceptions import TransportInitError
-from rospy.impl.tcpros_base import TCPROSTransport
-from rospy.impl.tcpros_service import TCPROSServiceClient
+from rosgraph.network import (
+    ROSHandshakeException,
+    read_ros_handshake_header,
+    write_ros_handshake_header,
+)
 from rospy.impl.validators import ParameterInvalid
 
 from drone_mesh.errors import MeshError
+from drone_mesh.ros.graph.bounded_master import NO_ANSWER, bounded_master
 
 CALL_TIMEOUT_S = 2  # our choice: wall seconds without an answer until a service is gone
 SINGLE_CALL_TIMEOUT_S = 10  # the same for `call_once`: the DroneManager may wait for a gateway
@@ -32,6 +35,14 @@ class ServiceGone(MeshError):
     """The service does not answer. The connection is closed; connect() tries again."""
 
 
+class ServiceSilent(ServiceGone):
+    """Its process, or the master, is there and does not answer."""
+
+
+class ServiceUnknown(ServiceGone):
+    """Nobody offers the service."""
+
+
 class ServiceRefused(MeshError):
     """The service answered with an error; the message is its text."""
 
@@ -43,6 +54,7 @@ Response = TypeVar("Response", bound=Message)
 class ServiceClass(Protocol[Request, Response]):
     """The class that genpy generates from a .srv file."""
 
+    _md5sum: str
     _request_class: type[Request]
     _response_class: type[Response]
 
@@ -50,8 +62,8 @@ class ServiceClass(Protocol[Request, Response]):
 class PersistentService(Generic[Request, Response]):
     """One connection to one service.
 
-    rospy makes the connection, this class the calls: those of rospy's ServiceProxy have no timeout,
-    report a lost connection only as text, and cost three times as much.
+    Connecting and calls end after a time. Those of rospy's ServiceProxy do not; they also report a
+    lost connection only as text, and cost three times as much.
 
     A thread other than the caller of `call` may use `connect` and `close`, but not during a call.
     """
@@ -64,39 +76,64 @@ class PersistentService(Generic[Request, Response]):
     ) -> None:
         """`timeout_s`: whole wall seconds to wait for an answer."""
         self.name = rospy.resolve_name(name)
-        self._timeval = struct.pack("@ll", timeout_s, 0)
+        self._timeout_s = timeout_s
         self._response_class = service_class._response_class
-        self._protocol = TCPROSServiceClient(self.name, service_class, headers={"persistent": "1"})
-        self._transport: TCPROSTransport | None = None
+        self._md5sum = service_class._md5sum
+        self._connection: socket.socket | None = None
+        self.server = ""  # the name of the node that offers it; empty if unknown
 
     def is_connected(self) -> bool:
         """Whether there is a connection that the other end has not closed. Any thread."""
-        transport = self._transport
-        connection = None if transport is None else transport.socket
+        connection = self._connection
         if connection is None or connection.fileno() < 0:
             return False
         poller = select.poll()
         poller.register(connection.fileno(), select.POLLRDHUP)
         return not poller.poll(0)  # POLLHUP and POLLERR are always reported
 
-    @property
-    def server(self) -> str:
-        """The name of the node that offers the service; empty if unknown or not connected."""
-        return "" if self._transport is None else self._transport.header.get("callerid", "")
-
     def connect(self) -> None:
         """Look the service up and connect. Raises ServiceGone."""
         self.close()
         try:
-            uri = rosgraph.Master(rospy.get_name()).lookupService(self.name)
-            host, port = rospy.core.parse_rosrpc_uri(uri)
-            transport = TCPROSTransport(self._protocol, self.name)
-            transport.connect(host, port, uri)
+            master = bounded_master(rospy.get_name(), self._timeout_s)
+            uri = master.lookupService(self.name)
+            address = rospy.core.parse_rosrpc_uri(uri)
+        except rosgraph.MasterException as error:
+            raise ServiceUnknown(f"{self.name}: {error}") from error
+        except (ParameterInvalid, *NO_ANSWER) as error:
+            raise self._gone(error) from error
+        try:
+            self._connection = self._shake_hands(address)
+        except (OSError, ROSHandshakeException) as error:
+            raise self._gone(error) from error
+
+    def _shake_hands(self, address: tuple[str, int]) -> socket.socket:
+        connection = socket.create_connection(address, self._timeout_s)
+        try:
+            header = {
+                "service": self.name,
+                "md5sum": self._md5sum,
+                "callerid": rospy.get_name(),
+                "persistent": "1",
+            }
+            write_ros_handshake_header(connection, header)
+            answer = read_ros_handshake_header(connection, io.BytesIO(), _READ_BYTES)
+            if "error" in answer:
+                raise ROSHandshakeException(answer["error"])
+            connection.settimeout(None)  # Python would ask the kernel twice for each call
+            timeval = struct.pack("@ll", self._timeout_s, 0)
             for option in (socket.SO_RCVTIMEO, socket.SO_SNDTIMEO):
-                transport.socket.setsockopt(socket.SOL_SOCKET, option, self._timeval)
-        except (rosgraph.MasterException, TransportInitError, ParameterInvalid, OSError) as error:
-            raise ServiceGone(f"{self.name}: {error}") from error
-        self._transport = transport
+                connection.setsockopt(socket.SOL_SOCKET, option, timeval)
+        except BaseException:
+            connection.close()
+            raise
+        self.server = answer.get("callerid", "")
+        return connection
+
+    def _gone(self, error: Exception) -> ServiceGone:
+        if isinstance(error, (BlockingIOError, socket.timeout)):
+            return ServiceSilent(f"{self.name}: no answer for {self._timeout_s} s")
+        return ServiceGone(f"{self.name}: {error}")
 
     def call(self, request: Request) -> Response:
         """Send a request and wait for the answer. Raises ServiceGone and ServiceRefused."""
@@ -106,16 +143,15 @@ class PersistentService(Generic[Request, Response]):
 
     def call_bytes(self, fields: bytes) -> bytes:
         """Like `call`, with the fields of request and answer as ROS serialises them."""
-        transport = self._transport
-        if transport is None:
+        connection = self._connection
+        if connection is None:
             raise ServiceGone(f"{self.name}: not connected")
         try:
-            transport.socket.sendall(_REQUEST_HEAD.pack(len(fields)) + fields)
-            ok, answer = self._read_answer(transport.socket)
-        # AttributeError: rospy shuts down and closed the connection during the call.
-        except (OSError, EOFError, AttributeError) as error:
+            connection.sendall(_REQUEST_HEAD.pack(len(fields)) + fields)
+            ok, answer = self._read_answer(connection)
+        except (OSError, EOFError) as error:
             self.close()
-            raise ServiceGone(f"{self.name}: {error}") from error
+            raise self._gone(error) from error
         if not ok:
             text = answer.decode("utf-8", "replace")
             raise ServiceRefused(text.replace(_PREFIX, "", 1))
@@ -123,9 +159,9 @@ class PersistentService(Generic[Request, Response]):
 
     def close(self) -> None:
         """Close the connection, if there is one."""
-        transport, self._transport = self._transport, None
-        if transport is not None:
-            transport.close()
+        connection, self._connection = self._connection, None
+        if connection is not None:
+            connection.close()
 
     @staticmethod
     def _read_answer(connection: socket.socket) -> tuple[bool, bytes]:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import logging
-import math
-import time
 from typing import Callable
 
 import rospy
@@ -20,9 +18,8 @@ from drone_mesh.ros.graph.conversions import location_msg, location_of
 from drone_mesh.ros.graph.logs import ThrottledLog
 from drone_mesh.ros.graph.persistent_service import PersistentService, ServiceGone, ServiceRefused
 from drone_mesh.ros.graph.run import Run, run_headers
+from drone_mesh.ros.host.silent_engines import SilentEngines
 from drone_mesh.srv import RequestGPS, RequestGPSRequest, RequestGPSResponse
-
-CONNECT_AGAIN_AFTER_S = 1.0  # our choice: wall seconds; a request costs the worker's time
 
 _log = logging.getLogger(__name__)
 
@@ -30,7 +27,8 @@ _log = logging.getLogger(__name__)
 class RosDroneEngineConnector(IDroneEngine):
     """Publishes /Drones/<id>/goal (Location), calls /Drones/<id>/gps (RequestGPS).
 
-    Belongs to the executor's worker. The connection is kept, and reopened when needed.
+    Belongs to the executor's worker. The connection is kept, and reopened when needed: by
+    SilentEngines as long as an engine does not answer.
     """
 
     def __init__(
@@ -38,9 +36,10 @@ class RosDroneEngineConnector(IDroneEngine):
         node_id: int,
         run: Run,
         why_not_fly: Callable[[], str],
+        silent: SilentEngines,
         obstacles: Obstacles | None = None,
     ) -> None:
-        """`run` and `obstacles` are the world's.
+        """`run` and `obstacles` are the world's, `silent` is the process's.
 
         `why_not_fly` returns why the drone cannot fly, empty if it can.
 
@@ -51,7 +50,7 @@ class RosDroneEngineConnector(IDroneEngine):
         self._node_id = node_id
         self._why_not_fly = why_not_fly
         self._gps = PersistentService(names.gps_service(node_id), RequestGPS)
-        self._gone_until_s = -math.inf  # monotonic
+        self._silent = silent
         self._throttled_log = ThrottledLog(_log)
         # Latched: an order that arrives before rospy has connected to the engine must not be lost.
         self._goal = rospy.Publisher(
@@ -65,12 +64,13 @@ class RosDroneEngineConnector(IDroneEngine):
     def connect(self) -> None:
         """Connect before the first request, so that the number of connections stays constant."""
         try:
-            self._gps.connect()
+            self._connect()
         except ServiceGone as error:
             _log.debug("drone %d: %s", self._node_id, error)
 
     def disconnect(self) -> None:
         """Close the connection and unregister the topic of the goals."""
+        self._silent.drop(self._gps)
         self._gps.close()
         self._goal.unregister()
 
@@ -108,13 +108,22 @@ class RosDroneEngineConnector(IDroneEngine):
         return location_of(answer)
 
     def _ask(self) -> RequestGPSResponse:
-        is_connected = self._gps.is_connected()
-        if not is_connected and time.monotonic() < self._gone_until_s:
-            raise ServiceGone(f"{self._gps.name}: no answer a moment ago")
+        if self._silent.holds(self._gps):
+            raise ServiceGone(f"{self._gps.name}: no answer")
+        if not self._gps.is_connected():
+            self._connect()
         try:
-            if not is_connected:
-                self._gps.connect()
             return self._gps.call(RequestGPSRequest())
-        except ServiceGone:
-            self._gone_until_s = time.monotonic() + CONNECT_AGAIN_AFTER_S
+        except ServiceGone as error:
+            self._silent.add(self._gps, error)
+            raise
+
+    def _connect(self) -> None:
+        """Raises ServiceGone. While others do not answer, this one may not either: do not wait."""
+        try:
+            if self._silent:
+                raise ServiceGone(f"{self._gps.name}: other engines do not answer")
+            self._gps.connect()
+        except ServiceGone as error:
+            self._silent.add(self._gps, error)
             raise

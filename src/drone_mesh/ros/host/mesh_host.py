@@ -17,6 +17,7 @@ from drone_mesh.ros.host.flown_drones import GroundedDrones
 from drone_mesh.ros.host.host_reports import HostReports
 from drone_mesh.ros.host.mesh_settings import MeshSettings
 from drone_mesh.ros.host.radios import Radios
+from drone_mesh.ros.host.silent_engines import SilentEngines
 from drone_mesh.ros.host.virtual_nrf24 import VirtualRadios
 from drone_mesh.ros.host.virtual_raspberry_pi import VIRTUAL_RASPBERRY_PIS, VirtualRaspberryPi
 from drone_mesh.state.figures import LOST_IN_RANGE, WORST_LAG
@@ -54,6 +55,7 @@ class MeshHost:
         self._radios = VirtualRadios(self.executor, place_of) if radios is None else radios
         self._figures = FiguresPublisher("host", self._take_figures)
         self._grounded = GroundedDrones()
+        self._silent = SilentEngines()
         self.nodes: dict[int, VirtualRaspberryPi] = {}
         self._stopping = False
 
@@ -63,6 +65,7 @@ class MeshHost:
         self._radios.start()
         self._reports.start()
         self._figures.start()
+        self._silent.start()
 
     def lag_s(self, now_s: float) -> float:
         """How long the oldest pending work has been waiting, in simulated seconds.
@@ -127,6 +130,7 @@ class MeshHost:
         """Stop all threads; returns when they have ended. Nodes not started yet never start."""
         self._stopping = True
         self._figures.stop()
+        self._silent.stop()
         self._grounded.stop()
         self._reports.stop()
         self._radios.fall_silent()
@@ -152,7 +156,7 @@ class MeshHost:
             why_not_fly = functools.partial(self._grounded.reason, node_id)
             observer = self._reports.observe
             node = VIRTUAL_RASPBERRY_PIS[role](
-                node_id, self._settings, observer, antenna, slot, why_not_fly
+                node_id, self._settings, observer, antenna, slot, why_not_fly, self._silent
             )
             self._reports.add(role, node.component, slot, antenna.on)
             node.start(now_s)

@@ -15,10 +15,11 @@ from drone_mesh.drone.fleet import ids_in_words
 from drone_mesh.drone.roles import Role
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.ros.graph import names
+from drone_mesh.ros.graph.bounded_master import NO_ANSWER
 from drone_mesh.ros.graph.command_line import start_node
 from drone_mesh.ros.graph.fleet_parameter import get_fleet_parameter, get_present_drones
 from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
-from drone_mesh.ros.graph.master_watch import NO_ANSWER, MasterWatch
+from drone_mesh.ros.graph.master_watch import MasterWatch
 from drone_mesh.ros.graph.orderly_stop import OrderlyStop
 from drone_mesh.ros.graph.parameters import configured_obstacles, or_exit
 from drone_mesh.ros.graph.present_drones import PresentDrones

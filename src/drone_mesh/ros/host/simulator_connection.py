@@ -14,6 +14,7 @@ from drone_mesh.ros.graph.persistent_service import (
     Response,
     ServiceClass,
     ServiceGone,
+    ServiceUnknown,
 )
 from drone_mesh.srv import AreaScan, Broadcast, WirelessMessage, WirelessMessages
 
@@ -92,6 +93,6 @@ class SimulatorConnection:
     ) -> PersistentService[Request, Response] | None:
         try:
             return self._connect(name, service_class)
-        except ServiceGone as error:
+        except ServiceUnknown as error:
             _log.info("the simulator does not offer %s, using single messages: %s", name, error)
             return None

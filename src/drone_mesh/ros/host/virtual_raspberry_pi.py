@@ -19,6 +19,7 @@ from drone_mesh.internet.several import SeveralInternets
 from drone_mesh.ros.host.engine_connector import RosDroneEngineConnector
 from drone_mesh.ros.host.internet_mock import RosInternetMock
 from drone_mesh.ros.host.mesh_settings import MeshSettings
+from drone_mesh.ros.host.silent_engines import SilentEngines
 from drone_mesh.ros.host.users_of_node import UsersOfNode
 from drone_mesh.users.desk import UsersDesk
 
@@ -39,14 +40,15 @@ class VirtualRaspberryPi(abc.ABC):
         antenna: IWirelessCommunication,
         slot: ExecutorSlot,
         why_not_fly: Callable[[], str],
+        silent: SilentEngines,
     ) -> None:
-        """`why_not_fly` as for RosDroneEngineConnector.
+        """`why_not_fly` and `silent` as for RosDroneEngineConnector.
 
         Raises ConfigurationError for a routing technique that does not exist."""
         configuration = settings.configuration
         self.node_id = node_id
         self.engine = RosDroneEngineConnector(
-            node_id, settings.run, why_not_fly, settings.obstacles
+            node_id, settings.run, why_not_fly, silent, settings.obstacles
         )
         self.slot = slot
         self.users = UsersDesk(node_id, slot.submit)

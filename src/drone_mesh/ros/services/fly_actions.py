@@ -23,11 +23,12 @@ from drone_mesh.msg import (
     NodeState,
 )
 from drone_mesh.ros.graph import names
+from drone_mesh.ros.graph.bounded_master import NO_ANSWER
 from drone_mesh.ros.graph.command_line import start_node
 from drone_mesh.ros.graph.conversions import event_record, location_of
 from drone_mesh.ros.graph.fleet_parameter import drones_if_known
 from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
-from drone_mesh.ros.graph.master_watch import NO_ANSWER, MasterWatch
+from drone_mesh.ros.graph.master_watch import MasterWatch
 from drone_mesh.ros.graph.orderly_stop import OrderlyStop
 from drone_mesh.ros.graph.run import Run, run_of
 from drone_mesh.ros.services.flight_request import (

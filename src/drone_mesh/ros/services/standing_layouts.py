@@ -24,9 +24,9 @@ from drone_mesh.msg import (
     MeshState,
 )
 from drone_mesh.ros.graph import names
+from drone_mesh.ros.graph.bounded_master import NO_ANSWER
 from drone_mesh.ros.graph.conversions import event_record, mesh_status
 from drone_mesh.ros.graph.fleet_parameter import get_fleet_parameter
-from drone_mesh.ros.graph.master_watch import NO_ANSWER
 from drone_mesh.ros.graph.parameters import configured_obstacles
 from drone_mesh.ros.graph.run import Run, run_of
 from drone_mesh.state.airspace import SWAY_M

@@ -8,7 +8,6 @@ import time
 from functools import partial
 from pathlib import Path
 
-import rosgraph
 import rospy
 
 from drone_mesh.arguments import is_whole
@@ -26,6 +25,7 @@ from drone_mesh.errors import ConfigurationError, naming_argument
 from drone_mesh.layouts import FIELD_CASE, GRID_CASE, Layouts
 from drone_mesh.msg import MeshEvent, MeshState, PacketSample
 from drone_mesh.ros.graph import names
+from drone_mesh.ros.graph.bounded_master import master_answers
 from drone_mesh.ros.graph.command_line import run_tool, start_node
 from drone_mesh.ros.graph.conversions import event_record, mesh_status
 from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
@@ -68,7 +68,7 @@ class MeshFeed:
         """Say on the pages when nothing is heard, until the program ends; for the main thread."""
         while not stop.wait(CHECK_PERIOD_S) and not rospy.is_shutdown():
             is_silent = time.monotonic() - self._heard_s > OLD_STATE_S
-            if not rosgraph.is_master_online():
+            if not master_answers():
                 if is_silent:  # without a master, nodes that are connected still hear each other
                     self._report("no ROS master: waiting for the simulation to start")
                 continue

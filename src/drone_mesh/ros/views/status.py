@@ -8,11 +8,11 @@ import sys
 import threading
 import time
 
-import rosgraph
 import rospy
 
 from drone_mesh.msg import MeshState
 from drone_mesh.ros.graph import names
+from drone_mesh.ros.graph.bounded_master import master_answers
 from drone_mesh.ros.graph.command_line import join_graph, run_tool
 from drone_mesh.ros.graph.conversions import mesh_status
 from drone_mesh.ros.graph.master_watch import MasterWatch
@@ -92,7 +92,7 @@ def _watch(colours: bool) -> int:
             age_s = time.monotonic() - came_s
             if age_s > OLD_STATE_S:
                 text += f"\nno state for {age_s:.0f} s"
-                if not rosgraph.is_master_online():
+                if not master_answers():
                     text += ", and the ROS master does not answer"
             print(f"{CLEAR_SCREEN if colours else ''}{text}", flush=True)
             time.sleep(WATCH_PERIOD_S)

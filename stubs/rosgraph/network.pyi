@@ -1,0 +1,9 @@
+import io
+import socket
+
+class ROSHandshakeException(Exception): ...
+
+def read_ros_handshake_header(
+    sock: socket.socket, b: io.BytesIO, buff_size: int
+) -> dict[str, str]: ...
+def write_ros_handshake_header(sock: socket.socket, header: dict[str, str]) -> int: ...

@@ -1,9 +1,0 @@
-import socket
-
-class TCPROSTransport:
-    # None once rospy has closed it, which it does when the node shuts down.
-    socket: socket.socket
-    header: dict[str, str]  # what the other end said of itself; {} before
-    def __init__(self, protocol: object, name: str) -> None: ...
-    def connect(self, dest_addr: str, dest_port: int, endpoint_id: str) -> None: ...
-    def close(self) -> None: ...
