@@ -44,6 +44,9 @@ class UsersDataTest(unittest.TestCase):
         nodes = {node.id: node for node in states[-1].nodes}
         self.assertEqual((nodes[3].data_bytes_sent, nodes[0].data_bytes_received), (1024, 1024))
         self.assertLessEqual(nodes[3].data_sent_at, nodes[0].data_received_at)
+        answer = call("/Nodes/3/send", SendData, 2, 7, True, b"across", 20.0)
+        self.assertTrue(answer.success, answer.message)
+        self.assertEqual(answer.message, "message 2 to node 2: delivered")
         refused = call("/Nodes/3/send", SendData, GATEWAY, 7, True, payload + b"!", 0.0)
         self.assertFalse(refused.success)
         self.assertIn("too large: 1025 bytes", refused.message)

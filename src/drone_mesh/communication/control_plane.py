@@ -43,7 +43,7 @@ class IControlHost(IMeshDebugInfo):
         """At a gateway: a packet of `node` proves a path of so many hops."""
 
     def on_node_missing(self, node: int) -> None:
-        """At a gateway: a relay has no route to `node`."""
+        """Another node has no route to `node`."""
 
 
 class IControlPlane(abc.ABC):

@@ -141,6 +141,7 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
 
     def on_node_missing(self, node: int) -> None:
         """A relay that cannot forward an order reports this to the gateway."""
+        super().on_node_missing(node)
         self._book.on_missing(node)
 
     def on_node_heard(self, node: int, hops: int) -> None:

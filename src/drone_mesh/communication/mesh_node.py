@@ -191,6 +191,12 @@ class MeshNode(IControlHost):
         """The antenna's use of a shared channel."""
         return self._antenna.channel_use()
 
+    # For the control plane --------------------------------------------------------------------
+
+    def on_node_missing(self, node: int) -> None:
+        """Messages for it may not arrive."""
+        self.data.on_node_missing(node)
+
     # For the parts ---------------------------------------------------------------------------
 
     def _took_off(self) -> None:

@@ -434,3 +434,75 @@ def test_ten_thousand_random_packets_raise_nothing_and_the_node_still_answers(ga
     rig.wait(300.0)
     rig.hear("05 05 02 01 01")
     assert [p[:5] for p in rig.sent(1)][-1] == bytes((1, 1, 1, 5, 5))
+
+
+# Users' data for nodes without a route --------------------------------------------------------
+
+DATA_FOR_9 = "05 03 80 01 09 00 ab cd"
+
+
+def below_the_gateway():
+    """Router 1: gateway 0 is reached through 2; 3 is another neighbour."""
+    rig = Rig()
+    rig.connect_through(2)
+    rig.know_neighbour(3)
+    return rig
+
+
+def test_data_for_an_unknown_node_goes_to_the_next_hop_to_the_gateway_and_nothing_else_does():
+    rig = below_the_gateway()
+    rig.hear(DATA_FOR_9)
+    assert rig.sent() == [packet("05 01 80 02 09 00 ab cd")]
+    rig.hear("05 03 01 01 09")
+    assert rig.sent(1) == []
+
+
+def test_data_that_comes_down_from_there_ends_here_and_the_next_hop_is_told():
+    rig = below_the_gateway()
+    rig.hear("05 02 80 01 09 00 ab cd")
+    assert packet("01 01 05 02 02 09") in rig.sent()
+
+
+def test_a_neighbour_that_sends_data_for_a_node_behind_it_does_not_lead_there():
+    rig = below_the_gateway()
+    rig.routing.other_can_communicate_with_node(3, 9)
+    rig.hear(DATA_FOR_9)
+    assert rig.sent() == [packet("05 01 80 02 09 00 ab cd")]
+    assert rig.routing.get_direction_to_node(9) == NO_ROUTE
+
+
+def test_data_that_comes_round_ends_here():
+    rig = below_the_gateway()
+    rig.hear(DATA_FOR_9)
+    rig.forget()
+    rig.hear("05 04 80 01 09 00 ab cd")
+    assert rig.sent(0x80) == []
+
+
+def test_if_the_hop_down_does_not_take_it_the_gateway_gets_it():
+    rig = below_the_gateway()
+    rig.know_neighbour(9)
+    rig.antenna.dead = {9}
+    rig.hear(DATA_FOR_9)
+    assert rig.sent(0x80) == [packet("05 01 80 02 09 00 ab cd")]
+
+
+def test_a_gateway_that_knows_no_such_node_tells_the_creator_and_searches_for_it_ever_more_rarely():
+    rig = Rig(gateway=True)
+    rig.know_neighbour(3)
+    searches = []
+    for _ in range(40):
+        rig.hear(DATA_FOR_9)
+        searches.append(len([p for p in rig.broadcasts() if p[2] == 0x44]))
+        rig.wait(0.5)
+    assert rig.sent(5)[0] == packet("01 01 05 03 05 09")
+    assert [0.5 * at for at, one in enumerate(searches) if one] == [0.0, 1.0, 3.0, 7.0, 15.0]
+    assert rig.mesh.complaints.counts["no route to node 9"] > 0
+
+
+def test_a_gateway_that_has_lost_its_internet_sends_it_on_to_another_gateway():
+    rig = Rig(gateway=True)
+    rig.mesh.set_internet(False, rig.now_s)
+    rig.connect_through(2)
+    rig.hear(DATA_FOR_9)
+    assert rig.sent(0x80) == [packet("05 01 80 02 09 00 ab cd")]

@@ -64,9 +64,9 @@ def test_send_takes_any_bytes_from_standard_input(rig, monkeypatch):
     ("arguments", "reason"),
     [
         (["--node", "2", "0", "x" * 1025], "too large: 1025 bytes"),
-        (["--node", "2", "--wait", "0.01", "--no-ack", "77", "x"], "no route to node 77"),
+        (["--node", "0", "--wait", "0.01", "--no-ack", "77", "x"], "no route to node 77"),
         (
-            ["--node", "2", "--wait", "0.01", "77", "x"],
+            ["--node", "0", "--wait", "0.01", "77", "x"],
             "queued: no route to node 77; not delivered within 0.01 s, the node keeps trying",
         ),
         (["0", "x"], "several nodes run here (0, 1, 2): choose one with --node"),

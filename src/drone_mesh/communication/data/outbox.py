@@ -22,6 +22,8 @@ from drone_mesh.communication.data.packets import COMPLETE, NO_ANSWER, Ack, Poll
 from drone_mesh.communication.data.ticket import TicketState, destination_in_words
 from drone_mesh.communication.data.train import Train
 
+MOST_DOUBLED = 6  # our choice: with a search of half a second, to about half a minute
+
 
 class Outbox:
     """The messages from one node to one destination, in the order of submission."""
@@ -51,6 +53,8 @@ class Outbox:
         self._train: Train | None = None  # if there are relays
         self._nonce = 0
         self._latest: OutgoingMessage | None = None  # message whose fragment left last
+        self._misses = 0  # times that a node had no route to the receiver, since its last answer
+        self._search_ends_s = -math.inf  # when it may have been found
         self.not_before_s = -math.inf  # no route: time of the next attempt
 
     def __len__(self) -> int:
@@ -162,6 +166,7 @@ class Outbox:
         """Process an ACK of the receiver."""
         if ack.session != self._session:
             return
+        self._misses = 0
         complete = {
             number
             for number, message in self._open.items()
@@ -208,13 +213,29 @@ class Outbox:
         """Give up messages that waited for too long."""
         for message in list(self):
             if now_s >= message.expires_s:
-                what = "no acknowledgement from" if has_route else "no route to"
+                has_way = has_route and not self._misses
+                what = "no acknowledgement from" if has_way else "no route to"
                 where = destination_in_words(self.to)
                 self.give_up(message, f"{what} {where} for {LIFETIME_S:.0f} s{self._hint()}")
 
     def give_up(self, message: OutgoingMessage, reason: str) -> None:
         """Stop sending this message."""
         self._close(message, TicketState.GIVEN_UP, reason)
+
+    def missing(self, reason: str, search_s: float, now_s: float) -> None:
+        """A node on the way has no route to the receiver, and may search for it for so long.
+
+        The next question follows then; if that is in vain, too, after twice as long, and so on.
+        """
+        if now_s < self._search_ends_s:
+            return
+        self._search_ends_s = now_s + search_s * 2 ** min(self._misses, MOST_DOUBLED)
+        self._misses += 1
+        for message in self:
+            message.ticket.reason = reason
+            if message.asks:
+                asked_s = self._search_ends_s - self._timeout_s(message)
+                message.asked_s = min(message.asked_s, asked_s)
 
     def blocked(self, reason: str) -> None:
         """Nothing can be sent now: reliable messages wait, the others are given up."""

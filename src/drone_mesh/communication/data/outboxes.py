@@ -26,6 +26,7 @@ from drone_mesh.communication.interfaces import NO_ROUTE, IMeshDebugInfo
 from drone_mesh.communication.parts import NodeParts
 
 BURST = 8  # our choice: packets sent before others get their turn
+FOUND_WITHIN_S = 0.5  # our choice: a gateway's search passes through 100 nodes
 ROUTE_PERIOD_S = 0.5  # our choice: how often an outbox without a route looks for one
 
 
@@ -74,6 +75,13 @@ class Outboxes:
         outbox = self._outboxes.get(by)
         if outbox is not None:
             outbox.answered(ack, self._parts.now_s)
+
+    def on_node_missing(self, node: int) -> None:
+        """Another node has no route to `node`: what goes there by default may end there."""
+        outbox = self._outboxes.get(node)
+        if outbox is not None and self._parts.routing.get_direction_to_node(node) == NO_ROUTE:
+            search_s = self._parts.antenna.medium.stretched(FOUND_WITHIN_S)
+            outbox.missing(self.unreachable(node), search_s, self._parts.now_s)
 
     def send(self) -> float:
         """Send what may be sent now; returns when to call it again, or infinity."""
@@ -129,8 +137,11 @@ class Outboxes:
 
     def _may_reach(self, outbox: Outbox, now_s: float) -> bool:
         """Whether there is a route. If not, retry later and give up unreliable messages."""
-        if self._parts.antenna.on() and self._parts.routing.may_reach(outbox.to):
+        parts, to = self._parts, outbox.to
+        by_default = parts.delivery.default_hop() != NO_ROUTE
+        if parts.antenna.on() and (by_default or parts.routing.may_reach(to)):
             return True
+        parts.delivery.seek(to)
         outbox.not_before_s = now_s + ROUTE_PERIOD_S
         outbox.blocked(self.unreachable(outbox.to))
         return False
@@ -151,7 +162,8 @@ class Outboxes:
         self._was_lost = lost
 
     def _direction(self, to: int) -> int:
-        return to if to == TO_ALL else self._parts.routing.get_direction_to_node(to)
+        direction = to if to == TO_ALL else self._parts.routing.get_direction_to_node(to)
+        return self._parts.delivery.default_hop() if direction == NO_ROUTE else direction
 
     def _follow_gateway(self) -> None:
         """Move messages for the gateway to the one that this node uses now."""

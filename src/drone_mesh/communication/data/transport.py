@@ -162,6 +162,11 @@ class Transport:
             self._parts.complaints.dropped(f"invalid data: {error}", payload, now_s)
         self._work()
 
+    def on_node_missing(self, node: int) -> None:
+        """Another node has no route to `node`."""
+        self._outboxes.on_node_missing(node)
+        self._work()
+
     def on_due(self) -> None:
         """The time requested with Due.DATA has come."""
         self._inboxes.on_time()

@@ -35,8 +35,14 @@ class Delivery(IDelivery):
         routing: IRoutingTechnique,
         on_neighbour_lost: Callable[[int], None],
         another_next_hop: Callable[[int, int], int],
+        way_up: Callable[[int], int],
+        seek: Callable[[int], bool],
     ) -> None:
-        """`another_next_hop`: a neighbour to try for a node, not the one given, or NO_ROUTE."""
+        """`another_next_hop`: a neighbour to try for a node, not the one given, or NO_ROUTE.
+
+        `way_up`: a next hop to the preferred gateway, not the one given, or NO_ROUTE; `seek`: see
+        IDelivery.
+        """
         self._node_id = basics.node_id
         self._antenna = antenna = basics.antenna
         self._shared = antenna.medium.shared
@@ -47,6 +53,8 @@ class Delivery(IDelivery):
         self._report = basics.report
         self._on_neighbour_lost = on_neighbour_lost
         self._another_next_hop = another_next_hop
+        self._way_up = way_up
+        self._seek = seek
         self._reported_s: dict[int, float] = {}  # shared medium: when each was announced
         self._gave_up: set[int] = set()  # neighbours that were heard but took no packets
         self._strangers = Strangers()
@@ -115,6 +123,7 @@ class Delivery(IDelivery):
         the channel may be busy.
         """
         to, other = messages.receiver(payload), messages.addressee(payload)
+        is_known = self._routing.get_direction_to_node(other) != NO_ROUTE
         self.total_sent -= 1
         self._routing.sent(to, False, tries)
         silent_since_s = self._deadlines.now_s - self._antenna.medium.silence_s
@@ -130,7 +139,8 @@ class Delivery(IDelivery):
             self.neighbour_lost(to)
         detour = self._routing.get_direction_to_node(other)
         if detour in (NO_ROUTE, to) and other != to:
-            detour = self._another_next_hop(other, to)
+            by_default = messages.is_data(payload) and not is_known
+            detour = self._way_up(to) if by_default else self._another_next_hop(other, to)
         if detour in (NO_ROUTE, to):
             return False
         return self.send(messages.readdressed(payload, detour), detour)
@@ -138,15 +148,25 @@ class Delivery(IDelivery):
     def send_own(self, payload: bytes) -> bool:
         """Send this node's own packet to its addressee, trying one route after the other."""
         other = messages.addressee(payload)
-        untried = self._routing.directions(other, NO_ROUTE, self._node_id)
         tried: list[int] = []
-        while untried:
+        while True:
+            directions = self._routing.directions(other, NO_ROUTE, self._node_id)
+            if not directions and messages.is_data(payload):
+                directions = [self._way_up(NO_ROUTE)]
+            untried = [to for to in directions if to != NO_ROUTE and to not in tried]
+            if not untried:
+                return False
             if self.send_to_each(payload, untried):
                 return True
             tried += untried
-            directions = self._routing.directions(other, NO_ROUTE, self._node_id)
-            untried = [to for to in directions if to not in tried]
-        return False
+
+    def default_hop(self) -> int:
+        """The next hop to the preferred gateway, which knows more nodes than a router."""
+        return self._way_up(NO_ROUTE)
+
+    def seek(self, node: int) -> bool:
+        """A gateway without another one searches for it."""
+        return self._seek(node)
 
     def send_to_each(self, payload: bytes, next_hops: Sequence[int]) -> bool:
         """Send the same packet to each of these neighbours. True: at least one received it."""

@@ -8,6 +8,7 @@ from drone_mesh.communication import messages
 from drone_mesh.communication.heartbeats.circulation import CirculationGuard, came_round
 from drone_mesh.communication.heartbeats.delivery import Delivery
 from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.limits import RateLimit
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.parts import NodeBasics
@@ -15,6 +16,7 @@ from drone_mesh.communication.routing.interfaces import IRoutingTechnique
 from drone_mesh.communication.timing import CIRCULATION_S
 
 _HEARTBEAT = int(MessageType.HEARTBEAT)
+CREATORS_TOLD = 8  # our choice: MISSING to one creator of users' data, per limits.LIMIT_PERIOD_S
 
 
 class Forwarding:
@@ -27,6 +29,7 @@ class Forwarding:
         self._delivery = delivery
         self._complaints = basics.complaints
         self._report = basics.report
+        self._told = RateLimit(CREATORS_TOLD)
         self._circulation = CirculationGuard(basics.antenna.medium.stretched(CIRCULATION_S))
 
     def forward(
@@ -66,6 +69,14 @@ class Forwarding:
         for _attempt in (1, 2):
             directions = routing.directions(forward, from_, creator)
             to = directions[0] if directions else NO_ROUTE
+            if to in (NO_ROUTE, from_) and messages.is_data(payload):
+                hop = self._hop_of_data(forward, from_, creator, is_listed=to == from_)
+                if hop != NO_ROUTE:
+                    to = hop
+                elif self._delivery.seek(forward):
+                    if self._told.count(creator, now_s):
+                        self._send_missing(creator, forward)
+                    return
             if to in (NO_ROUTE, from_):
                 self.stranded(payload, now_s)
                 if to == from_:
@@ -83,6 +94,19 @@ class Forwarding:
                 return
             lost = to
         self.stranded(payload, now_s)
+
+    def _hop_of_data(self, forward: int, from_: int, creator: int, is_listed: bool) -> int:
+        """The next hop of users' data for a node without a route; NO_ROUTE: none, or back.
+
+        `is_listed`: it counted as behind `from_`, which would then not have sent this packet here.
+        """
+        if is_listed and from_ != forward:
+            self._routing.other_cant_communicate_with_node(from_, forward)
+            directions = self._routing.directions(forward, from_, creator)
+            if directions and directions[0] != from_:
+                return directions[0]
+        up = self._delivery.default_hop()
+        return NO_ROUTE if up == from_ else up
 
     def _flood(self, payload: bytes, next_hops: Sequence[int], now_s: float) -> None:
         forwarded = messages.next_hop(payload, self._node_id, self._node_id)
@@ -105,7 +129,10 @@ class Forwarding:
         reason = f"no route to drone {forward}"
         self._complaints.add(reason, "an order for it ends here", now_s)
         self._report(MeshEventKind.NO_ROUTE, forward)
+        self._send_missing(creator, forward)
+
+    def _send_missing(self, to: int, missing: int) -> None:
         me = self._node_id
-        if creator != me:
-            missing = messages.MissingMessage(me, me, creator, creator, forward)
-            self._delivery.send_own(missing.to_payload())
+        if to != me:
+            packet = messages.MissingMessage(me, me, to, to, missing)
+            self._delivery.send_own(packet.to_payload())

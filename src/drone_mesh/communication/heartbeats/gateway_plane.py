@@ -82,6 +82,7 @@ class GatewayHeartbeats(RouterHeartbeats):
         """A heartbeat for this node."""
         _know_gateway, preferred_gateway, hops = messages.heartbeat_body(payload)
         self._host.on_node_heard(creator, hops + 1)
+        self._search.found(creator)
         if not self._has_internet and preferred_gateway != self._parts.node_id:
             super().receive_heartbeat(payload, creator, from_)
         elif creator != preferred_gateway:  # gateways do not answer each other
@@ -96,6 +97,10 @@ class GatewayHeartbeats(RouterHeartbeats):
         else:
             super()._forward_and_learn(payload, creator, from_, kind, forward, now_s)
 
-    def _after_missing(self, missing: int) -> None:
-        super()._after_missing(missing)
-        self._host.on_node_missing(missing)
+    # Users' data for nodes that this gateway does not know --------------------------------------
+
+    def _seek(self, node: int) -> bool:
+        if self._way_up(NO_ROUTE) != NO_ROUTE:
+            return False
+        self._search.seek(node)
+        return True

@@ -1,8 +1,10 @@
-"""NodeSearch: a gateway on a shared channel searches for a node without a known route.
+"""NodeSearch: a gateway searches for a node without a known route.
 
-A relay that loses a neighbour loses the routes to all nodes behind it, and learns new ones only
-from packets of those nodes. On a busy channel such a node may be silent for 25 s, so the gateway
-requests a packet from it (docs/protocol.md, "Shared channel").
+On a shared channel, for its orders: a relay that loses a neighbour loses the routes to all nodes
+behind it, and learns new ones only from packets of those nodes. On a busy channel such a node may
+be silent for 25 s, so the gateway requests a packet from it (docs/protocol.md, "Shared channel").
+On every medium, for users' data: the node may use another gateway (docs/protocol.md, "Users' data
+for unknown nodes").
 """
 
 from __future__ import annotations
@@ -18,6 +20,8 @@ from drone_mesh.communication.parts import NodeParts
 BODY = MessageType.NODE_SEARCH.about.layout
 SEARCH_EVERY_S = 0.3  # our choice: each search is one broadcast by every node
 SAME_SEARCH_S = 10.0  # our choice: far longer than a search takes to pass through a mesh
+FIRST_PAUSE_S = 1.0  # our choice: a search passes through 100 nodes within half a second
+LONGEST_PAUSE_S = 60.0  # our choice: a search in vain doubles the pause, up to this
 NUMBERS_PER_S = 16  # our choice, for orders too: a restarted gateway starts at another number
 
 
@@ -29,17 +33,33 @@ class NodeSearch:
         self._parts = parts
         self._answer = answer
         self._searched_s = -math.inf
+        self._pauses_s: dict[int, tuple[float, float]] = {}  # by node: until when, and the next one
         self._seen_s: dict[tuple[int, int, int], float] = {}  # creator, node, number
 
     def search(self, node: int) -> bool:
         """Broadcast a search for `node`. False: too soon after another search."""
         now_s = self._parts.now_s
-        if now_s - self._searched_s < self._parts.antenna.medium.stretched(SEARCH_EVERY_S):
+        medium = self._parts.antenna.medium
+        if medium.shared and now_s - self._searched_s < medium.stretched(SEARCH_EVERY_S):
             return False
         self._searched_s = now_s
         number = int(now_s * NUMBERS_PER_S) % 2**16
         self._broadcast(self._parts.node_id, node, number)
         return True
+
+    def seek(self, node: int) -> None:
+        """Search for `node`, unless that was in vain a moment ago."""
+        now_s = self._parts.now_s
+        until_s, pause_s = self._pauses_s.get(node, (-math.inf, FIRST_PAUSE_S))
+        if pause_s > 2.0 * FIRST_PAUSE_S:
+            self._parts.complaints.add(f"no route to node {node}", "users' data ends here", now_s)
+        if now_s >= until_s and self.search(node):
+            until_s = now_s + self._parts.antenna.medium.stretched(pause_s)
+            self._pauses_s[node] = until_s, min(2.0 * pause_s, LONGEST_PAUSE_S)
+
+    def found(self, node: int) -> None:
+        """It answered, or sent a heartbeat for another reason."""
+        self._pauses_s.pop(node, None)
 
     def on_packet(self, creator: int, payload: bytes) -> None:
         """Answer a search for this node; forward any other search, once."""

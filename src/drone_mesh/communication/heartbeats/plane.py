@@ -34,7 +34,12 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         self._deadlines = basics.deadlines
         self._neighbours = basics.neighbours
         self._delivery = self.delivery = Delivery(
-            basics, technique, self._on_neighbour_lost, self._another_next_hop
+            basics,
+            technique,
+            self._on_neighbour_lost,
+            self._another_next_hop,
+            self._way_up,
+            self._seek,
         )
         self._forwarding = Forwarding(basics, technique, self._delivery)
         self._parts = HeartbeatParts(**vars(basics), routing=technique, delivery=self._delivery)
@@ -133,6 +138,19 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
     def _another_next_hop(self, node: int, but: int) -> int:
         """A neighbour to try for `node`, not `but`, beside those that the routes know."""
         return NO_ROUTE
+
+    # Users' data for nodes to which there is no route -----------------------------------------
+
+    def _way_up(self, but: int) -> int:
+        """A next hop to the preferred gateway, not `but`; NO_ROUTE also if that is this node."""
+        to = self.next_hop()
+        if to == self._parts.node_id:
+            return NO_ROUTE
+        return to if to != but else self._another_next_hop(self.gateway, but)
+
+    def _seek(self, node: int) -> bool:
+        """Users' data for `node` has no way from here."""
+        return False
 
     # For the routing technique ---------------------------------------------------------------
 

@@ -165,6 +165,7 @@ class RouterHeartbeats(HeartbeatPlane):
 
     def _after_missing(self, missing: int) -> None:
         self._connection.on_route_lost()
+        self._host.on_node_missing(missing)
 
     def _check_soon(self) -> None:
         """Its surroundings change, so the next check comes sooner; at rest, once a period."""

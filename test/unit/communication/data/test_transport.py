@@ -146,7 +146,9 @@ def test_without_a_route_it_is_given_up_at_the_end_of_its_life_with_the_reason(n
     assert str(ticket) == "message 1 to node 77: given up: no route to node 77 for 240 s"
 
 
-def test_without_a_route_it_looks_for_one_twice_a_second(network):
+def test_without_a_route_it_looks_for_one_twice_a_second():
+    network = Network()
+    network.add_router(3, 0.0, 0.0)
     ticks = []
     tick = network.nodes[3].component.tick
     network.nodes[3].component.tick = lambda now_s: (ticks.append(now_s), tick(now_s))
@@ -158,7 +160,7 @@ def test_without_a_route_it_looks_for_one_twice_a_second(network):
 
 
 def test_without_a_route_best_effort_is_given_up_at_once(network):
-    ticket = network.send(3, 77, b"unreachable", reliable=False)
+    ticket = network.send(0, 77, b"unreachable", reliable=False)
     assert (ticket.state, ticket.reason) == (TicketState.GIVEN_UP, "no route to node 77")
 
 

@@ -1,0 +1,133 @@
+"""Users' data from any node to any other: a router sends what it cannot route to its gateway."""
+
+from __future__ import annotations
+
+import itertools
+import random
+
+import pytest
+import scenarios
+
+from drone_mesh.communication.messages import is_data
+from drone_mesh.communication.named_techniques import ROUTING_TECHNIQUES
+from drone_mesh.communication.seals.keys import MeshKey
+from drone_mesh.inprocess import Network
+from drone_mesh.inprocess.bounds import SHORTEST_PATH
+
+PORT = 9
+KEY = MeshKey(bytes(range(16)))
+
+
+def send_each(network, pairs, every_s):
+    """Send each pair its number, and wait. Returns the delays of those that arrived, by pair."""
+    sent_s = {}
+    for number, (from_, to) in enumerate(pairs):
+        sent_s[number] = network.clock.now_s
+        network.send(from_, to, b"%d" % number, PORT)
+        network.run_for(every_s)
+    network.run_for(10.0)
+    return {
+        (message.sender, to): message.received_s - sent_s[int(message.payload)]
+        for to, messages in network.received.items()
+        for message in messages
+        if message.port == PORT
+    }
+
+
+def assert_all_arrive(network, within_s, count=None, every_s=0.1):
+    """Between `count` random pairs of nodes, or all pairs."""
+    pairs = list(itertools.permutations(sorted(network.nodes), 2))
+    random.Random(3).shuffle(pairs)
+    delays = send_each(network, pairs[:count], every_s)
+    assert set(delays) == set(pairs[:count])
+    assert max(delays.values()) <= within_s
+
+
+def between_two_gateways(**options):
+    """A row of seven nodes with a gateway at each end: each knows the routers near it."""
+    network = Network(seed=1, **options)
+    network.add_gateway(0, 0.0, 0.0)
+    network.add_gateway(1, 36.0, 0.0)
+    for node in range(2, 7):
+        network.add_router(node, 6.0 * (node - 1), 0.0)
+    assert network.run_until(network.all_connected, within_s=60.0)
+    network.run_for(30.0)
+    return network
+
+
+def test_a_message_and_an_echo_pass_through_the_gateway_between_two_routers():
+    network = Network(seed=1)
+    network.add_gateway(0, 0.0, 0.0)
+    network.add_router(1, -6.0, 0.0)
+    network.add_router(2, 6.0, 0.0)
+    network.run_for(30.0)
+    ticket, answers = network.send(1, 2, b"hello"), []
+    network.echo(2, 1, answers.append)
+    network.run_for(1.0)
+    assert str(ticket) == "message 1 to node 2: delivered"
+    assert [(answer.node, answer.route) for answer in answers] == [(1, (0,))]
+
+
+@pytest.mark.parametrize("technique", [*ROUTING_TECHNIQUES, SHORTEST_PATH])
+def test_between_25_nodes_at_rest_each_message_arrives_within_a_second(technique):
+    network = scenarios.fleet(24, 5, seed=1, routing=technique)
+    network.run_for(60.0)
+    assert_all_arrive(network, within_s=1.0, count=100)
+
+
+@pytest.mark.parametrize("key", [None, KEY], ids=["plain", "key"])
+def test_on_a_shared_channel_within_five_seconds(key):
+    network = scenarios.fleet(15, 4, seed=1, radio="shared", key=key)
+    network.run_for(60.0)
+    assert_all_arrive(network, within_s=5.0, count=60, every_s=0.5)
+
+
+@pytest.mark.parametrize("technique", ROUTING_TECHNIQUES)
+def test_a_gateway_searches_for_a_node_that_uses_another_gateway(technique):
+    within_s = 3.0 if technique == "beacon" else 1.0  # it searches every 0.6 s while a packet waits
+    assert_all_arrive(between_two_gateways(routing=technique), within_s)
+
+
+def test_also_on_a_shared_channel():
+    assert_all_arrive(between_two_gateways(radio="shared"), within_s=5.0, every_s=1.0)
+
+
+def test_what_nobody_knows_ends_at_the_gateway_which_says_so_and_nothing_circulates():
+    network = scenarios.line(4)
+    network.run_for(60.0)
+    receivers = []
+    for number, node in network.nodes.items():
+        note_data(node.component, number, receivers)
+    ticket = network.send(4, 77, b"hello")
+    network.run_for(1.0)
+    assert receivers[:4] == [3, 2, 1, 0]
+    network.run_for(249.0)
+    assert str(ticket) == "message 1 to node 77: given up: no route to node 77 for 240 s"
+    questions = network.nodes[0].component.complaints.counts["no route to node 77"]
+    assert 5 <= questions <= 15
+    assert len(receivers) <= 4 * (questions + 4)
+
+
+def note_data(component, number, receivers):
+    """Append `number` to `receivers` for each packet of users' data that the node receives."""
+    on_msg = component.on_msg
+
+    def noting(payload, now_s):
+        if is_data(payload):
+            receivers.append(number)
+        on_msg(payload, now_s)
+
+    component.on_msg = noting
+
+
+def test_a_router_that_its_neighbours_think_elsewhere_is_reached_all_the_same():
+    network = scenarios.fleet(24, 5, seed=2)
+    network.run_for(60.0)
+    for node in network.nodes.values():
+        routes = node.component.control.routes
+        for child in sorted(routes.get_set_of_children() - {24}):
+            if not node.is_gateway:
+                routes.other_can_communicate_with_node(child, 24)
+    ticket = network.send(20, 24, b"hello")
+    network.run_for(5.0)
+    assert str(ticket) == "message 1 to node 24: delivered"
