@@ -1,6 +1,6 @@
 """A minimal pcapng writer for packets with comments (IETF draft-ietf-opsawg-pcapng).
 
-Our own because it is short and the libraries mainly read (docs/decisions/own-code.md).
+Our own because it is short and the libraries mainly read (docs/decisions.md).
 """
 
 from __future__ import annotations
