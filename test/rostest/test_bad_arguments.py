@@ -37,6 +37,51 @@ class BadArgumentsTest(unittest.TestCase):
         self.assertTrue(shutdown, launch.stdout)
         self.assertNotIn("Traceback", until_failure)
 
+    def refuse(self, argument: str, line: str, **environment: str) -> None:
+        """Nothing starts."""
+        launch = subprocess.run(
+            [*LAUNCH, "drone_mesh", "factory.launch", argument],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            env={**os.environ, **environment},
+            timeout=WALL_LIMIT_S,
+            check=False,
+            text=True,
+        )
+        self.assertEqual(launch.stdout, f"roslaunch: {line}\n")
+        self.assertEqual(launch.returncode, 1)
+
+    def test_a_namespace_in_which_topics_have_no_valid_name(self) -> None:
+        for namespace in ("site-a", "01", "site a"):
+            self.refuse(
+                f"namespace:={namespace}",
+                f"invalid namespace {namespace!r}: must be letters, digits and _, and begin with a "
+                "letter",
+            )
+
+    def test_the_nodes_themselves_refuse_such_a_namespace(self) -> None:
+        port = free_port()
+        launch = subprocess.run(
+            ["roslaunch", "-p", str(port), "drone_mesh", "factory.launch", "namespace:=site-a"],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            env={**os.environ, "ROS_MASTER_URI": f"http://127.0.0.1:{port}"},
+            timeout=WALL_LIMIT_S,
+            check=False,
+            text=True,
+        )
+        said = [line for line in launch.stdout.splitlines() if "invalid namespace" in line]
+        self.assertEqual(len(said), 1, said)
+        self.assertIn("drone_factory: invalid namespace '/site-a/'", said[0])
+
+    def test_an_address_of_a_master_without_http(self) -> None:
+        self.refuse(
+            "routers:=2",
+            "ROS_MASTER_URI=localhost:11311 is no address of a master: it must look like "
+            "http://localhost:11311",
+            ROS_MASTER_URI="localhost:11311",
+        )
+
     def test_a_number_that_is_out_of_bounds(self) -> None:
         self.launch_and_expect(
             "max_distance:=-1", "argument: invalid max_distance '-1': expected metres"

@@ -14,7 +14,7 @@ from typing import Callable
 import rosgraph
 import rospy
 
-from drone_mesh.errors import MeshError
+from drone_mesh.errors import ConfigurationError, MeshError
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.bounded_master import (
     ANSWER_TIMEOUT_S,
@@ -49,6 +49,16 @@ def join_graph(name: str) -> None:
 def _words() -> list[str]:
     """The command line of a node, whose clock is that of its namespace."""
     return [*sys.argv, *names.REMAPPINGS]
+
+
+def _require_namespace() -> None:
+    """Raises ConfigurationError if the names of a simulation are invalid in our namespace."""
+    try:
+        names.check_namespace(rospy.get_namespace())
+    except ConfigurationError:
+        if SPEAKER_VARIABLE in os.environ:
+            sys.exit(FAILED)
+        raise
 
 
 def _require_free_name(name: str) -> None:
@@ -101,6 +111,7 @@ def start_node(about: str | None, name: str, *, disable_signals: bool = False) -
         formatter_class=argparse.RawDescriptionHelpFormatter,
     ).parse_args(rospy.myargv()[1:])
     try:
+        _require_namespace()
         require_master()
         _require_free_name(name)
     except MeshError as error:

@@ -1,6 +1,7 @@
 """roslaunch with an exit status: 1 if a node that the launch requires fails.
 
-`roslaunch` itself exits with 0 then, so a script cannot see that a launch failed. `scripts/run`
+`roslaunch` itself exits with 0 then, so a script cannot see that a launch failed. What roslaunch
+takes for the address of a master or for a namespace, and is none, is an error here. `scripts/run`
 uses this module: python3 -m drone_mesh.ros.graph.launching [what roslaunch accepts ...]
 """
 
@@ -13,7 +14,12 @@ import roslaunch
 import roslaunch.parent
 from roslaunch.pmon import ProcessListener
 
+from drone_mesh.errors import MeshError
+from drone_mesh.ros.graph.bounded_master import ANSWER_TIMEOUT_S, bounded_master
+from drone_mesh.ros.graph.names import check_namespace
+
 EXIT_FAILED = 1
+NAMESPACE = "namespace:="
 
 
 class WatchedLaunch(roslaunch.parent.ROSLaunchParent, ProcessListener):
@@ -36,6 +42,13 @@ class WatchedLaunch(roslaunch.parent.ROSLaunchParent, ProcessListener):
 
 def main() -> None:
     """Launch, and exit with 1 if a required node failed."""
+    try:
+        bounded_master("roslaunch", ANSWER_TIMEOUT_S)
+        for word in sys.argv:
+            if word.startswith(NAMESPACE):
+                check_namespace(word[len(NAMESPACE) :])
+    except MeshError as error:
+        sys.exit(f"roslaunch: {error}")
     roslaunch.parent.ROSLaunchParent = WatchedLaunch  # type: ignore[misc]
     roslaunch.main(["roslaunch", *sys.argv[1:]])
     if WatchedLaunch.failed:

@@ -6,6 +6,9 @@ docstrings write them as they are without a namespace: /mesh/state.
 
 from __future__ import annotations
 
+from drone_mesh.air.node_table import AirError, check_topic
+from drone_mesh.errors import ConfigurationError
+
 SIGNAL_TOPIC = "WirelessSignalSimulator"  # DroneInfo: every engine and antenna -> simulator
 SIGNAL_QUEUE = 4096  # DroneInfo that may wait for a slow simulator; the oldest is dropped
 MESSAGE_SERVICE = "SignalSimulator/message"
@@ -58,6 +61,17 @@ TF_TOPIC = "tf"  # TFMessage: mesh_markers -> rviz
 MAP_FRAME = "map"
 
 GROUNDED_TOPIC = "Drones/grounded"  # GroundedDrones, latched: DroneFactory -> hosts
+
+
+def check_namespace(namespace: str) -> None:
+    """Raises ConfigurationError unless the names of a simulation are valid in this namespace."""
+    try:
+        check_topic(0, f"/{namespace.strip('/')}/{node_topic(0)}".replace("//", "/"))
+    except AirError as error:
+        raise ConfigurationError(
+            f"invalid namespace {namespace!r}: must be letters, digits and _, and begin with a "
+            "letter"
+        ) from error
 
 
 def host_param(host: str) -> str:

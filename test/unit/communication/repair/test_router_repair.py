@@ -1324,7 +1324,9 @@ def test_a_drone_whose_channel_is_jammed_stays_says_so_and_tries_again(make_rig)
 
 @pytest.mark.parametrize("strategy", [*REPAIR_STRATEGIES, "reckless"])
 def test_a_drone_whose_own_radio_does_not_work_stays_and_says_so(strategy):
-    rig = lone_rig(repair=Reckless() if strategy == "reckless" else create_repair_strategy(strategy))
+    rig = lone_rig(
+        repair=Reckless() if strategy == "reckless" else create_repair_strategy(strategy)
+    )
     rig.antenna.is_whole = False
     rig.wait_until(3600.0)
     assert rig.engine.goals == []
