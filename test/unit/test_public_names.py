@@ -74,7 +74,7 @@ def test_examples_and_pages_import_only_public_names(source):
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.version_info < (3, 10), reason="sys.stdlib_module_names")
-@pytest.mark.parametrize("page", ["README.md", "docs/experiments.md"])
+@pytest.mark.parametrize("page", ["README.md", "docs/lab.md"])
 def test_the_code_of_a_page_runs_without_extras(page, tmp_path):
     code = [block.text for block in blocks("python") if block.page == ROOT / page]
     base = [text for text in code if "render_page" not in text]
