@@ -5,11 +5,14 @@ The record of a gateway (`raspberry_gateway --record`) is read in the place of a
 
 from __future__ import annotations
 
+import codecs
+import itertools
+import math
+import sys
 from pathlib import Path
-from typing import Any, Iterable, Iterator
+from typing import Any, Callable, Iterable, Iterator, Sequence, TypeVar
 
 import rosbag
-import rospy
 
 from drone_mesh.console.dots import RecordedDots, make_dots
 from drone_mesh.console.real_mesh import events_of, origin_of, real_mesh
@@ -24,58 +27,97 @@ from drone_mesh.ros.graph.conversions import (
     ros_time,
     state_msg,
 )
+from drone_mesh.ros.views.bag_file import (
+    RECORDER,
+    BagDamaged,
+    BagUnusable,
+    messages,
+    namespace_in,
+    open_bag,
+    raise_if_damaged,
+    topics_of,
+)
 from drone_mesh.state.model import EventRecord, MeshStatus
 
 EARLIEST_S = 1e-3  # a bag refuses a message with time 0
-_RECORDER = "'roslaunch drone_mesh record.launch'"
-
-
-class BagUnusable(MeshError):
-    """A bag is missing, broken, or contains no mesh; the message says which."""
+T = TypeVar("T")
 
 
 def read_states(path: Path) -> Iterator[MeshStatus]:
     """Every state in the bag, oldest first. Raises BagUnusable."""
     if is_gateway_record(path):
-        yield from (real_mesh(answer)[0] for answer in _answers(path))
-        return
-    for message, _at_s in _messages(path, names.STATE_TOPIC):
-        yield mesh_status(message)
+        return _recorded(path, lambda answer: real_mesh(answer)[0])
+    return messages(path, names.STATE_TOPIC, lambda message, _at_s: mesh_status(message))
 
 
 def read_events(path: Path) -> Iterator[EventRecord]:
     """Every event in the bag, oldest first. Raises BagUnusable."""
     if is_gateway_record(path):
-        for answer in _answers(path):
-            yield from events_of(answer)
-        return
-    for message, _at_s in _messages(path, names.EVENTS_TOPIC):
-        yield event_record(message)
+        return itertools.chain.from_iterable(_recorded(path, events_of))
+    return messages(path, names.EVENTS_TOPIC, lambda message, _at_s: event_record(message))
 
 
 def read_packets(path: Path) -> Iterator[RecordedDots]:
     """Every sample of packets in the bag, oldest first. Raises BagUnusable."""
     if is_gateway_record(path):
-        return  # a gateway does not see the packets of others
-    for message, at_s in _messages(path, names.PACKETS_TOPIC):
-        dots = make_dots(message.senders, message.receivers, message.types, message.ages)
-        yield RecordedDots.of(at_s, message.carried, dots)
+        return iter(())  # a gateway does not see the packets of others
+    return messages(path, names.PACKETS_TOPIC, _dots)
+
+
+def readable(items: Iterator[T], damage: list[BagDamaged]) -> Iterator[T]:
+    """What can be read of these; the error behind it is added to `damage` instead of raised."""
+    try:
+        yield from items
+    except BagDamaged as error:
+        damage.append(error)
+
+
+def raise_any(damage: Sequence[BagDamaged]) -> None:
+    """For a tool that has shown what can be read: raises the first, if there is one."""
+    if damage:
+        raise damage[0]
 
 
 def origin_in(path: Path) -> Origin | None:
     """Where the mesh of a gateway's record is on the earth; None: a bag does not say."""
     if not is_gateway_record(path):
         return None
-    return next(filter(None, map(origin_of, _answers(path))), None)
+    return next(filter(None, readable(_recorded(path, origin_of), [])), None)
 
 
 def is_gateway_record(path: Path) -> bool:
     """Whether it is the record of a gateway; False for a file that cannot be read."""
     try:
         with path.open("rb") as file:
-            return file.read(1) == FIRST_BYTE.encode()
+            begin = file.read(len(codecs.BOM_UTF8) + 1)
     except OSError:
         return False
+    return begin.decode("utf-8-sig", "replace").startswith(FIRST_BYTE)
+
+
+def by_run(states: Iterable[MeshStatus]) -> Iterator[tuple[int, MeshStatus]]:
+    """Each state with the number of its run, from 1 on: time goes back where a run begins."""
+    run, latest_s = 1, -math.inf
+    for state in states:
+        run += state.stamp_s < latest_s
+        latest_s = state.stamp_s
+        yield run, state
+
+
+def chosen_run(path: Path, runs: int, given: int | None) -> int:
+    """The run that was asked for, by default the last one, and then says so if there are several.
+
+    Raises BagUnusable if there are not so many.
+    """
+    if given is not None and given > runs:
+        raise BagUnusable(f"{path}: no run {given}; it contains {runs}")
+    if given is None and runs > 1:
+        print(
+            f"{path}: contains {runs} runs, as its time goes back; this is the last one, "
+            f"--run 1..{runs} takes another",
+            file=sys.stderr,
+        )
+    return given or runs
 
 
 def write_bag(path: Path, states: Iterable[MeshStatus], events: Iterable[EventRecord]) -> None:
@@ -92,20 +134,23 @@ def write_bag(path: Path, states: Iterable[MeshStatus], events: Iterable[EventRe
         raise BagUnusable(f"cannot write {path}: {error.strerror}") from error
 
 
-def playable(path: Path) -> Path:
-    """A bag that rosbag can play: itself, or one made of a gateway's record, beside it."""
+def playable(path: Path, damage: list[BagDamaged]) -> Path:
+    """A bag that rosbag can play: itself, or one made of a gateway's record, beside it.
+
+    What is damaged in the record is left out and added to `damage`.
+    """
     if not is_gateway_record(path):
         return path
     bag = path.with_name(f"{path.name}.bag")
-    write_bag(bag, read_states(path), read_events(path))
+    write_bag(bag, readable(read_states(path), damage), readable(read_events(path), damage))
     return bag
 
 
 def topics_in_bag(path: Path) -> tuple[str, set[str]]:
     """The namespace of the mesh, which ends in a slash, and all topics. Raises BagUnusable."""
-    with _open(path) as bag:
-        topics = set(bag.get_type_and_topic_info().topics)
-        namespace = _namespace(bag)
+    with open_bag(path) as bag:
+        topics = topics_of(bag)
+        namespace = namespace_in(bag)
     if namespace + names.STATE_TOPIC not in topics:
         raise no_states(path)
     return namespace, topics
@@ -113,47 +158,29 @@ def topics_in_bag(path: Path) -> tuple[str, set[str]]:
 
 def no_states(path: Path) -> BagUnusable:
     """The error for a bag without states."""
-    return BagUnusable(f"{path}: contains no /{names.STATE_TOPIC}, which {_RECORDER} records")
+    return BagUnusable(f"{path}: contains no /{names.STATE_TOPIC}, which {RECORDER} records")
 
 
-def _messages(path: Path, topic: str) -> Iterator[tuple[Any, float]]:
-    """Each message of the mesh on this topic, oldest first, and its time."""
-    with _open(path) as bag:
-        for _topic, message, time in bag.read_messages([_namespace(bag) + topic]):
-            yield message, time.to_sec()
+def _dots(message: Any, at_s: float) -> RecordedDots:
+    dots = make_dots(message.senders, message.receivers, message.types, message.ages)
+    return RecordedDots.of(at_s, message.carried, dots)
 
 
-def _namespace(bag: rosbag.Bag) -> str:
-    """The namespace of the mesh in the bag: the only one there is, or else our own."""
-    end = f"/{names.STATE_TOPIC}"
-    topics = bag.get_type_and_topic_info().topics
-    found = [topic[: -len(names.STATE_TOPIC)] for topic in topics if topic.endswith(end)]
-    return found[0] if len(found) == 1 else rospy.get_namespace()
-
-
-def _answers(path: Path) -> Iterator[dict[str, Any]]:
-    """Each answer, its times from the begin of the record."""
+def _recorded(path: Path, convert: Callable[[dict[str, Any]], T]) -> Iterator[T]:
+    """Each answer in the record of a gateway, converted, its times from the begin of the record."""
+    losses: list[float] = []
     try:
-        with path.open(encoding="utf-8") as file:
+        with path.open(encoding="utf-8-sig", errors="replace") as file:
             for at_s, answer in answers(file):
-                later_s = at_s - answer["uptime_s"]
-                for event in answer["events"]:
-                    event["t"] += later_s
-                yield {**answer, "uptime_s": at_s}
-    except (KeyError, TypeError, ValueError) as error:
+                try:
+                    later_s = at_s - answer["uptime_s"]
+                    for event in answer["events"]:
+                        event["t"] += later_s
+                    found = convert({**answer, "uptime_s": at_s})
+                except (AttributeError, KeyError, MeshError, TypeError, ValueError):
+                    losses.append(at_s)
+                else:
+                    yield found
+    except (OSError, ValueError) as error:
         raise BagUnusable(f"{path}: {error}") from error
-
-
-def _open(path: Path) -> rosbag.Bag:
-    try:
-        return rosbag.Bag(str(path))
-    except FileNotFoundError as error:
-        raise BagUnusable(f"{path}: no such file; {_RECORDER} records one") from error
-    except rosbag.ROSBagUnindexedException as error:
-        raise BagUnusable(
-            f"{path}: the recording was not closed; 'rosbag reindex {path}' repairs it"
-        ) from error
-    except OSError as error:
-        raise BagUnusable(f"{path}: {error.strerror or error}") from error
-    except (rosbag.ROSBagException, ValueError) as error:  # for arbitrary bytes
-        raise BagUnusable(f"{path}: not a complete bag; {_RECORDER} records one") from error
+    raise_if_damaged(path, losses, "of the record")

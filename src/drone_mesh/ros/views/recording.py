@@ -12,7 +12,8 @@ from typing import Sequence
 
 from drone_mesh.console.history import History
 from drone_mesh.console.runner import ConsoleRunner
-from drone_mesh.ros.views.bag import BagUnusable, read_events, read_packets, read_states
+from drone_mesh.ros.views.bag import read_events, read_packets, read_states, readable
+from drone_mesh.ros.views.bag_file import BagDamaged, BagUnusable
 from drone_mesh.state.model import MeshStatus
 
 STATES_AT_ONCE = 10  # our choice: 254 nodes keep the server's loop busy for some 50 ms
@@ -41,13 +42,17 @@ class Recording:
     def _run(self) -> None:
         begun_s = time.monotonic()
         try:
-            events = sorted(read_events(self._path), key=lambda event: event.stamp_s)
+            damage: list[BagDamaged] = []
+            found = readable(read_events(self._path), damage)
+            events = sorted(found, key=lambda event: event.stamp_s)
             self._runner.in_loop(lambda: self._history.add_events(events))
-            states = read_states(self._path)
+            states = readable(read_states(self._path), damage)
             while not self._stopped.is_set():
                 batch = list(itertools.islice(states, STATES_AT_ONCE))
                 if not batch:
-                    packets = list(read_packets(self._path))
+                    packets = list(readable(read_packets(self._path), damage))
+                    for error in damage:
+                        _log.warning("%s", error)
                     self._runner.in_loop(partial(self._history.add_packets, packets))
                     took_s = time.monotonic() - begun_s
                     _log.info("%s: completely on the time line after %.1f s", self._path, took_s)

@@ -15,6 +15,7 @@ from drone_mesh.errors import MeshError
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import require_master, run_tool
 from drone_mesh.ros.views.bag import playable, topics_in_bag
+from drone_mesh.ros.views.bag_file import BagDamaged
 
 # Topics that rosbag must not publish, because running nodes do; --clock publishes the time.
 NOT_PLAYED = {"/rosout", "/rosout_agg"}
@@ -54,7 +55,10 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _run(options: argparse.Namespace) -> int:
-    bag = playable(options.bag)
+    damage: list[BagDamaged] = []
+    bag = playable(options.bag, damage)
+    for error in damage:
+        print(f"replay: {error}", file=sys.stderr)
     recorded, topics = topics_in_bag(bag)
     require_master()
     clock = rospy.resolve_name(names.CLOCK_TOPIC)

@@ -13,7 +13,8 @@ from drone_mesh.report.page import render_page
 from drone_mesh.report.story import NothingRecorded, tell_story
 from drone_mesh.report.tables import write_csv
 from drone_mesh.ros.graph.command_line import run_tool
-from drone_mesh.ros.views.bag import BagUnusable, read_events, read_states
+from drone_mesh.ros.views.bag import raise_any, read_events, read_states, readable
+from drone_mesh.ros.views.bag_file import BagDamaged, BagUnusable
 
 
 def main() -> None:
@@ -48,8 +49,11 @@ def _parser() -> argparse.ArgumentParser:
 def _run(options: argparse.Namespace) -> int:
     page = options.output or options.bag.with_suffix(".html")
     print(f"reading {options.bag} ...", file=sys.stderr)
+    damage: list[BagDamaged] = []
+    states = readable(read_states(options.bag), damage)
+    events = readable(read_events(options.bag), damage)
     try:
-        story = tell_story(read_states(options.bag), read_events(options.bag))
+        story = tell_story(states, events)
     except NothingRecorded as error:
         raise BagUnusable(f"{options.bag}: {error}") from error
     print("drawing ...", file=sys.stderr)
@@ -61,4 +65,5 @@ def _run(options: argparse.Namespace) -> int:
         raise MeshError(f"{error.filename}: {error.strerror}") from error
     for path in written:
         print(path)
+    raise_any(damage)
     return 0

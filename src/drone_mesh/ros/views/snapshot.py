@@ -8,6 +8,8 @@ from pathlib import Path
 
 from drone_mesh.errors import MeshError
 from drone_mesh.ros.graph.command_line import join_graph, run_tool
+from drone_mesh.ros.views.bag import raise_any
+from drone_mesh.ros.views.bag_file import BagDamaged
 from drone_mesh.ros.views.state_source import live_state, parse_with_bag, state_in_bag
 from drone_mesh.view.scene import scene_of
 from drone_mesh.view.snapshot import DEFAULT_SIZE, render
@@ -56,14 +58,16 @@ def _size(text: str) -> tuple[int, int]:
 
 
 def _run(options: argparse.Namespace) -> int:
+    damage: list[BagDamaged] = []
     if options.bag is None:
         join_graph("mesh_snapshot")
         mesh = live_state()
     else:
-        mesh = state_in_bag(options.bag, options.at)
+        mesh = state_in_bag(options.bag, options.at, options.run, damage)
     try:
         render(scene_of(mesh), options.picture, options.size)
     except (OSError, ValueError) as error:
         raise MeshError(f"{options.picture}: {error}") from error
     print(options.picture)
+    raise_any(damage)
     return 0

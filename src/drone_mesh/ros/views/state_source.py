@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import dataclass
 from pathlib import Path
 
 import rospy
 
-from drone_mesh.arguments import MOST, decimal
+from drone_mesh.arguments import MOST, decimal, whole
 from drone_mesh.errors import MeshError, naming_argument
 from drone_mesh.msg import MeshState
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import mesh_status
-from drone_mesh.ros.views.bag import BagUnusable, no_states, read_states
+from drone_mesh.ros.views.bag import by_run, chosen_run, no_states, read_states, readable
+from drone_mesh.ros.views.bag_file import BagDamaged, BagUnusable
 from drone_mesh.state.model import MeshStatus
 
 WAIT_S = 5.0  # wall time for a live state: it is latched, so it arrives at once or not at all
@@ -41,10 +43,23 @@ def parse_with_bag(parser: argparse.ArgumentParser) -> argparse.Namespace:
         metavar="S",
         help="with --bag: the state at this simulated time (default: the last one)",
     )
+    add_run(parser)
     options = parser.parse_args(rospy.myargv()[1:])
-    if options.at is not None and options.bag is None:
-        parser.error("--at needs --bag")
+    for name in ("at", "run"):
+        if getattr(options, name) is not None and options.bag is None:
+            parser.error(f"--{name} needs --bag")
     return options
+
+
+def add_run(parser: argparse.ArgumentParser) -> None:
+    """Add --run, for a recording that went on over a restart of the simulation."""
+    parser.add_argument(
+        "--run",
+        type=whole(1, MOST),
+        metavar="N",
+        help="of the runs in the bag, whose time goes back where one begins: this one "
+        "(default: the last)",
+    )
 
 
 def live_state() -> MeshStatus:
@@ -55,25 +70,38 @@ def live_state() -> MeshStatus:
         raise NoState from error
 
 
-def state_in_bag(path: Path, at_s: float | None) -> MeshStatus:
-    """The last state in a bag, or the last one up to `at_s`. Raises BagUnusable."""
-    found, is_behind = None, at_s is not None  # the end of the recording
+@dataclass
+class _Run:
+    first_s: float
+    last_s: float
+    found: MeshStatus | None = None
+
+
+def state_in_bag(
+    path: Path, at_s: float | None, run: int | None, damage: list[BagDamaged]
+) -> MeshStatus:
+    """The last state of a run in a bag, or the last one up to `at_s`. Raises BagUnusable.
+
+    What else is damaged in the bag is added to `damage`.
+    """
+    runs: dict[int, _Run] = {}
     with naming_argument("--bag ", path):
-        for mesh in read_states(path):
-            if at_s is not None and mesh.stamp_s > at_s:
-                if found is None:
-                    raise BagUnusable(
-                        f"{path}: no state up to {at_s:g} s; the recording starts at "
-                        f"{mesh.stamp_s:.1f} s of simulated time"
-                    )
-                is_behind = False
-                break
-            found = mesh
-        if found is None:
-            raise no_states(path)
-        if at_s is not None and is_behind and at_s > found.stamp_s + SPARE_S:
+        for number, mesh in by_run(readable(read_states(path), damage)):
+            this = runs.setdefault(number, _Run(mesh.stamp_s, mesh.stamp_s))
+            this.last_s = mesh.stamp_s
+            if at_s is None or mesh.stamp_s <= at_s:
+                this.found = mesh
+        if not runs:
+            raise damage[0] if damage else no_states(path)
+        this = runs[chosen_run(path, len(runs), run)]
+        if this.found is None:
             raise BagUnusable(
-                f"{path}: no state at {at_s:g} s; the recording ends at {found.stamp_s:.1f} s of "
+                f"{path}: no state up to {at_s:g} s; the recording starts at "
+                f"{this.first_s:.1f} s of simulated time"
+            )
+        if at_s is not None and at_s > this.last_s + SPARE_S:
+            raise BagUnusable(
+                f"{path}: no state at {at_s:g} s; the recording ends at {this.last_s:.1f} s of "
                 "simulated time"
             )
-    return found
+    return this.found

@@ -16,6 +16,8 @@ from drone_mesh.ros.graph.bounded_master import master_answers
 from drone_mesh.ros.graph.command_line import join_graph, run_tool
 from drone_mesh.ros.graph.conversions import mesh_status
 from drone_mesh.ros.graph.master_watch import MasterWatch
+from drone_mesh.ros.views.bag import raise_any
+from drone_mesh.ros.views.bag_file import BagDamaged
 from drone_mesh.ros.views.state_source import (
     OLD_STATE_S,
     WAIT_S,
@@ -60,7 +62,10 @@ def _run(options: argparse.Namespace) -> int:
         options.colour == "auto" and sys.stdout.isatty() and "NO_COLOR" not in os.environ
     )
     if options.bag is not None:
-        return _show(state_in_bag(options.bag, options.at), colours)
+        damage: list[BagDamaged] = []
+        result = _show(state_in_bag(options.bag, options.at, options.run, damage), colours)
+        raise_any(damage)
+        return result
     join_graph("mesh_status")
     if options.watch:
         return _watch(colours)
