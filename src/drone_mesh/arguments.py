@@ -34,12 +34,12 @@ def is_decimal(text: str) -> bool:
 def finite(text: str) -> float:
     """The number in this text of a file, which other programs may begin with +.
 
-    Raises ValueError for anything but a decimal number, and for one that no float can be.
+    Raises ValueError for anything but a decimal number, and above 1e9, where distances overflow.
     """
     text = text.strip(" \t")
     digits = text[1:] if text[:1] == "+" and text[1:2] != "-" else text
     number = float(digits) if is_decimal(digits) else math.nan
-    if not math.isfinite(number):
+    if not abs(number) <= MOST:
         raise ValueError(f"{text[:40]!r} is not a number")
     return number
 

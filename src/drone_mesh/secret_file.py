@@ -21,7 +21,7 @@ def read_secret_file(path: Path) -> str:
     """
     try:
         # A pipe without a writer would otherwise block the program here.
-        with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK), encoding="utf-8") as file:
+        with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK), encoding="utf-8-sig") as file:
             _check(path, os.fstat(file.fileno()))
             return file.read()
     except OSError as error:

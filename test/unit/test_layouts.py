@@ -8,7 +8,8 @@ import pytest
 
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError, MeshError
-from drone_mesh.layouts import Layouts, UnknownCase, read_layout
+from drone_mesh.layouts import Layouts, Order, UnknownCase, read_layout
+from drone_mesh.yaml_file import read_text
 
 SHIPPED = Path(__file__).parents[2] / "config" / "casus.yaml"
 
@@ -104,6 +105,13 @@ def test_an_unknown_case_is_refused_with_the_known_ones(shipped):
     assert isinstance(refused.value, MeshError)
 
 
+def test_a_byte_order_mark_is_no_part_of_a_text(tmp_path):
+    path = tmp_path / "layout.yaml"
+    path.write_bytes(b"\xef\xbb\xbfcases: {5: {1: [1, 2, 3]}}")
+    assert read_text(path) == "cases: {5: {1: [1, 2, 3]}}"
+    assert Layouts.load(path).orders(5) == [Order(1, Location(2.0, 1.0, 3.0))]
+
+
 @pytest.mark.parametrize(
     ("text", "why"),
     [
@@ -135,6 +143,9 @@ def test_an_unknown_case_is_refused_with_the_known_ones(shipped):
         ("cases: {5: {1: [0, 0, 501]}}", "case 5, drone 1: height 501 m is outside 0..500"),
         ("cases: {5: {1: [0, 0, -1]}}", "case 5, drone 1: height -1 m is outside"),
         ("cases:\n  5: {1: [0, 0, 0]}\n  5: {2: [0, 0, 0]}", "line 3: duplicate key 5"),
+        ("cases:\n  5:\n    010: [0, 0, 0]", "line 3: 010 is not a number in decimal digits"),
+        ("cases:\n  5:\n    1: [0, 1:30, 0]", "line 3: 1:30 is not a number in decimal digits"),
+        ("cases:\n  5:\n    1: [0, 1:30.5, 0]", "line 3: 1:30.5 is not a number in decimal digits"),
         ("cases:\n  5:\n    1: [0, 0, 0]\n    1: [1, 1, 1]", "line 4: duplicate key 1"),
     ],
 )

@@ -63,7 +63,7 @@ def rows_of_file(path: Path) -> list[list[float]]:
     A role is gateway or router. Raises ConfigurationError.
     """
     try:
-        rows = list(csv.reader(read_text(path).splitlines()))
+        rows = list(csv.reader(read_text(path).splitlines(), skipinitialspace=True))
     except (ConfigurationError, csv.Error) as error:
         raise ConfigurationError(f"layout file {path}: {error}") from error
     if not rows or [name.strip() for name in rows[0]] != PLACES_HEADER:

@@ -245,8 +245,13 @@ def read_rows(path: Path) -> list[dict[str, str]]:
         return []
     except OSError as error:
         raise _cannot("read", path, error) from error
-    text = data[: data.rfind(b"\n") + 1].decode("utf-8", "replace")
-    rows = list(csv.DictReader(io.StringIO(text, newline="")))
+    text = data[: data.rfind(b"\n") + 1].decode("utf-8-sig", "replace")
+    try:
+        rows = list(csv.DictReader(io.StringIO(text, newline="")))
+    except csv.Error as error:
+        raise StoreError(f"{path}: {error}") from error
+    if rows and "run" not in rows[0]:
+        raise StoreError(f"{path}: has no column run")
     while rows and None in rows[-1].values():
         rows.pop()  # cut off inside a quoted traceback
     return rows
@@ -265,8 +270,7 @@ def describe_folder(folder: Path) -> str:
     """A few lines of text. Raises StoreError if the folder has no results."""
     if not (folder / PLAN).exists():
         raise StoreError(f"{folder}: no {PLAN} there, so it is not a results folder of lab run")
-    with (folder / PLAN).open(encoding="utf-8", newline="") as file:
-        planned = [row["run"] for row in csv.DictReader(file)]
+    planned = [row["run"] for row in read_rows(folder / PLAN)]
     rows = read_rows(folder / RUNS)
     done = {row["run"] for row in rows}
     failed = {row["run"] for row in read_rows(folder / FAILURES)} - done

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
-import math
-from typing import Any, Iterable, Iterator, Tuple
+import reprlib
+from typing import Any, Iterable, Iterator, Tuple, cast
+
+from drone_mesh.arguments import MOST
 
 Answer = Tuple[float, Any]
 """Seconds since the record began, which rise on after a restart of the gateway; and the answer."""
@@ -21,8 +23,10 @@ def answers(lines: Iterable[str]) -> Iterator[Answer]:
     for number, line in enumerate(lines, start=1):
         try:
             answer = json.loads(line)
-            uptime_s = _number(answer["uptime_s"])
+            uptime_s = answer["uptime_s"]
         except (ValueError, KeyError, TypeError, RecursionError):
+            continue
+        if not _is_number(uptime_s):
             continue
         try:
             list(places(answer))
@@ -38,21 +42,29 @@ def answers(lines: Iterable[str]) -> Iterator[Answer]:
 
 def places(answer: Any) -> Iterator[tuple[int, tuple[float, float, float]]]:
     """Each node with a known place, as x, y, z in metres. Raises ValueError for other content."""
-    try:
-        for node in answer["nodes"]:
-            if node["place"] is not None:
-                latitude, longitude, height = map(_number, node["place"])
-                yield int(_number(node["id"])), (longitude, latitude, height)
-    except (KeyError, TypeError) as error:
-        raise ValueError("expected an answer to GET /mesh") from error
-    except ValueError as error:
-        raise ValueError(
-            f"node {node['id']}: place {node['place']} must be three numbers"
-        ) from error
+    for node in _list_in(answer, "nodes"):
+        try:
+            number, place = node["id"], node["place"]
+        except (KeyError, TypeError) as error:
+            raise ValueError(
+                f"expected nodes with id and place, not {reprlib.repr(node)}"
+            ) from error
+        if type(number) is not int:
+            raise ValueError(f"the id of a node is {reprlib.repr(number)}")
+        if place is not None:
+            if not (isinstance(place, list) and len(place) == 3 and all(map(_is_number, place))):
+                given = reprlib.repr(place)
+                raise ValueError(f"node {number}: place {given} must be three numbers")
+            latitude, longitude, height = map(float, place)
+            yield number, (longitude, latitude, height)
 
 
-def _number(value: Any) -> float:
-    """Raises ValueError for what JSON of others may have in its place, NaN included."""
-    if type(value) not in (int, float) or not abs(value) < math.inf:
-        raise ValueError(f"{value!r:.40} is not a number")
-    return float(value)
+def _list_in(answer: Any, key: str) -> list[Any]:
+    found = answer.get(key)
+    if not isinstance(found, list):
+        raise ValueError(f"expected an answer to GET /mesh, with a list of {key}")
+    return found
+
+
+def _is_number(value: object) -> bool:
+    return type(value) in (int, float) and -MOST <= cast(float, value) <= MOST

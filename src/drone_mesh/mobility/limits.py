@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 import numbers
-from typing import Iterator, Sequence
+from typing import Iterator, Sequence, cast
 
+from drone_mesh.arguments import MOST
 from drone_mesh.drone.goal import MAX_HEIGHT_M
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.mobility.area import Area
@@ -52,9 +52,9 @@ def _rules(mobility: Mobility) -> Iterator[tuple[str, bool, str]]:
     yield "waypoints", are_right, "pairs x, y of finite numbers, two different places or more"
 
 
-def _is_in(low: float, value: object, high: float = math.inf) -> bool:
-    """Whether it is a finite number in this range."""
-    return isinstance(value, numbers.Real) and math.isfinite(value) and low <= float(value) <= high
+def _is_in(low: float, value: object, high: float = MOST) -> bool:
+    """Whether it is a number in this range; by default of none whose distances overflow."""
+    return isinstance(value, numbers.Real) and low <= cast(float, value) <= high
 
 
 def _is_tuple(values: object, length: int) -> bool:
@@ -62,7 +62,7 @@ def _is_tuple(values: object, length: int) -> bool:
     return (
         isinstance(values, Sequence)
         and len(values) == length
-        and all(_is_in(-math.inf, value) for value in values)
+        and all(_is_in(-MOST, value) for value in values)
     )
 
 

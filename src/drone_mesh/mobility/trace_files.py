@@ -6,7 +6,7 @@ import csv
 import gzip
 import zlib
 from pathlib import Path
-from typing import Iterable, Sequence, Tuple
+from typing import Iterable, Iterator, Sequence, Tuple
 
 from drone_mesh.arguments import MOST, is_up_to
 from drone_mesh.errors import ConfigurationError
@@ -46,7 +46,7 @@ def read_trace(path: Path) -> Knots:
         raise ConfigurationError(f"trace {path}: {error}") from error
     lines = text.splitlines()
     try:
-        if lines and [name.strip() for name in lines[0].split(",")] == CSV_HEADER:
+        if [name.strip() for row in _rows(lines[:1]) for name in row] == CSV_HEADER:
             knots = _csv(lines)
         elif is_ns2(lines):
             knots = read_ns2(lines)
@@ -82,7 +82,7 @@ def _is_another_table(line: str) -> bool:
 def _csv(lines: Iterable[str]) -> Knots:
     """Rows may come in any order. Raises ValueError, which names the line."""
     found: dict[int, list[tuple[Knot, int]]] = {}  # each with its line
-    for number, row in enumerate(csv.reader(lines), start=1):
+    for number, row in enumerate(_rows(lines), start=1):
         if number == 1 or not row:
             continue
         node, knot = _row(number, row)
@@ -93,6 +93,10 @@ def _csv(lines: Iterable[str]) -> Knots:
             if not follows(knot, before):
                 raise ValueError(f"line {number}: drone {node} is at two places at {knot[0]:g} s")
     return {node: [knot for knot, _line in found[node]] for node in sorted(found)}
+
+
+def _rows(lines: Iterable[str]) -> Iterator[list[str]]:
+    return csv.reader(lines, skipinitialspace=True)
 
 
 def _row(number: int, row: Sequence[str]) -> tuple[int, Knot]:

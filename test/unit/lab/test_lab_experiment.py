@@ -220,6 +220,7 @@ def test_an_axis_without_the_baseline_asks_for_another_baseline(tmp_path: Path) 
         ("sedes=3", "unknown key sedes; did you mean seeds?"),
         ("seeds", "expected key=value"),
         ("seeds=x", "seeds: input should be a valid integer, not 'x'"),
+        ("seeds=010", "the value is not valid YAML"),
         ("base.radio.loss=0.5", "radio.loss is swept; use sweep.radio.loss=[0.5] instead"),
         ("base.layout.drnes=3", "unknown key base.layout.drnes; did you mean drones?"),
         ("base.faults.7.at_s=1", "base.faults has no entry 7"),
@@ -412,7 +413,8 @@ def test_an_experiment_may_come_from_a_pipe(tmp_path: Path) -> None:
 
 
 def test_places_come_from_a_file_beside_the_experiment(tmp_path: Path) -> None:
-    (tmp_path / "yard.csv").write_text("id,x,y,role\n0,0,0,gateway\n3,5,0,router\n")
+    rows = '\ufeff"id", "x","y","role"\n0,0,0,gateway\n3,5,0,"router"\n'
+    (tmp_path / "yard.csv").write_text(rows)
     text = "name: yard\nbase:\n  layout: {kind: file, path: yard.csv}\n"
     (cell,) = load_experiment(write(tmp_path, text)).cells
     assert cell.scenario.layout.places == [[0, 0, 0, 1], [3, 5, 0, 0]]
@@ -429,6 +431,7 @@ def test_places_come_from_a_file_beside_the_experiment(tmp_path: Path) -> None:
         ("0,0,\u0663,gateway\n", "line 2: expected finite x, y"),
         ("0_0,0,0,gateway\n", "line 2: id 0_0 is out of range"),
         ("0,0,inf,gateway\n", "line 2: expected finite x, y"),
+        ("0,0,1e308,gateway\n", "line 2: expected finite x, y"),
     ],
 )
 def test_a_bad_file_of_places_is_refused(tmp_path: Path, rows: str, words: str) -> None:

@@ -322,6 +322,8 @@ def test_a_further_drone_does_not_change_the_motion_of_the_others():
         ("waypoints", ((1.0, math.nan), (1.0, 1.0)), "pairs x, y of finite numbers"),
         ("waypoints", ((1.0, 1.0, 2.0), (5.0, 1.0, 2.0)), "pairs x, y"),
         ("knots", {1: ()}, "knots of drone 1: must be t, x, y and z"),
+        ("knots", {1: ((0.0, 1e308, 1.0, 0.0),)}, "knots of drone 1: must be t, x, y and z"),
+        ("knots", {1: ((0.0, 10**400, 1.0, 0.0),)}, "knots of drone 1: must be t, x, y and z"),
         ("knots", {1: ((0.0, 1.0, 1.0),)}, "knots of drone 1: must be t, x, y and z"),
         ("knots", {1: ((0.0, math.nan, 1.0, 0.0),)}, "knots of drone 1: .* finite"),
         ("knots", {1: ((2.0, 1.0, 1.0, 0.0), (1.0, 1.0, 1.0, 0.0))}, "t must not fall"),

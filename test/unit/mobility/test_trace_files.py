@@ -160,6 +160,11 @@ def test_csv_rows_may_come_in_any_order(tmp_path):
     assert knots == {2: [(0.5, 9.0, 9.0, 1.0)], 4: [(0.0, 1.0, 2.0, 0.0), (1.0, 3.0, 3.0, 0.0)]}
 
 
+def test_csv_may_have_quoted_words(tmp_path):
+    text = '"t", "id", "x", "y", "z"\n"1.0", "4", "3", "3", "0"\n'
+    assert read(tmp_path, text) == {4: [(1.0, 3.0, 3.0, 0.0)]}
+
+
 def test_csv_may_begin_with_a_byte_order_mark(tmp_path):
     assert read(tmp_path, "\ufefft,id,x,y,z\r\n1.0,4,3,3,0\r\n") == {4: [(1.0, 3.0, 3.0, 0.0)]}
 

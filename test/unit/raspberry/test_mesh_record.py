@@ -35,6 +35,37 @@ def answer(uptime_s: float, *place: float, events: list[dict[str, Any]] | None =
     return {"gateway": 0, "uptime_s": uptime_s, "nodes": [node], "events": events or []}
 
 
+@pytest.mark.parametrize(
+    ("key", "value", "why"),
+    [
+        ("id", None, "line 2: expected nodes with id and place, not {"),
+        ("id", 1e400, "line 2: the id of a node is inf"),
+        ("place", None, "line 2: expected nodes with id and place, not {"),
+        ("place", [1, 2, 1e308], "line 2: node 3: place [1, 2, 1e+308] must be three numbers"),
+        ("place", [1, 2, "x"], "line 2: node 3: place [1, 2, 'x'] must be three numbers"),
+        ("place", "abc", "line 2: node 3: place 'abc' must be three numbers"),
+    ],
+)
+def test_a_record_with_a_missing_or_wrong_value_is_refused_in_one_line(tmp_path, key, value, why):
+    wrong = answer(2.0, 1.0, 2.0, 3.0)
+    del wrong["nodes"][0][key]
+    if value is not None:
+        wrong["nodes"][0][key] = value
+    lines = [json.dumps(answer(1.0, 1.0, 2.0, 3.0)), json.dumps(wrong)]
+    path = tmp_path / "flight.jsonl"
+    path.write_text("\n".join(lines))
+    with pytest.raises(ConfigurationError) as caught:
+        read_trace(path)
+    assert why in str(caught.value)
+
+
+def test_lines_that_are_no_answers_are_left_out(tmp_path):
+    path = tmp_path / "flight.jsonl"
+    others = ['{"uptime_s": 1e400}', '{"uptime_s": "1"}', "[" * 5000, "{}", '{"uptime_s": 2, "no']
+    path.write_text("\ufeff" + "\n".join([json.dumps(answer(1.0, 1.0, 2.0, 3.0)), *others]))
+    assert read_trace(path) == {3: [(1.0, 2.0, 1.0, 3.0)]}
+
+
 class Gateway:
     """Answers at once; an event a second."""
 
