@@ -42,6 +42,7 @@ KEEP_ALIVE_S = 15  # our choice: time until a broken connection is noticed and t
 MOST_WAITING = 10_000  # our choice: messages for an absent broker; then new ones are dropped
 STATE_PERIOD_S = 5.0  # our choice
 RETRY_S = 0.5  # our choice: pause after the mesh's queue was full
+RETAINED = "retained messages are not sent: each new connection would send them again"
 _DELAYS_S = (1, 30)  # our choice: shortest and longest pause between attempts to connect
 
 _log = logging.getLogger(__name__)
@@ -61,9 +62,9 @@ class _Unacknowledged:
 class MqttInternet(IInternetConnection):
     """The MQTT connection of a gateway.
 
-    Three threads use it: paho's calls `_on_...`; its own publishes states, and resubmits messages
-    that the full queue of the mesh refused; the node's calls `observe`, `_received` and message
-    callbacks. All may use paho's client.
+    Three threads use it: that of paho's loop calls `_on_...`; another one publishes states, and
+    resubmits messages that the full queue of the mesh refused; the node's calls `observe`,
+    `_received` and message callbacks. All may use paho's client.
     """
 
     def __init__(
@@ -91,7 +92,8 @@ class MqttInternet(IInternetConnection):
         self._commands: IGatewayCommands | None = None
         self._stopped = threading.Event()
         self._end_subscription: Callable[[], None] = lambda: None
-        self._states: dict[int, str] = {}  # as published; for the thread of the states
+        self._states: dict[int, str] = {}  # as published; for the node's thread
+        self._left_online: set[int] = set()  # by an earlier run; for the node's thread
         self._lock = threading.Lock()
         self._to_retry: list[mqtt.MQTTMessage] = []  # under the lock
         # Messages whose acknowledgement the broker has not received, by packet id. Under the lock.
@@ -120,34 +122,39 @@ class MqttInternet(IInternetConnection):
         self._client.on_connect_fail = self._on_connect_fail
         self._client.on_disconnect = self._on_disconnect
         self._client.on_message = self._on_message
-        self._watch: threading.Thread | None = None
+        self._threads: list[threading.Thread] = []
         self._complained = False
 
     def connect(self, commands: IGatewayCommands) -> None:
         """Connect as soon as the broker answers; returns at once."""
         self._commands = commands
-        self._client.connect_async(self._broker.host, self._broker.port, KEEP_ALIVE_S)
-        self._client.loop_start()
         self._end_subscription = self._users.subscribe(self._received)
-        self._watch = threading.Thread(
-            target=self._keep_states_published, args=(commands,), name=f"MQTT states {self._node}"
-        )
-        self._watch.start()
+        self._threads = [
+            threading.Thread(target=self._keep_connected, name=f"MQTT {self._node}"),
+            threading.Thread(
+                target=self._keep_states_published,
+                args=(commands,),
+                name=f"MQTT states {self._node}",
+            ),
+        ]
+        for thread in self._threads:
+            thread.start()
 
     def disconnect(self) -> None:
         """Disconnect from the broker and end the threads."""
         self._stopped.set()
         self._end_subscription()
-        if self._watch is not None:
-            self._watch.join()
-            self._watch = None
-            if self._client.is_connected():
-                info = self._client.publish(
-                    self._topics.state(self._node), _offline(self._node), QOS, True
-                )
-                info.wait_for_publish(1.0)
+        if not self._threads:
+            return
+        loop, states = self._threads
+        self._threads = []
+        states.join()
+        if self._client.is_connected():
+            topic = self._topics.state(self._node)
+            self._client.publish(topic, _offline(self._node), QOS, True).wait_for_publish(1.0)
+        while loop.is_alive():
             self._client.disconnect()
-            self._client.loop_stop()
+            loop.join(RETRY_S)
 
     # From the mesh to the broker ---------------------------------------------------------------
 
@@ -185,7 +192,9 @@ class MqttInternet(IInternetConnection):
 
     def _publish_states(self, commands: IGatewayCommands, now_s: float) -> None:
         """On the node's thread: publish changed states."""
-        states = {node.node_id: _state(node, now_s) for node in commands.get_known_nodes()}
+        gone = [KnownNode(node, NO_ROUTE, NO_ROUTE, -math.inf) for node in self._left_online]
+        nodes = [*gone, *commands.get_known_nodes()]
+        states = {node.node_id: _state(node, now_s, by=self._node) for node in nodes}
         states[self._node] = json.dumps({"online": True, "node": self._node, "gateway": True})
         for node, state in states.items():
             if self._states.get(node) != state:
@@ -195,6 +204,19 @@ class MqttInternet(IInternetConnection):
     # From the broker to the mesh ---------------------------------------------------------------
 
     def _on_message(self, _client: mqtt.Client, _userdata: Any, message: mqtt.MQTTMessage) -> None:
+        try:
+            node = self._topics.node_of_state(message.topic)
+            if node is None:
+                self._take(message)
+            elif message.retain and _is_online(message.payload, by=self._node):
+                self._submit(lambda _now_s: self._left_online.add(node))
+        except Exception as error:  # a topic, for example, that no broker lets pass
+            _log.warning("MQTT: dropped a message of the broker %s: %s", self._broker.url, error)
+            with self._lock:
+                self._unacknowledged.pop(message.mid, None)
+            self._client.ack(message.mid, message.qos)
+
+    def _take(self, message: mqtt.MQTTMessage) -> None:
         with self._lock:
             known = self._unacknowledged.get(message.mid)
             # A restored broker may reuse the packet id for another message.
@@ -209,10 +231,9 @@ class MqttInternet(IInternetConnection):
     def _hand_in(self, message: mqtt.MQTTMessage) -> None:
         destination = self._topics.destination(message.topic)
         node = self._topics.node_of(message.topic)
-        if destination is None:
-            self._say(
-                node, {"state": "refused", "reason": f"no such node or port: {message.topic}"}
-            )
+        if destination is None or message.retain:
+            reason = RETAINED if message.retain else f"no such node or port: {message.topic}"
+            self._say(node, {"state": "refused", "reason": reason})
             self._acknowledge(message)
             return
         sending = self._users.send(destination.to, message.payload, destination.port)
@@ -247,6 +268,15 @@ class MqttInternet(IInternetConnection):
 
     # The connection ----------------------------------------------------------------------------
 
+    def _keep_connected(self) -> None:
+        while not self._stopped.is_set():
+            self._client.connect_async(self._broker.host, self._broker.port, KEEP_ALIVE_S)
+            try:
+                self._client.loop_forever(retry_first_connection=True)
+            except Exception as error:  # paho trusts that the packets of a broker are whole
+                self._complain(f"sent what cannot be read ({error!r})")
+            self._stopped.wait(_DELAYS_S[0])
+
     def _on_connect(
         self,
         client: mqtt.Client,
@@ -263,6 +293,7 @@ class MqttInternet(IInternetConnection):
         _log.info("MQTT: connected to %s, mesh %s", self._broker.url, self._broker.mesh)
         if self._sends:
             client.subscribe([(topic, QOS) for topic in self._topics.all_tx])
+        client.subscribe(self._topics.all_states, 0)  # what was retained; not kept while offline
         self._submit(lambda _now_s: self._states.clear())  # the last will may have replaced them
 
     def _on_connect_fail(self, _client: mqtt.Client, _userdata: Any) -> None:
@@ -302,13 +333,25 @@ def _offline(node: int) -> str:
     return json.dumps({"online": False, "node": node, "gateway": True})
 
 
-def _state(node: KnownNode, now_s: float) -> str:
+def _is_online(state: bytes, by: int) -> bool:
+    """Whether a state that this gateway may have published says that a router is online."""
+    try:
+        said = json.loads(state)
+    except (ValueError, RecursionError):
+        return False
+    if not isinstance(said, dict) or said.get("gateway") is not False:
+        return False
+    return said.get("online") is True and said.get("by", by) == by
+
+
+def _state(node: KnownNode, now_s: float, by: int) -> str:
     heard = math.isfinite(node.heard_s)
     return json.dumps(
         {
             "online": node.next_hop != NO_ROUTE,
             "node": node.node_id,
             "gateway": False,
+            "by": by,
             "hops": None if node.hops == NO_ROUTE else node.hops,
             "next_hop": None if node.next_hop == NO_ROUTE else node.next_hop,
             "heard_minutes_ago": int(max(0.0, now_s - node.heard_s) // 60) if heard else None,

@@ -3,6 +3,7 @@
     drone_mesh/<mesh>/<node>/rx[/<port>]   a message that the gateway received from that node
     drone_mesh/<mesh>/<node>/tx[/<port>]   publish here to send a message to that node
     drone_mesh/<mesh>/<node>/state         retained: JSON, the node's state as known to the gateway
+                                           `by`; it holds while that gateway is online
     drone_mesh/<mesh>/<node>/event         JSON: outcome of a message for that node ("state"), or an
                                            event of that node ("event")
 
@@ -97,6 +98,17 @@ class Topics:
     def state(self, node: int) -> str:
         """The topic for the retained state of `node`."""
         return f"{self._prefix}/{node}/state"
+
+    @property
+    def all_states(self) -> str:
+        """A filter that matches every `state` topic."""
+        return f"{self._prefix}/+/state"
+
+    def node_of_state(self, topic: str) -> int | None:
+        """The node whose `state` topic this is; None: it is another kind of topic."""
+        node = self.node_of(topic)
+        is_state = is_up_to(node, MAX_NODE_ID) and topic == self.state(int(node))
+        return int(node) if is_state else None
 
     def event(self, node: str) -> str:
         """The topic for outcomes of messages for `node`, and for its events."""

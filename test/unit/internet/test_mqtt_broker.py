@@ -97,8 +97,8 @@ class Client:
         self._client.loop_start()
         assert self.messages.get(timeout=PATIENCE_S) is None
 
-    def publish(self, topic, payload):
-        return self._client.publish(topic, payload, 1)
+    def publish(self, topic, payload, retain=False):
+        return self._client.publish(topic, payload, 1, retain)
 
     def next(self, wanted=lambda message: True):
         deadline_s = time.monotonic() + PATIENCE_S
@@ -241,6 +241,130 @@ def test_the_state_of_a_node_is_retained_and_the_end_of_the_gateway_shows(broker
     gateway.internet._client._sock.shutdown(socket.SHUT_RDWR)  # as if its host lost power
     gone = client.next(is_topic("0/state"))
     assert json.loads(gone.payload) == {"online": False, "node": 0, "gateway": True}
+
+
+def retained(broker, node, **more):
+    """What an earlier run left behind: it says that this node is online."""
+    client = mqtt.Client(CallbackAPIVersion.VERSION2, client_id="earlier")
+    client.connect("127.0.0.1", broker.port)
+    client.loop_start()
+    state = json.dumps({"online": True, "node": node, "gateway": False, **more})
+    client.publish(f"drone_mesh/field/{node}/state", state, 1, True).wait_for_publish(PATIENCE_S)
+    client.disconnect()
+    client.loop_stop()
+
+
+def test_a_node_that_died_while_its_gateway_was_away_is_not_online_for_ever(broker):
+    retained(broker, 5, by=0)
+    retained(broker, 6)  # by a program that named no gateway
+    retained(broker, 7, by=9)  # another gateway answers for it
+    retained(broker, 1, by=0)  # it lives
+    client = Client(broker.port, "drone_mesh/field/#")
+    gateway = Gateway(Broker("127.0.0.1", broker.port, False, "field"))
+    states = {}
+
+    def are_true(message):
+        if message.topic.endswith("/state"):
+            states[message.topic.split("/")[2]] = json.loads(message.payload)
+        online = {node: state["online"] for node, state in states.items()}
+        return online == {"0": True, "1": True, "5": False, "6": False, "7": True}
+
+    try:
+        client.next(are_true)
+        assert states["5"] == {
+            "online": False, "node": 5, "gateway": False, "by": 0, "hops": None, "next_hop": None,
+            "heard_minutes_ago": None,
+        }  # fmt: skip
+        assert states["1"]["by"] == 0
+    finally:
+        client.close()
+        gateway.close()
+
+
+@pytest.mark.parametrize("state", [b"", b"\xff", b"[]", b"[" * 100_000, b'{"online": 1}'])
+def test_a_retained_state_of_somebody_else_harms_nothing(broker, state):
+    client = Client(broker.port, "drone_mesh/field/#")
+    client.publish("drone_mesh/field/5/state", state, retain=True).wait_for_publish(PATIENCE_S)
+    gateway = Gateway(Broker("127.0.0.1", broker.port, False, "field"))
+    try:
+        client.next(is_topic("0/state"))
+        assert gateway.internet._left_online == set()
+    finally:
+        client.close()
+        gateway.close()
+
+
+def test_a_retained_message_is_sent_by_no_new_connection_and_an_event_says_why(
+    broker, gateway, client
+):
+    client.publish("drone_mesh/field/1/tx", b"blink", retain=True)
+    assert json.loads(client.next(is_topic("1/event")).payload)["state"] == "delivered"
+    for _ in range(2):
+        gateway.internet._client._sock.shutdown(socket.SHUT_RDWR)
+        event = json.loads(client.next(is_topic("1/event")).payload)
+        assert event["state"] == "refused"
+        assert "retained messages are not sent" in event["reason"]
+    assert [message.payload for message in gateway.network.received[1]] == [b"blink"]
+
+
+class BrokenBroker:
+    """It answers CONNECT and SUBSCRIBE; then it sends `broken`, once, and each time `good`."""
+
+    def __init__(self, broken, good):
+        self._broken, self._good = broken, good
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self.port = self._listener.getsockname()[1]
+        threading.Thread(target=self._serve, daemon=True).start()
+
+    def _serve(self):
+        while True:
+            connection, _address = self._listener.accept()
+            with connection:
+                connection.settimeout(PATIENCE_S)
+                while True:
+                    try:
+                        request = connection.recv(65536)
+                        if not request:
+                            break
+                        if request[0] == 0x10:
+                            connection.sendall(bytes.fromhex("20 02 00 00"))
+                        elif request[0] == 0x82:
+                            connection.sendall(b"\x90\x04" + request[2:4] + b"\x01\x01")
+                            broken, self._broken = self._broken, b""
+                            connection.sendall(broken + self._good)
+                    except OSError:
+                        break
+
+
+def publish_packet(topic, payload, mid):
+    body = len(topic).to_bytes(2, "big") + topic + mid.to_bytes(2, "big") + payload
+    return bytes((0x32, len(body))) + body
+
+
+@pytest.mark.parametrize(
+    "broken",
+    [
+        publish_packet(b"drone_mesh/field/+/tx", b"x", 1),
+        publish_packet(b"drone_mesh/field/#/tx", b"x", 1),
+        publish_packet(b"drone_mesh/field/\xff/tx", b"x", 1),
+        publish_packet(b"", b"x", 1),
+        bytes.fromhex("32 01 00"),
+        bytes.fromhex("32 03 00 09 41"),
+        bytes.fromhex("20 01 00"),
+        bytes.fromhex("90 01 00"),
+        bytes.fromhex("F0 00"),
+    ],
+)
+def test_nothing_that_a_broken_broker_sends_ends_the_connection_for_good(broken):
+    good = publish_packet(b"drone_mesh/field/1/tx", b"blink", 2)
+    broker = BrokenBroker(broken, good)
+    gateway = Gateway(Broker("127.0.0.1", broker.port, False, "field"))
+    try:
+        gateway.wait_for_all_at_node_1({b"blink"})
+        assert all(thread.is_alive() for thread in gateway.internet._threads)
+    finally:
+        gateway.close()
+    assert not [thread for thread in threading.enumerate() if "MQTT" in thread.name]
 
 
 def test_what_happens_to_a_node_is_published(gateway, client):
