@@ -140,6 +140,7 @@ class OrderFormationResponse(Message):
     id: int
     sent: bytes
     later: bytes
+    there: bytes
     no_route: bytes
     not_in_fleet: bytes
     message: str
@@ -148,6 +149,7 @@ class OrderFormationResponse(Message):
         id: int = ...,
         sent: bytes | Sequence[int] = ...,
         later: bytes | Sequence[int] = ...,
+        there: bytes | Sequence[int] = ...,
         no_route: bytes | Sequence[int] = ...,
         not_in_fleet: bytes | Sequence[int] = ...,
         message: str = ...,
@@ -167,6 +169,7 @@ class OrderLayoutResponse(Message):
     id: int
     sent: bytes
     later: bytes
+    there: bytes
     no_route: bytes
     not_in_fleet: bytes
     message: str
@@ -175,6 +178,7 @@ class OrderLayoutResponse(Message):
         id: int = ...,
         sent: bytes | Sequence[int] = ...,
         later: bytes | Sequence[int] = ...,
+        there: bytes | Sequence[int] = ...,
         no_route: bytes | Sequence[int] = ...,
         not_in_fleet: bytes | Sequence[int] = ...,
         message: str = ...,

@@ -76,6 +76,20 @@ def test_a_formation_is_previewed_and_sent(page):
     )
 
 
+def test_a_real_gateway_is_asked_before_drones_of_a_formation_stand_too_near(start_console, visit):
+    page = visit(start_console("--real", "--skip", "25").url)
+    page.wait_for_drones(len(PLACES))
+    for drone in (16, 17):
+        page.page.click(f"#nodes tr[data-id='{drone}']", modifiers=["Shift"])
+    page.page.click("#group-formation")
+    page.page.fill("#formation-spacing", "0.5")
+    page.answer_held("#held-now")
+    page.page.click("#formation-send")
+    page.wait_for("the question", lambda: page.page.is_visible("#confirm"))
+    question = page.page.inner_text("#confirm-text")
+    assert "flies to a place 0.5 m from there. Send it all the same?" in question
+
+
 SHAPES = """async () => {
   const { assigned, placesOf } = await import("/static/formations.js");
   const places = (shape, n, heading) => placesOf(shape, n, 2, [10, 20], heading);

@@ -75,9 +75,10 @@ class LogWatch:
         self._lines: list[Log] = []
         self._subscriber = rospy.Subscriber("/rosout", Log, self._lines.append)
 
-    def lines(self, text: str) -> list[str]:
-        """The lines that contain this text."""
-        return [line.msg for line in list(self._lines) if text in line.msg]
+    def lines(self, text: str, level: int = Log.DEBUG) -> list[str]:
+        """The lines that contain this text, of this level or above it."""
+        lines = list(self._lines)
+        return [line.msg for line in lines if text in line.msg and line.level >= level]
 
     def failures(self) -> list[str]:
         """Lines of unexpected exceptions."""

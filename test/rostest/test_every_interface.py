@@ -20,7 +20,7 @@ import rospy
 import rostest
 from actionlib_msgs.msg import GoalStatus
 from diagnostic_msgs.msg import DiagnosticArray
-from rosgraph_msgs.msg import Clock
+from rosgraph_msgs.msg import Clock, Log
 from rostest_support import WALL_LIMIT_S, LogWatch, MeshWatch, call, wait_for
 from std_msgs.msg import Bool, Float32
 
@@ -102,7 +102,7 @@ class EveryInterfaceTest(unittest.TestCase):
 
     def publisher(self, name: str, of: type) -> rospy.Publisher:
         self.note(name, of)
-        topic = rospy.Publisher(name, of, queue_size=10)
+        topic = rospy.Publisher(name, of, queue_size=10, latch=True)
         wait_for(f"a subscriber of {name}", WALL_LIMIT_S, lambda: topic.get_num_connections() > 0)
         return topic
 
@@ -295,19 +295,40 @@ class EveryInterfaceTest(unittest.TestCase):
             self.mesh.wait("all connected after it", 60, self.mesh.connected)
         places = [msg.Location(*STARTS[drone][::-1], 0) for drone in LAYOUT]
         name = "/DroneManager/orderFormation"
-        formation = {"name": "back", "drones": bytes(LAYOUT), "places": places, "at_once": False}
+        formation = {"name": "back", "drones": bytes(LAYOUT), "places": places}
+        formation.update(at_once=False, gateways=b"")
         answer = self.ask(name, srv.OrderFormation, **formation)
         self.assertEqual(sorted(answer.sent + answer.later), sorted(LAYOUT), answer.message)
         over = self.wait_over(answer.id)
         self.assertEqual((over.name, over.arrived), ("back", bytes(LAYOUT)))
+        again = self.ask(name, srv.OrderFormation, **formation)
+        self.assertEqual((again.there, again.sent, again.later), (bytes(LAYOUT), b"", b""))
+        words = "ordered 0 of 3 drones; drones 1..2, 4 are at their places"
+        self.assertEqual(again.message, words)
+        wait_for("its line", WALL_LIMIT_S, lambda: self.log.lines(f"back: {words}"))
+        self.assertEqual(self.log.lines("back: ", Log.WARN), [])
         name = "/DroneManager/orderLayout"
         answer = self.ask(name, srv.OrderLayout, caseID=31, at_once=False)
         name = "/DroneManager/withdrawLayout"
         self.assertTrue(self.ask(name, srv.WithdrawLayout, id=answer.id).success)
         self.assertFalse(self.ask(name, srv.WithdrawLayout, id=answer.id).success)
         self.assertLess(len(self.wait_over(answer.id).arrived), len(LAYOUT))
-        for drone in answer.sent:  # they fly on
-            self.wait_at(drone, *LAYOUT[drone])
+
+    def test_12_places_too_near_to_each_other_are_refused_by_every_kind_of_order(self) -> None:
+        why = "drones 1 and 2 would stand 0.50 m apart: the clearance is 1 m"
+        for name, of, fields in (
+            ("/DroneManager/orderLayout", srv.OrderLayout, {"at_once": False}),
+            ("/DroneManager/orderLayout", srv.OrderLayout, {"at_once": True}),
+            ("/DroneManager/previewLayout", srv.PreviewLayout, {"at_once": True}),
+            ("/DroneManager/SetToCasus", srv.Casus, {}),
+        ):
+            with self.assertRaisesRegex(rospy.ServiceException, why):
+                self.ask(name, of, caseID=34, **fields)
+        client = actionlib.SimpleActionClient("/DroneManager/layout", msg.LayoutAction)
+        self.assertTrue(client.wait_for_server(rospy.Duration(60)), "no action")
+        client.send_goal_and_wait(msg.LayoutGoal(34, True))
+        self.assertEqual(client.get_state(), GoalStatus.ABORTED)
+        self.assertIn(why, client.get_result().message)
 
     def test_13_actions_end_with_the_drones_at_their_places(self) -> None:
         for name, action, goal in (

@@ -171,6 +171,18 @@ class ManagerTest(unittest.TestCase):
             with self.assertRaisesRegex(rospy.ServiceException, why):
                 call("/DroneManager/orderFormation", OrderFormation, name, drones, places, True, [])
 
+    def test_places_of_a_layout_that_are_too_near_to_each_other_are_refused(self) -> None:
+        self.listen()
+        name = "/DroneManager/orderFormation"
+        for away_m, at_once in ((0.0, True), (0.01, True), (0.9, False)):
+            places = [Location(5.0, 5.0, 0), Location(5.0, 5.0 + away_m, 0)]
+            why = f"drones 3 and 4 would stand {away_m:.2f} m apart: the clearance is 1 m"
+            with self.assertRaisesRegex(rospy.ServiceException, why):
+                call(name, OrderFormation, "near", [3, 4], places, at_once, [])
+        places = [Location(5.0, 5.0, 0), Location(5.0, 6.0, 0)]
+        self.assertTrue(call(name, OrderFormation, "apart", [3, 4], places, True, []).sent)
+        self.assertEqual([order.ID for order in self.orders], [4, 3])
+
     def test_what_is_no_order_is_refused_with_a_reason(self) -> None:
         self.listen()
         for arguments, why in (

@@ -130,6 +130,11 @@ class MeshConsoleTest(unittest.TestCase):
             WALL_LIMIT_S,
             lambda: [page.nodes[n]["position"] for n in ("1", "2")] == places,
         )
+        again = page.order(do="formation", name="two", places=[[1, 3, 5, 0], [2, 6, 5, 0]])
+        self.assertTrue(again["done"], again["text"])
+        self.assertEqual(
+            again["text"], "two: ordered 0 of 2 drones; drones 1..2 are at their places"
+        )
         wait_for("all connected after it", WALL_LIMIT_S, page.all_connected)
         self.assertTrue(page.order(do="layout", case=1)["done"])
         wait_for("1 flies", WALL_LIMIT_S, lambda: page.nodes["1"]["path"])

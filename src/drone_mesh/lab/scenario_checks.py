@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from typing import Iterable
 
+from drone_mesh.drone.goal import check_apart
+from drone_mesh.errors import GoalRefused
 from drone_mesh.lab import places
 from drone_mesh.lab.experiment_source import Source
 from drone_mesh.lab.faults import Fault
@@ -15,6 +18,7 @@ from drone_mesh.yaml_file import KeyPath
 def check_scenario(scenario: Scenario, source: Source) -> None:
     """Raise ConfigurationError that points into the file."""
     _check_cases(scenario, source)
+    _check_rings(scenario, source)
     _check_ids(scenario, source)
     _check_begins(scenario, source)
 
@@ -30,9 +34,28 @@ def _check_cases(scenario: Scenario, source: Source) -> None:
     shipped = Layouts.shipped()
     for place, case in cases:
         try:
-            shipped.orders(case)
-        except UnknownCase as error:
+            orders = dict(shipped.orders(case))
+            if place[0] == "faults":
+                check_apart(orders, scenario.repair_options.clearance_m)
+        except (GoalRefused, UnknownCase) as error:
             raise source.error(("base", *place), f"{_dotted(place)}: {error}") from None
+
+
+def _check_rings(scenario: Scenario, source: Source) -> None:
+    ids, gateways = _ids_of(scenario.layout)
+    corners = len(ids) - max(1, len(gateways)) + 1  # the routers, and the first gateway
+    for index, fault in enumerate(scenario.faults):
+        radius_m = None if fault.layouts is None else fault.layouts.ring_m
+        if radius_m is None:
+            continue
+        apart_m = 2 * radius_m * math.sin(math.pi / corners)
+        if apart_m < scenario.repair_options.clearance_m:
+            place: KeyPath = ("faults", index, "layouts", "ring_m")
+            raise source.error(
+                ("base", *place),
+                f"{_dotted(place)}: {corners} drones would stand {apart_m:.2f} m apart: "
+                f"the clearance is {scenario.repair_options.clearance_m:g} m",
+            )
 
 
 def _check_ids(scenario: Scenario, source: Source) -> None:

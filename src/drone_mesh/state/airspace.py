@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-from typing import Mapping, Sequence
+from typing import Sequence
 
 import numpy as np
 
 from drone_mesh.drone.flight_path import FlightPath, Vector
-from drone_mesh.drone.location import Location
+from drone_mesh.drone.goal import ROUNDING_M
 
 APART_M = 1.0  # least distance between two drones on the way
 SWAY_M = 0.5  # our choice: how far physics may move a drone from its path
-ONE_PLACE_M = 0.2  # the size of a drone: places nearer than that are one, and not for two drones
 _TOUCH_M = 1e-3  # rounding of positions
 
 
 class Airspace:
     """Who flies, or is about to, and who rests. Paths count whole, whenever they are flown."""
 
-    def __init__(self, sway_m: float, goals: Mapping[int, Location]) -> None:
-        """`goals` of all drones of the formation, those at rest included."""
+    def __init__(self, sway_m: float, clearance_m: float) -> None:
+        """`clearance_m`: the least distance between two drones at rest."""
         self._apart_m = APART_M + sway_m
-        self._goals = {drone: np.asarray(goal.to_vector()) for drone, goal in goals.items()}
+        self._clearance_m = clearance_m - ROUNDING_M
         self._ways = np.empty((0, 2, 3))  # segments of all flights
         self._ends = np.empty((0, 2, 3))  # where the flight of each segment begins and ends
         self._places = np.empty((256, 3))  # of resting drones, by id
@@ -47,7 +46,7 @@ class Airspace:
         self._ends = np.concatenate([self._ends, ends])
 
     def meets_flight(self, path: FlightPath) -> bool:
-        """Whether this flight comes too near to one in the air.
+        """Whether this flight comes too near to one in the air, or ends too near to its end.
 
         Drones that begin or end near each other may be that near on the way, too.
         """
@@ -56,29 +55,21 @@ class Airspace:
         starts_m, ends_m = (
             _away_m(self._ends[:, end], point) for end, point in enumerate((path.start, path.goal))
         )
-        ends_m = np.where(ends_m < ONE_PLACE_M, APART_M, ends_m)
         allowed_m = np.minimum(self._apart_m, np.minimum(starts_m, ends_m)) - _TOUCH_M
-        return bool((nearest_m(ways_of(path), self._ways) < allowed_m).any())
+        meets = nearest_m(ways_of(path), self._ways) < allowed_m
+        return bool((meets | (ends_m < self._clearance_m)).any())
 
     def in_the_way(self, drone: int, path: FlightPath) -> list[int]:
-        """The resting drones to which this flight would come too near.
-
-        A place of a formation may be near another one of it, and 1 m from any other drone.
-        """
+        """The resting drones to which this flight would come too near, or end too near."""
         self._rests[drone], rested = False, self._rests[drone]
         others = np.flatnonzero(self._rests)
         self._rests[drone] = rested
         places = self._places[others]
-        ends_m = np.maximum(_away_m(places, path.goal), APART_M)
-        for index, other in enumerate(others):
-            goal = self._goals.get(int(other))
-            if goal is not None and np.array_equal(goal.round(2), places[index].round(2)):
-                away_m = _away_m(places[index], path.goal)
-                ends_m[index] = away_m if away_m >= ONE_PLACE_M else APART_M
-        starts_m = _away_m(places, path.start)
+        starts_m, ends_m = (_away_m(places, point) for point in (path.start, path.goal))
         allowed_m = np.minimum(self._apart_m, np.minimum(starts_m, ends_m)) - _TOUCH_M
         near_m = nearest_m(ways_of(path), np.stack([places, places], axis=1))
-        return [int(other) for other in others[near_m < allowed_m]]
+        found = others[(near_m < allowed_m) | (ends_m < self._clearance_m)]
+        return [int(other) for other in found]
 
 
 def _away_m(places: np.ndarray, point: Sequence[float]) -> np.ndarray:

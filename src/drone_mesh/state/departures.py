@@ -13,8 +13,10 @@ from typing import Collection, Iterable, Iterator, Mapping, NamedTuple
 import numpy as np
 
 from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.repair.options import CLEARANCE_M
 from drone_mesh.drone.fleet import ids_in_words
 from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath, PlanFlight
+from drone_mesh.drone.goal import ROUNDING_M
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
 from drone_mesh.state.airspace import APART_M, Airspace
@@ -33,6 +35,7 @@ class FlightRules(NamedTuple):
 
     plan_flight: PlanFlight = FlightPath
     sway_m: float = 0.0  # airspace.SWAY_M for dynamic drones
+    clearance_m: float = CLEARANCE_M  # between drones at rest
 
 
 @dataclass
@@ -65,7 +68,7 @@ class Departures:
         self._range_m = mesh.max_distance
         self._flying_are_members = mesh.routing == MEMBERS_IN_FLIGHT
         self._nodes = {node.id: node for node in mesh.nodes if position_is_known(node)}
-        self._airspace = Airspace(rules.sway_m, goals)
+        self._airspace = Airspace(rules.sway_m, rules.clearance_m)
         self._resting: set[int] = set()
         self._ends: dict[int, Location] = {}  # of all drones that fly or are about to
         for node in self._nodes.values():
@@ -148,9 +151,9 @@ class Departures:
 
     def taken_by(self, drone: int) -> str:
         """Why its goal is not free, and will not be; empty if it may be."""
-        goal = self._goals[drone]
-        others = self._resting - self._to_go - self._at_home - {drone}
-        near = [n for n in sorted(others) if self._is_at(n, goal, APART_M)]
+        goal, within_m = self._goals[drone], self._rules.clearance_m - ROUNDING_M
+        others = self._resting - self._to_go - {drone}
+        near = [n for n in sorted(others) if self._is_at(n, goal, within_m)]
         return _in_the_way(near) if near else ""
 
     def _rank(self, drone: int) -> tuple[bool, int, int, int]:

@@ -1,6 +1,6 @@
 """The state of a mesh at one moment.
 
-NodeStatus and MeshStatus are NodeState.msg and MeshState.msg without ROS, with the same field names.
+NodeStatus and MeshStatus are NodeState.msg and MeshState.msg without ROS: the same field names.
 """
 
 from __future__ import annotations

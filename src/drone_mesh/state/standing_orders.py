@@ -145,6 +145,7 @@ class StandingOrders:
 
     def __init__(self) -> None:
         self._orders: dict[int, _StandingOrder] = {}  # by number, oldest first
+        self._sent: dict[int, tuple[Location, float]] = {}  # latest order of each drone, and when
         self._last_number = 0
 
     def give(
@@ -156,14 +157,18 @@ class StandingOrders:
         together, whatever becomes of the mesh and whomever they meet. The first orders are those of
         the next `update`.
         """
-        self.replace(goals)
+        self._replace(goals)
         number = self._last_number = self._last_number + 1
         parts = {drone: _Part(goal) for drone, goal in goals.items()}
         self._orders[number] = _StandingOrder(number, name, parts, now_s, at_once)
         return number
 
-    def replace(self, drones: Iterable[int]) -> None:
-        """Another order for these drones followed."""
+    def ordered(self, drone: int, to: Location, now_s: float) -> None:
+        """Somebody else ordered this drone to a place."""
+        self._replace([drone])
+        self._sent[drone] = to, now_s
+
+    def _replace(self, drones: Iterable[int]) -> None:
         for order in self._orders.values():
             for drone in drones:
                 if drone in order.parts and order.parts[drone].is_followed:
@@ -231,6 +236,7 @@ class StandingOrders:
                     together[drone].state = PartState.LATER
                 together[drone].send(to, mesh.stamp_s)
                 wanted[drone] = to
+        self._sent.update({drone: (to, mesh.stamp_s) for drone, to in wanted.items()})
         return list(wanted.items())
 
     def _departures(self, mesh: MeshStatus, rules: FlightRules) -> Departures:
@@ -264,25 +270,35 @@ class StandingOrders:
             part.state = PartState.ABSENT
             return False
         flies = bool(len(node.path))
+        has_route = node.connected or node.role == Role.GATEWAY
         if flies or position_is_known(node):
             end = Location.from_vector(node.path[-3:] if flies else node.position)
-            if end.distance_m(_as_ordered(part.goal)) <= AT_PLACE_M:
+            is_there = end.distance_m(_as_ordered(part.goal)) <= AT_PLACE_M
+            if is_there and not flies and self._may_leave(node.id, part.goal, now_s):
+                part.stay(PartState.LATER if has_route else PartState.WAITING)
+                part.sent_to = part.goal if has_route else None  # replaces the order that it has
+                return has_route
+            if is_there:
                 part.stay(PartState.FLYING if flies else PartState.ARRIVED)
                 part.pause_s = FIRST_PAUSE_S
                 part.arrived = part.arrived or not flies
-                part.settled = not flies and (node.connected or node.role == Role.GATEWAY)
+                part.settled = not flies and has_route
                 return False
             is_aside = part.sent_to is not None and end.distance_m(part.sent_to) <= AT_PLACE_M
             if is_aside and not flies:
                 part.sent_to, part.due_s = None, now_s
         if now_s - part.sent_s >= UNDER_WAY_S and not flies:
             part.sent_to = None
-        has_route = node.connected or node.role == Role.GATEWAY
         if part.state is not PartState.REFUSED:
             part.state = PartState.LATER if has_route or flies else PartState.WAITING
         if at_once and part.sent_s == -math.inf:
             return True  # a gateway may find a drone that seems lost
         return now_s >= part.due_s and has_route and (at_once or not flies)
+
+    def _may_leave(self, drone: int, goal: Location, now_s: float) -> bool:
+        """Whether it may still follow an order to another place."""
+        to, sent_s = self._sent.get(drone, (goal, -math.inf))
+        return to.distance_m(goal) > AT_PLACE_M and now_s - sent_s < UNDER_WAY_S
 
     def all_progress(self) -> list[StandingProgress]:
         """How far each has come, oldest first."""

@@ -80,6 +80,13 @@ def test_parts_may_be_shared_by_anchors_and_a_title_may_be_long(tmp_path: Path) 
     assert (revive.number, revive.pick) == (1, "busiest")
 
 
+def test_a_layout_with_places_within_the_clearance_is_refused(tmp_path: Path) -> None:
+    text = GOOD.replace("revive: {number: 1}", "layouts: {cases: [100]}")
+    wide = ["base.repair_options.clearance_m=6"]
+    with pytest.raises(ConfigurationError, match="drones 1 and 2 would stand 5.00 m apart"):
+        load_experiment(write(tmp_path, text), wide)
+
+
 def test_an_argument_overrides_the_file(tmp_path: Path) -> None:
     path = write(tmp_path, GOOD)
     loaded = load_experiment(path, ["seeds=7", "base.range_m=12", "sweep.radio.loss=[0.1]"])
@@ -124,6 +131,12 @@ def test_a_default_that_is_written_out_is_the_same_run(tmp_path: Path) -> None:
         ("revive: {number: 1}", "revive: {ids: [9]}", 10, "no drone 9; the layout has 0..4"),
         ("revive: {number: 1}", "gateway_off: {id: 1}", 10, "drone 1 is no gateway; use kill"),
         ("revive: {number: 1}", "layouts: {cases: [77]}", 10, "unknown case 77"),
+        (
+            "revive: {number: 1}",
+            "layouts: {cases: [101], ring_m: 0.8}",
+            10,
+            "5 drones would stand 0.94 m apart: the clearance is 1 m",
+        ),
         ("kind: grid, drones: 5", "kind: casus, case: 99", 4, "layout.case: unknown case 99"),
         ("revive: {number: 1}", "cut_link: {between: [3, 3]}", 10, "a link is between two drones"),
         ("revive: {number: 1}", "cut_link: {between: [1, 2], number: 2}", 10, "give either"),

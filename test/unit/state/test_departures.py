@@ -82,6 +82,20 @@ def test_two_formations_with_one_place_do_not_stack_their_drones():
     assert choose(there, goals).blocked == {1: "drone 2 is in the way"}
 
 
+@pytest.mark.parametrize("clearance_m", [0.5, 1.0, 3.0])
+def test_two_formations_keep_the_clearance_between_their_drones(clearance_m):
+    rules = FlightRules(clearance_m=clearance_m)
+    for away_m, blocked in ((0.9 * clearance_m, True), (clearance_m, False)):
+        places = {1: at(5, 5), 2: at(-3, 0), 3: at(0, 3), 4: at(0, 6), 5: at(0, 9)}
+        goals = {1: at(5, 5), 2: at(5, 5 - away_m)}
+        assert bool(Departures(mesh(places), goals, {}, rules).taken_by(2)) is blocked
+        assert (2 not in choose(mesh(places), goals, rules=rules).set_out) is blocked
+        flying = mesh({**places, 1: at(9, 5)})
+        flying.nodes[1].path = (9.0, 5.0, 0.0, 5.0, 5.0, 0.0)
+        if blocked:
+            assert 2 not in choose(flying, goals, rules=rules).set_out
+
+
 def test_drones_that_change_places_let_each_other_pass():
     places = {1: at(3, 0), 2: at(6, 0)}
     found = preview(mesh(places), {1: places[2], 2: places[1]})

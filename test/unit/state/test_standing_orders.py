@@ -68,6 +68,28 @@ def test_a_drone_that_flies_elsewhere_is_ordered_when_it_has_landed():
     assert orders.update(state(7.0, drone(4, at=NORTH))) == [(4, EAST)]
 
 
+def test_a_drone_that_may_still_set_out_elsewhere_is_ordered_to_the_place_where_it_stands():
+    orders = StandingOrders()
+    there = state(0.0, drone(4))
+    first = orders.give("layout 7", {4: EAST}, now_s=0.0)
+    assert orders.update(there) == [(4, EAST)]
+    orders.withdraw(first)
+    orders.give("layout 8", {4: HOME}, now_s=0.0)
+    assert orders.update(there) == [(4, HOME)]
+    assert orders.update(state(1.0, drone(4))) == []
+    assert orders.all_progress()[-1].is_over
+
+
+def test_a_drone_that_another_order_sent_elsewhere_is_ordered_back_to_where_it_stands():
+    orders = StandingOrders()
+    orders.ordered(4, EAST, now_s=0.0)
+    orders.give("layout 8", {4: HOME}, now_s=1.0)
+    assert orders.update(state(1.0, drone(4))) == [(4, HOME)]
+    orders.ordered(5, EAST, now_s=0.0)
+    orders.give("layout 9", {5: HOME}, now_s=40.0)
+    assert orders.update(state(40.0, drone(5))) == []
+
+
 def test_at_once_a_drone_is_ordered_on_the_way_elsewhere_and_without_a_route():
     orders = StandingOrders()
     orders.give("layout 7", {3: EAST, 4: EAST, 5: NORTH}, now_s=0.0, at_once=True)

@@ -12,10 +12,9 @@ from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.order_record import OrderRecord, OrderState
 from drone_mesh.communication.parts import NodeParts
 from drone_mesh.communication.reports.node_reports import ReportedNode
+from drone_mesh.drone.goal import ROUNDING_M
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import PlaceTaken
-
-ROUNDING_M = 0.01  # our choice: places travel as float32 and in steps
 
 
 class _Place(NamedTuple):

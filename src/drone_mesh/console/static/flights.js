@@ -106,6 +106,7 @@ export class Flights extends EventTarget {
       } catch (error) {
         failed.push(`${id}: ${error.message}`);
       }
+      leaving.delete(id); // from now on the gateway knows where it will stand
     }
     if (moves.length > 1)
       text = `ordered ${moves.length - failed.length} of ${moves.length} drones`;

@@ -12,7 +12,7 @@ import rospy
 from drone_mesh import srv
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.drone.fleet import ids_in_words
-from drone_mesh.drone.goal import check_goal
+from drone_mesh.drone.goal import check_apart, check_goal
 from drone_mesh.errors import GoalRefused
 from drone_mesh.layouts import MAX_NAME, Layouts, Order, UnknownCase
 from drone_mesh.msg import FlightOrderAnswer, RequestGatewayDroneFlight
@@ -28,7 +28,7 @@ from drone_mesh.ros.graph.present_drones import PresentDrones
 from drone_mesh.ros.graph.waiting import comes_true
 from drone_mesh.ros.services.order_answers import OrderAnswers, Outcomes
 from drone_mesh.ros.services.order_summary import OrderSummary
-from drone_mesh.ros.services.standing_layouts import Given, StandingLayouts
+from drone_mesh.ros.services.standing_layouts import Given, StandingLayouts, flight_rules
 from drone_mesh.state.standing_orders import PartState
 
 WAIT_FOR_GATEWAY_S = 3.0  # of wall time (docs/ros.md, "Drone manager")
@@ -110,7 +110,7 @@ class DroneManager:
         for answer in outcomes.refused.values():
             raise rospy.ServiceException(answer.reason)
         if not outcomes.no_route:
-            self._standing.replace(drone)
+            self._standing.ordered(order)
             return ""
         _log.warning("drone %d: no gateway has a route to it", drone)
         return f"no gateway has a route to drone {drone}"
@@ -131,7 +131,9 @@ class DroneManager:
         )
 
     def _preview_layout(self, request: srv.PreviewLayoutRequest) -> srv.PreviewLayoutResponse:
-        known, missing = _in_fleet(self._orders_of(request.caseID), drones_if_known())
+        orders = self._orders_of(request.caseID)
+        _check_apart(orders)
+        known, missing = _in_fleet(orders, drones_if_known())
         found = self._standing.preview(known, request.at_once)
         if found is None:
             raise rospy.ServiceException("the state of the mesh is not known")
@@ -165,7 +167,8 @@ class DroneManager:
         at_once: bool,
         handle: actionlib.ServerGoalHandle | None = None,
     ) -> srv.OrderLayoutResponse:
-        """Make a standing order of these."""
+        """Make a standing order of these. Raises ServiceException for places that are too near."""
+        _check_apart(orders)
         fleet = drones_if_known()
         known, missing = _in_fleet(orders, fleet)
         if not self._gateway_is_there():
@@ -175,13 +178,14 @@ class DroneManager:
             summary = self._order_first(given, fleet, missing)
         else:
             summary = self._order_all(known, fleet, missing)
-        complete = len(summary.sent) + len(summary.later) == len(known) + len(missing)
         words = summary.in_words()
-        _log.log(logging.INFO if complete else logging.WARNING, "%s: %s", name, words)
+        level = logging.INFO if summary.is_complete else logging.WARNING
+        _log.log(level, "%s: %s", name, words)
         return srv.OrderLayoutResponse(
             given.progress.number,
             summary.sent,
             summary.later,
+            [*summary.there, *summary.flying],
             summary.no_route,
             summary.not_in_fleet,
             words,
@@ -196,9 +200,12 @@ class DroneManager:
         ordered = {order.node_id for order in first}
         outcomes = self._order(first, fleet, allow_shared_place=True)
         reasons.update({drone: answer.reason for drone, answer in outcomes.refused.items()})
-        no_route = [drone for drone in drones[PartState.WAITING] if drone not in ordered]
-        later = [drone for drone in drones[PartState.LATER] if drone not in ordered]
-        return OrderSummary(outcomes.sent, outcomes.no_route + no_route, missing, reasons, later)
+        no_route, later, there, flying = (
+            [drone for drone in drones[state] if drone not in ordered]
+            for state in (PartState.WAITING, PartState.LATER, PartState.ARRIVED, PartState.FLYING)
+        )
+        no_route = outcomes.no_route + no_route
+        return OrderSummary(outcomes.sent, no_route, missing, reasons, later, there, flying)
 
     def _orders_of(self, case: int) -> list[Order]:
         try:
@@ -305,6 +312,13 @@ def _check(order: Order) -> None:
         raise rospy.ServiceException(f"invalid drone id {order.node_id}: must be 0..{MAX_NODE_ID}")
     try:
         check_goal(*order.goal)
+    except GoalRefused as error:
+        raise rospy.ServiceException(str(error)) from None
+
+
+def _check_apart(orders: Sequence[Order]) -> None:
+    try:
+        check_apart(dict(orders), flight_rules().clearance_m)
     except GoalRefused as error:
         raise rospy.ServiceException(str(error)) from None
 

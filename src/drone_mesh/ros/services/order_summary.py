@@ -17,12 +17,25 @@ class OrderSummary:
     not_in_fleet: Sequence[int]
     refused: Mapping[int, str] = field(default_factory=dict)  # by drone: the reason
     later: Sequence[int] = ()
+    there: Sequence[int] = ()
+    flying: Sequence[int] = ()  # to their places, since before the order
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether nobody is left without the order."""
+        return not (self.no_route or self.not_in_fleet or self.refused)
 
     def in_words(self) -> str:
         """One line, for example: ordered 16 of 17 drones; drone 17 is not in this fleet."""
-        others = (self.no_route, self.not_in_fleet, self.refused, self.later)
+        others = self.no_route, self.not_in_fleet, self.refused, self.later, self.there, self.flying
         total = len(self.sent) + sum(map(len, others))
         parts = [f"ordered {len(self.sent)} of {_counted(total, 'drone')}"]
+        if self.there:
+            verb, noun = ("is", "its place") if len(self.there) == 1 else ("are", "their places")
+            parts.append(f"{_named(self.there)} {verb} at {noun}")
+        if self.flying:
+            verb = "flies" if len(self.flying) == 1 else "fly"
+            parts.append(f"{_named(self.flying)} {verb} there already")
         if self.later:
             parts.append(f"{_named(self.later)} will set out later")
         if self.no_route:

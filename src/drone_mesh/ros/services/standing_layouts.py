@@ -126,7 +126,7 @@ class StandingLayouts:
         Without a state of the mesh, as beside the world of another program, that is all of them.
         `handle` is the accepted goal of the action, if it was ordered by one.
         """
-        rules = _flight_rules()
+        rules = flight_rules()
         with self._lock:
             number = self._orders.give(name, dict(orders), rospy.get_time(), at_once)
             if handle is not None:
@@ -147,12 +147,12 @@ class StandingLayouts:
             return None
         with self._lock:
             standing = self._orders.goals(mesh)
-        return preview(mesh, dict(orders), _flight_rules(), at_once, standing)
+        return preview(mesh, dict(orders), flight_rules(), at_once, standing)
 
-    def replace(self, drone: int) -> None:
-        """This drone is ordered elsewhere."""
+    def ordered(self, order: Order) -> None:
+        """Somebody ordered one drone to a place."""
         with self._lock:
-            self._orders.replace([drone])
+            self._orders.ordered(*order, rospy.get_time())
         self._show()
 
     def withdraw(self, number: int) -> str | None:
@@ -181,7 +181,7 @@ class StandingLayouts:
             return
         with self._lock:
             is_idle = not self._orders.all_progress()
-        rules = FlightRules() if is_idle else _flight_rules()
+        rules = FlightRules() if is_idle else flight_rules()
         with self._lock:
             self._mesh = mesh
             wanted = self._orders.update(mesh, rules)
@@ -292,7 +292,7 @@ def _tell(handle: actionlib.ServerGoalHandle, progress: StandingProgress) -> Non
         handle.set_aborted(result, words)
 
 
-def _flight_rules() -> FlightRules:
+def flight_rules() -> FlightRules:
     """The rules of the present factory; those of kinematic drones if there is none."""
     try:
         fleet = get_fleet_parameter()
@@ -302,4 +302,4 @@ def _flight_rules() -> FlightRules:
     plan: PlanFlight = functools.partial(FlightPath, ceiling_m=fleet.cruise_height)
     if obstacles is not None:
         plan = obstacles.plan_flight
-    return FlightRules(plan, SWAY_M if fleet.flight == "dynamic" else 0.0)
+    return FlightRules(plan, SWAY_M if fleet.flight == "dynamic" else 0.0, fleet.clearance)

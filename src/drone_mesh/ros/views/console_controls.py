@@ -129,7 +129,7 @@ _DONE = {"pause": "paused", "resume": "resumed", "stop": "ended"}
 
 
 def _outcome(name: str, answer: srv.OrderLayoutResponse | srv.OrderFormationResponse) -> str:
-    if not (answer.sent or answer.later or answer.no_route):  # the manager keeps those
+    if not (answer.sent or answer.later or answer.there or answer.no_route):  # all are refused
         raise OrderRefused(f"{name}: {answer.message}")
     return f"{name}: {answer.message}"
 
