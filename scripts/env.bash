@@ -11,6 +11,13 @@ if [ -e "$drone_mesh_root/build/devel/setup.bash" ]; then
     *":$drone_mesh_root/.venv/bin:"*) ;;
     *) PATH="$drone_mesh_root/.venv/bin:$PATH" ;;
   esac
+  case "$drone_mesh_root" in
+    *[[:space:]]*) # see scripts/prepare.bash
+      drone_mesh_packages=("$drone_mesh_root"/.venv/lib/python3*/site-packages)
+      export PYTHONPATH="${drone_mesh_packages[0]}${PYTHONPATH:+:$PYTHONPATH}"
+      unset drone_mesh_packages
+      ;;
+  esac
   export PYTHONUNBUFFERED=1  # log lines appear at once, also in a pipe
   # ROS gives the name of this machine to other nodes, which must be able to resolve it.
   if [ -z "$ROS_HOSTNAME$ROS_IP" ] && ! getent hosts "$(uname -n)" >/dev/null; then

@@ -127,13 +127,16 @@ build_step() {
 build() {
   # shellcheck disable=SC1090
   [ -e "$noetic" ] && . "$noetic"
-  if ! grep -qsx "PYTHON_EXECUTABLE:[A-Z]*=$venv/bin/python" "$root/build/CMakeCache.txt"; then
+  if ! grep -qsxF "CMAKE_HOME_DIRECTORY:INTERNAL=$root" "$root/build/CMakeCache.txt"; then
     # Nothing is built, or the checkout has been moved: CMake stores absolute paths.
     find "$root/build" -mindepth 1 -maxdepth 1 ! -name .lock -exec rm -rf {} +
   fi
+  # catkin writes this into the first lines of scripts, which cannot name a path with a space.
+  local python="$venv/bin/python"
+  [[ $python != *[[:space:]]* ]] || python=/usr/bin/python3 # finds .venv with scripts/env.bash
   [ -e "$root/build/Makefile" ] ||
     build_step configuring cmake -S "$root" -B "$root/build" \
-      -DPYTHON_EXECUTABLE="$venv/bin/python" -DCMAKE_INSTALL_PREFIX="$root/build/install"
+      -DPYTHON_EXECUTABLE="$python" -DCMAKE_INSTALL_PREFIX="$root/build/install"
   build_step building cmake --build "$root/build" -j "$(nproc)"
 }
 
