@@ -10,6 +10,7 @@ from drone_mesh.communication.data.packets import Head
 from drone_mesh.communication.data.ticket import Ticket
 
 MOST_OPEN = 12  # messages on their way at once; at most MOST_BEHIND + 1
+MOST_ORDERS = 1 << 15  # messages of a port in one session: a receiver may have missed all but one
 NUMBER_SPAN = packets.DONE_BITS  # from the oldest to the newest open message
 
 Seal = Callable[[bytes, bytes], bytes]
@@ -23,7 +24,7 @@ class Fragmentation:
         self, session: int, room: int, seal: Seal, open_messages: Mapping[int, OutgoingMessage]
     ) -> None:
         """`open_messages`: those under way by number, oldest first; the outbox keeps them."""
-        self._session = session
+        self.session = session
         self._room = room
         self._seal = seal
         self._open = open_messages
@@ -37,6 +38,8 @@ class Fragmentation:
         if self._open and (self._number - next(iter(self._open))) & 0xFF >= NUMBER_SPAN:
             return False
         order = self._orders.get((ticket.port, ticket.reliable), 0)
+        if order >= MOST_ORDERS:
+            return not self._open  # then a new session begins
         return self._behind(ticket, order) <= packets.MOST_BEHIND
 
     def begin(self, message: OutgoingMessage) -> Head:
@@ -44,19 +47,22 @@ class Fragmentation:
         ticket = message.ticket
         key = (ticket.port, ticket.reliable)
         order = self._orders.get(key, 0)
-        place = packets.place_of(self._session, ticket.port, order)
+        if order >= MOST_ORDERS:
+            self.session, order = (self.session + 1) & 0xFFFF, 0
+            self._orders.clear()
+        place = packets.place_of(self.session, ticket.port, order)
         message.sealed = self._seal(place, message.payload)
         head = message.head = Head(
             self._number,
-            self._session,
+            self.session,
             ticket.port,
             len(message.sealed),
             ticket.reliable,
             0,
             order,
-            packets.checksum(self._session, ticket.port, order, message.sealed),
+            packets.checksum(self.session, ticket.port, order, message.sealed),
         )
-        self._orders[key] = (order + 1) & 0xFFFF
+        self._orders[key] = order + 1
         self._number = (self._number + 1) & 0xFF
         message.to_send.extend(range(packets.count_of(len(message.sealed), self._room)))
         return head
@@ -76,6 +82,5 @@ class Fragmentation:
         for message in self._open.values():
             head = message.head
             if ticket.reliable and head is not None and head.reliable and head.port == ticket.port:
-                distance = (order - head.order) & 0xFFFF
-                behind = max(behind, distance if distance < 1 << 15 else 0)
+                behind = max(behind, order - head.order)
         return behind

@@ -42,7 +42,6 @@ class Outbox:
         `hint` returns a possible reason why messages do not arrive.
         """
         self.to = to
-        self._session = session
         self._ended = ended
         self._hint = hint
         self._waiting: deque[OutgoingMessage] = deque()
@@ -164,7 +163,7 @@ class Outbox:
 
     def answered(self, ack: Ack, now_s: float) -> None:
         """Process an ACK of the receiver."""
-        if ack.session != self._session:
+        if ack.session != self._fragmentation.session:
             return
         self._misses = 0
         complete = {
@@ -309,16 +308,12 @@ class Outbox:
         if not train.is_open:
             return None
         assert self._latest is not None
-        assert self._latest.head is not None
-        poll = Poll(self._session, NO_ANSWER, self._latest.head.number, self._latest.head.checksum)
-        return DataPacket(packets.POLL, packets.poll_body(poll), self._latest, ends_train=True)
+        return _poll(self._latest, NO_ANSWER)._replace(ends_train=True)
 
     def _asking(self, message: OutgoingMessage) -> DataPacket:
-        assert message.head is not None
         self._nonce = self._nonce % 0xFF + 1
         message.nonce = self._nonce
-        poll = Poll(self._session, self._nonce, message.head.number, message.head.checksum)
-        return DataPacket(packets.POLL, packets.poll_body(poll), message)
+        return _poll(message, self._nonce)
 
     def _partly(self, message: OutgoingMessage, ack: Ack, now_s: float) -> None:
         if ack.nonce != message.nonce:
@@ -365,3 +360,10 @@ class Outbox:
 
     def _timeout_s(self, message: OutgoingMessage) -> float:
         return self._round_trip.timeout_s(max(0, message.asks - 1))
+
+
+def _poll(message: OutgoingMessage, nonce: int) -> DataPacket:
+    head = message.head
+    assert head is not None
+    poll = Poll(head.session, nonce, head.number, head.checksum)
+    return DataPacket(packets.POLL, packets.poll_body(poll), message)
