@@ -1,7 +1,12 @@
-"""Probes: messages up, messages down and echoes, each from a drone that had a path at the time."""
+"""Probes: messages and echoes between two nodes that had a path to each other at the time.
+
+Up, down and echo are between a gateway and a random router; those of kind "any" between two random
+nodes.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import random
 from dataclasses import dataclass
 
@@ -12,7 +17,7 @@ from drone_mesh.inprocess import Network
 from drone_mesh.lab.network_sample import gateways_of, physical_graph
 from drone_mesh.lab.scenario import Probes
 
-KINDS = ("up", "down", "echo")
+KINDS = ("up", "down", "echo", "any")
 PORT = 77  # our choice: of these messages
 
 
@@ -21,7 +26,7 @@ class ProbeFate:
     """One message or echo, and its fate."""
 
     kind: str  # one of KINDS
-    node: int
+    node: int  # the router; of kind "any" the receiver
     sent_s: float
     shortest: int  # hops of the shortest path over existing links
     delay_s: float | None = None  # until it arrived, or until the answer; None: not in time
@@ -36,10 +41,13 @@ class ProbeSender:
         self._network, self._probes = network, probes
         last_s = end_s - probes.within_s
         count = int(probes.per_s * max(0.0, last_s - probes.from_s))
-        for kind in KINDS:
+        for kind in KINDS[:-1] if probes.between == "gateway" else KINDS[-1:]:
             for _ in range(count):
                 at_s, draw = rng.uniform(probes.from_s, last_s), rng.random()
-                network.clock.call_at(at_s, self._send, (kind, draw))
+                if kind == "any":
+                    network.clock.call_at(at_s, self._send_between_any, (draw, rng.random()))
+                else:
+                    network.clock.call_at(at_s, self._send, (kind, draw))
 
     def results(self) -> list[ProbeFate]:
         """The probes with the fates of the messages; to be called once, at the end."""
@@ -83,6 +91,21 @@ class ProbeSender:
                 network.echo(gateway, node, lambda answer: self._answered(probe, answer))
         except MeshError:
             pass  # its queue is full, for example: the probe is lost
+
+    def _send_between_any(self, draws: tuple[float, float]) -> None:
+        network = self._network
+        graph = physical_graph(network)
+        nodes = sorted(graph.near)
+        sender = nodes[int(draws[0] * len(nodes))]
+        hops = graph.hops_from([sender])
+        receivers = [node for node in sorted(hops) if node != sender]
+        if not receivers:
+            return
+        node = receivers[int(draws[1] * len(receivers))]
+        number = len(self.sent)
+        self.sent.append(ProbeFate("any", node, network.clock.now_s, hops[node]))
+        with contextlib.suppress(MeshError):  # as above
+            network.send(sender, node, number.to_bytes(4, "big"), PORT, reliable=False)
 
     def _nearest(self, gateways: list[int], node: int, hops: int) -> int:
         if len(gateways) == 1:

@@ -168,9 +168,10 @@ class MotionSettings(PartOfKind):
 
 
 class Probes(Part):
-    """Messages and echoes that measure the delivery, each between a gateway and a random drone."""
+    """Messages and echoes that measure the delivery, between a gateway or any node and another."""
 
-    per_s: AtLeast0 = 0.0  # of each: message up, message down, echo; at random times
+    between: Literal["gateway", "any"] = "gateway"  # and a random router; or two random nodes
+    per_s: AtLeast0 = 0.0  # at random times; with a gateway so many of each kind: up, down, echo
     from_s: AtLeast0 = 20.0
     within_s: Above0 = 2.0  # later ones count as lost
 

@@ -90,6 +90,16 @@ def test_a_mesh_at_rest_delivers_every_probe_and_its_links_live() -> None:
     assert values["detours"] >= 0.0
 
 
+def test_probes_between_any_two_nodes_arrive_at_rest_and_others_are_not_sent() -> None:
+    record = run(mobility={"kind": "none"}, probes={"between": "any", "per_s": 2, "from_s": 20})
+    values = measure_all(record)
+    assert values["pdr_any"] == 1.0
+    assert 0.0 < values["delay_ms"] < 100.0
+    assert math.isnan(values["pdr_up"])
+    assert {probe.kind for probe in record.probes} == {"any"}
+    assert len({probe.node for probe in record.probes}) > 6
+
+
 def test_probes_of_cut_off_drones_do_not_count() -> None:
     """Drones 2 to 4 lose their only relay; the others still get every message."""
     layout = {"kind": "line", "drones": 5, "spacing_m": 6}

@@ -77,6 +77,7 @@ def unconnected(run: RunRecord) -> list[float]:
     pdr_up="best-effort messages to the gateway that arrived in time, of drones with a path",
     pdr_down="the same from the gateway",
     pdr_echo="echoes of a gateway that a drone with a path answered in time",
+    pdr_any="the same as messages from any node to any other with a path (`between: any`)",
 )
 def delivered(run: RunRecord) -> list[float]:
     return [
@@ -88,7 +89,7 @@ def delivered(run: RunRecord) -> list[float]:
 @metrics(
     "ms",
     better="less",
-    delay_ms="median time of these messages that arrived, up and down",
+    delay_ms="median time of these messages that arrived, up and down, or between any nodes",
     delay_p95_ms="the time within which 95 % of them arrived",
 )
 def delays(run: RunRecord) -> tuple[float, float]:
