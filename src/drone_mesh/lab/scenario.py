@@ -224,7 +224,9 @@ class Sequence(Part):
         "cut_vertex_killed", "many_killed", "gateway_off", "gateway_moved",
         "killed_in_negotiation", "killed_in_flight",
     )  # fmt: skip
-    INCIDENTS: ClassVar[Tuple[str, ...]] = (*DEATHS, "silent_for_a_while", "links_cut")
+    INCIDENTS: ClassVar[Tuple[str, ...]] = (
+        *DEATHS, "silent_for_a_while", "links_cut", "restarted_cut_off",
+    )  # fmt: skip
 
     drones: Annotated[List[NodeId], Field(min_length=2, max_length=2)] = [8, 60]  # least, most
     density: Annotated[List[Above0], Field(min_length=2, max_length=2)] = [7.0, 9.0]

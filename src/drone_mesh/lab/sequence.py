@@ -158,6 +158,15 @@ class SequenceRun(Simulation):
                 air.cut(one, other)
         return iter(())
 
+    def _restarted_cut_off(self) -> Times:
+        """A cut vertex dies; one to three routers restart soon after it, and know no place."""
+        yield from self._cut_vertex_killed()
+        yield from self._passing(self._rng.uniform(1.0, 60.0))
+        alive = self._alive()
+        for node in self._rng.sample(alive, min(self._rng.randint(1, 3), len(alive))):
+            self.timeline.note("restart", [node])
+            self.network.restart(node)
+
     def _killed_at(self, kind: MeshEventKind, after_s: float) -> Times:
         """Kill the first router with an event of this kind, shortly after it."""
         network = self.network

@@ -81,7 +81,7 @@ def test_drones_that_know_where_the_gateway_moved_are_not_left_behind(number):
 
 def test_the_same_seed_gives_the_same_run_in_an_experiment():
     loaded = load_experiment(SUITE, ["seeds=1", "base.sequence.drones=[8, 12]"])
-    dense, _, sparse, _ = Plan(loaded)
+    dense, _, _, sparse, _, _ = Plan(loaded)
     outcome = execute(dense.spec)
     assert (outcome.failure, outcome.values["harm"]) == ("", 0.0)
     assert execute(dense.spec).event_hash == outcome.event_hash

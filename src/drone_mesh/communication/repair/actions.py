@@ -193,7 +193,7 @@ class RepairActions(abc.ABC):
     ) -> None:
         """Send a bid to all neighbours; `node` is its creator if it is relayed.
 
-        `about`: the gateway's place, if the bid announces that a drone flies or flew there.
+        `about`: the goal of a flight that the bid announces, or the gateway's place where it failed.
         """
         me = self.node_id
         creator = me if node is None else node

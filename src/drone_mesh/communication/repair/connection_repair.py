@@ -130,6 +130,9 @@ class ConnectionRepair(RepairActions):
         """A node of the group bids; `from_` sent or relayed that bid (see IRepairStrategy)."""
         if score in (TOOK_OFF, TOOK_OFF_HOME):
             self._parts.neighbours.motion.flies_for_repair(node, self.now_s)
+            if about is not None:
+                self._parts.neighbours.set_place(node, about, self.now_s)
+                self.on_taken(about)
         self._strategy.on_bid(node, score, from_, about)
 
     def on_due(self) -> bool:

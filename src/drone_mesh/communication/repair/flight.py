@@ -53,6 +53,7 @@ class RepairFlight:
         self._leg_m = LEG * options.range_m
         self._diversions = 0
         self._leg_from: Location | None = None
+        self._leg_end = goal
 
     @property
     def on_ground(self) -> bool:
@@ -95,10 +96,15 @@ class RepairFlight:
 
     def on_taken(self, place: Location) -> None:
         """Another drone is at `place`, or may be there in silence; keep clear of it."""
-        near = above_ground(place).distance_m(self.goal) < self._clearance_m
-        if near and not self._taken.is_free(self.goal):
+        if self._is_taken_by(place, self.goal):
             self._diversions += 1
             self._go_to(self._spot())
+        elif not self.on_ground and self._is_taken_by(place, self._leg_end):
+            self.fly_on()
+
+    def _is_taken_by(self, place: Location, spot: Location) -> bool:
+        near = above_ground(place).distance_m(spot) < self._clearance_m
+        return near and not self._taken.is_free(spot)
 
     def arrived(self) -> bool:
         """It is on the ground: ask for places. Returns False after one leg of several."""
@@ -130,17 +136,22 @@ class RepairFlight:
         """Take off, or continue towards the goal.
 
         A flight that may end where the drone is connected consists of legs. The drone climbs by
-        half the length of a leg; from higher up it would hear no node on the ground. No leg ends
-        within LANDED_WITHIN_M of the goal, because the drone would rest there although only the
-        goal is clear of the others.
+        half the length of a leg; from higher up it would hear no node on the ground. Each leg ends
+        clear of others, like the flight, and none just before the goal. The others are told where
+        it ends at once: this drone may fall silent within a second.
         """
         here = self._parts.pilot.location()
-        self._leg_from = here
-        goal = self.goal
+        self._leg_from, self._leg_end = here, above_ground(self.goal)
         longest_m = self._leg_m + LANDED_WITHIN_M
-        if self.stops_when_connected and here is not None and here.distance_m(goal) > longest_m:
-            goal = here.towards(goal, self._leg_m)
-        self._parts.pilot.step_back_to(above_ground(goal))
+        if (
+            self.stops_when_connected
+            and here is not None
+            and here.distance_m(self.goal) > longest_m
+        ):
+            end = at_whole_metres(here.towards(self.goal, self._leg_m))
+            self._leg_end = self._taken.at_or_beside(end, Landing(self.goal))
+        self._parts.pilot.step_back_to(self._leg_end)
+        ask_all_for_places(self._parts)
 
     def _leg_is_short(self, here: Location | None) -> bool:
         """Whether this was not the last leg, and the drone makes progress."""

@@ -169,7 +169,8 @@ class GroupRepair(LoneRepair):
 
     def _is_tried(self, place: Location) -> bool:
         """Whether another drone has been so close that a gateway would have answered it."""
-        return self._news.is_tried(place, self.mesh.now_s, self.mesh.range_m / 2)
+        near_m = max(self.mesh.range_m / 2, 2 * PITCH * self.mesh.clearance_m)
+        return self._news.is_tried(place, self.mesh.now_s, near_m)
 
     def _occupant(self, step: Step) -> int:
         """A reachable node at the goal of `step`, or the owner of that place; else NO_ROUTE."""
@@ -278,10 +279,7 @@ class GroupRepair(LoneRepair):
             step, self.reason = self._next_step(alone=False)
             self._end_round()
             if step is not None:
-                if step.home:
-                    mesh.bid(TOOK_OFF_HOME, about=step.place)
-                else:
-                    mesh.bid(TOOK_OFF)
+                mesh.bid(TOOK_OFF_HOME if step.home else TOOK_OFF, about=mesh.goal_of(step))
                 self._fly(step)
 
     def _on_take_off_of(self, node: int, code: float, from_: int, about: Location | None) -> None:

@@ -71,7 +71,7 @@ class IRepairStrategy(abc.ABC):
     def on_bid(self, node: int, score: float, from_: int, about: Location | None) -> None:
         """`node` bids; the neighbour `from_` sent or relayed that bid.
 
-        `about`: the gateway's place to which that node flies or flew.
+        `about`: the goal of its flight, or the gateway's place to which it flew in vain.
         """
 
     def on_time(self) -> None:

@@ -7,7 +7,8 @@ import math
 
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.repair.options import CLEARANCE_M
-from drone_mesh.lab.metrics.registry import metric
+from drone_mesh.lab.approaches import approaches
+from drone_mesh.lab.metrics.registry import NAN, metric, metrics
 from drone_mesh.lab.record import RunRecord
 
 ROUNDING_M = 1e-6
@@ -16,23 +17,47 @@ PROMPT_S = 120.0  # our choice: a node that is cut off should be connected again
 
 @metric(
     "0/1",
-    "any of resting_close, flew_connected, flew_grounded, left_able and endless_packets is above 0",
+    "any of resting_close, flew_close, flew_connected, flew_grounded, left_able, left_placeless "
+    "and endless_packets is above 0",
     better="less", is_share=True,
 )  # fmt: skip
 def harm(run: RunRecord) -> float:
-    kinds = (resting_close, flew_connected, flew_grounded, left_able, endless_packets)
-    return any(count(run) for count in kinds)
+    kinds = (
+        resting_close,
+        flew_connected,
+        flew_grounded,
+        left_able,
+        left_placeless,
+        endless_packets,
+    )
+    return close_ones(run)[0] > 0 or any(count(run) > 0 for count in kinds)
 
 
 @metric(
-    "", "pairs of live drones at rest nearer than the clearance, 1 m, at the end", better="less"
-)
+    "", "pairs of drones at rest, on or off, nearer than the clearance, 1 m, at the end",
+    better="less",
+)  # fmt: skip
 def resting_close(run: RunRecord) -> float:
-    at_rest = sorted(run.end.graph.near.keys() - run.in_the_air)
+    at_rest = sorted(run.end.places.keys() - run.in_the_air)
     return sum(
         math.dist(run.end.places[one], run.end.places[other]) < CLEARANCE_M - ROUNDING_M
         for one, other in itertools.combinations(at_rest, 2)
     )
+
+
+@metrics(
+    "",
+    better="less",
+    flew_close="drones at rest, on or off, to which another one came nearer than the clearance, "
+    "1 m, on a flight for a repair or where a part of it ended; empty: pilots fly drones",
+    passed_close="pairs of drones in flight, one for a repair, that came nearer than 1 m",
+)
+def close_ones(run: RunRecord) -> tuple[float, float]:
+    if run.scenario.mobility.kind != "none":
+        return NAN, NAN
+    found = approaches(run, CLEARANCE_M - ROUNDING_M)
+    passed = sum(approach.in_the_air for approach in found)
+    return len(found) - passed, passed
 
 
 @metric("", "repair flights of drones that were connected", better="less")
@@ -74,12 +99,19 @@ def left_able(run: RunRecord) -> float:
     return len(run.left_behind.keys() & run.able)
 
 
-@metric("drones", "of left_behind: those that were connected, and know no place", better="less")
+@metric(
+    "drones", "of left_behind: those that know no place, although they, or others that they reach, "
+    "were connected since they started", better="less",
+)  # fmt: skip
 def left_placeless(run: RunRecord) -> float:
-    connected = set(_nodes_with(run, MeshEventKind.CONNECTED))
-    return sum(
-        node in connected and "knows no place" in why for node, why in run.left_behind.items()
-    )
+    informed: set[int] = set()
+    for event in run.events:
+        if event.kind == MeshEventKind.CONNECTED.value:
+            informed.add(event.node)
+        elif event.kind == MeshEventKind.STARTED.value:
+            informed.discard(event.node)  # a restarted node has forgotten
+    told = run.end.graph.hops_from(informed)
+    return sum(node in told and "knows no place" in why for node, why in run.left_behind.items())
 
 
 @metric("", "packets that were dropped at the limit of hops", better="less")

@@ -1086,13 +1086,30 @@ def test_a_better_bid_is_passed_on_to_the_other_neighbours_and_a_worse_one_is_no
     assert rig.sent(BID) == []
 
 
-def test_the_winner_announces_its_flight():
+def test_the_winner_announces_its_flight_with_its_goal_and_asks_at_once_who_is_there():
+    """It may be dead a second later, and then hang there."""
     rig = group_rig(3)
     rig.wait_until(BIDS_S)
     rig.forget()
     rig.hear(bid(3, 1.0))
     rig.wait(TO_DECISION_S)
-    assert rig.sent(BID) == [own_bid(3, TOOK_OFF)]
+    goal = "00 00 00 41 cd cc 8c bf"  # BESIDE_NEIGHBOUR
+    assert rig.sent(BID) == [packet(f"01 01 07 03 03 28 6b ee 4e 01 00 00 {goal}")]
+    assert rig.broadcasts() == [packet(f"01 01 02 fe fe {goal} 01 80")]
+
+
+def test_a_drone_keeps_clear_of_the_goal_of_one_that_took_off_and_was_not_heard_again():
+    rig = group_rig(3)
+    rig.wait_until(BIDS_S)
+    rig.hear(bid(3, 99.0))
+    rig.wait(TO_DECISION_S)
+    rig.hear(bid(3, TOOK_OFF) + "01 00 00 00 00 00 41 cd cc 8c bf 00 00")  # BESIDE_NEIGHBOUR
+    rig.antenna.dead = {2, 3}
+    while not rig.engine.goals:
+        rig.wait(1.0)
+    (goal,) = rig.engine.goals
+    assert goal.distance_m(Location(8.0, -1.1, 0.0)) >= 1.0
+    assert goal.distance_m(NEIGHBOUR_PLACE) < 1.2
 
 
 def test_a_winner_that_takes_off_is_waited_for():
@@ -1324,9 +1341,8 @@ def test_a_drone_whose_channel_is_jammed_stays_says_so_and_tries_again(make_rig)
 
 @pytest.mark.parametrize("strategy", [*REPAIR_STRATEGIES, "reckless"])
 def test_a_drone_whose_own_radio_does_not_work_stays_and_says_so(strategy):
-    rig = lone_rig(
-        repair=Reckless() if strategy == "reckless" else create_repair_strategy(strategy)
-    )
+    repair = Reckless() if strategy == "reckless" else create_repair_strategy(strategy)
+    rig = lone_rig(repair=repair)
     rig.antenna.is_whole = False
     rig.wait_until(3600.0)
     assert rig.engine.goals == []
@@ -1572,6 +1588,23 @@ def test_to_the_gateway_it_flies_in_legs_and_presents_itself():
     fly(rig, Location(6.2, 0.0, 0.2))
     rig.hear("00 00 04 01 01 01 00 00")
     assert rig.engine.goals[-1] == Location(6.2, 0.0, 0.0)
+
+
+def test_no_leg_ends_on_a_drone_whose_place_is_known_or_told_on_the_way():
+    rig = lone_rig()
+    rig.hear(UNDERGROUND)  # the place of 2 is nowhere to fly
+    rig.hear("05 05 02 01 01 cd cc bc 40 00 00 00 00 01 00")  # node 5 asks, from latitude 5.9
+    rig.antenna.dead = {2, 5}
+    while not rig.engine.goals:
+        rig.wait(1.0)
+    (first,) = rig.engine.goals
+    assert 1.0 <= first.distance_m(Location(5.9, 0.0, 0.0)) < 1.3
+    fly(rig, Location(9.0, 0.0, 3.0))
+    flown = len(rig.engine.goals)
+    told = struct.pack("<ff", first.latitude + 0.1, first.longitude).hex()
+    rig.hear(f"06 06 01 01 01 {told}")
+    assert len(rig.engine.goals) == flown + 1
+    assert rig.engine.goals[-1].distance_m(first) >= 0.9
 
 
 def test_the_last_leg_ends_at_the_goal_and_not_just_before_it():
