@@ -317,15 +317,40 @@ def test_a_router_that_has_just_come_is_off_while_a_connected_one_uses_its_id():
     assert rig.antenna.switched == [False, True]
 
 
+NOT_SENT = "dropped a packet in this node's name that it did not send"
+
+
 @pytest.mark.parametrize("forged", ["01 02 80 01 09", "01 02 04 01 09 01 00 02", "01 02 06 01 09"])
 def test_a_packet_in_its_name_that_it_did_not_send_says_nothing_about_a_route(forged):
     rig = Rig()
+    rig.wait(31.0)
     rig.hear("09 03 00 01 01")
     rig.know_neighbour(2)
     rig.hear(forged)
-    assert rig.sent() == []
+    assert rig.sent(int(forged[6:8], 16)) == []
     assert rig.routing.get_direction_to_node(9) == 3
-    assert "dropped a packet in this node's name that it did not send" in rig.mesh.complaints.counts
+    assert NOT_SENT in rig.mesh.complaints.counts
+
+
+def test_its_own_packet_that_comes_back_after_seconds_is_no_forgery_and_says_nothing_about_a_route():
+    rig = Rig()
+    rig.wait(31.0)
+    rig.hear("09 03 00 01 01")
+    rig.know_neighbour(2)
+    rig.mesh.control.send_heartbeat(9)
+    rig.wait(5.5)
+    rig.hear("01 02 04 01 09 00 ff 02")
+    assert rig.routing.get_direction_to_node(9) == 3
+    assert NOT_SENT not in rig.mesh.complaints.counts
+
+
+def test_what_comes_back_to_a_restarted_node_is_no_forgery():
+    rig = Rig()
+    rig.hear("09 03 00 01 01")
+    rig.know_neighbour(2)
+    rig.hear("01 02 06 01 09")
+    assert rig.sent() == []
+    assert NOT_SENT not in rig.mesh.complaints.counts
 
 
 def test_a_direct_neighbour_is_never_forgotten_for_a_packet_that_goes_round():
@@ -398,6 +423,23 @@ def test_a_heartbeat_is_bounded_by_its_hops_and_not_by_the_way_it_came():
     rig = Rig()
     rig.hear("09 03 00 01 01", "05 02 04 01 09 00 ff 01", "05 04 04 01 09 00 ff 01")
     assert rig.sent() == [packet("05 01 04 03 09 00 ff 02")] * 2
+
+
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        ("05 02 04 01 09 00 ff 01", "05 05 04 01 09 00 ff 00"),  # straight from its creator
+        ("05 02 04 01 09 00 ff 01", "05 04 04 01 09 00 ff 02"),  # a detour
+        ("05 02 04 01 09 00 ff 01", "05 04 04 01 09 00 ff 03"),
+        ("05 02 80 01 09 2a", "05 05 80 01 09 2a"),
+    ],
+)
+def test_a_packet_that_was_sent_again_another_way_does_not_circulate(first, second):
+    rig = Rig()
+    rig.hear("06 06 00 01 01", "09 03 00 01 01", first, second)
+    assert len(rig.sent(int(first[6:8], 16))) == 2
+    assert rig.routing.get_direction_to_node(9) == 3
+    assert not any("circulates" in reason for reason in rig.mesh.complaints.counts)
 
 
 def test_a_heartbeat_that_comes_round_with_more_hops_is_dropped_and_its_route_forgotten():

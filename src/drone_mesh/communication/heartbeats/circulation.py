@@ -7,6 +7,8 @@ from typing import Hashable, Tuple
 
 from drone_mesh.communication.timing import CIRCULATION_S
 
+LEAST_LOOP = 3  # links: no node sends a packet straight back to where it came from
+
 Passage = Tuple[int, int, float, int]
 """A packet's first passage: the neighbour that it came from, the next hop, the time and its hop
 count. A plain tuple, as there is one for each packet."""
@@ -42,12 +44,15 @@ class CirculationGuard:
         self._passages[identity] = (came_from, went_to, now_s, hops)
 
 
-def came_round(first: Passage, came_from: int, hops: int = 0) -> int | None:
-    """The next hop of the packet's first passage, if it now comes from another neighbour.
+def came_round(first: Passage, creator: int, came_from: int, hops: int | None = None) -> int | None:
+    """The next hop of the packet's first passage, if it now comes round from another neighbour.
 
-    A heartbeat counts its hops, so it has come round only if it has more `hops` than before.
+    What comes straight from its creator was sent again. A heartbeat counts its hops: one with only
+    a few more of them was sent again, too, another way.
     """
     first_from, went_to, _at_s, first_hops = first
-    if first_from == came_from or (hops and hops <= first_hops):
+    if came_from in (creator, first_from):
+        return None
+    if hops is not None and hops < first_hops + LEAST_LOOP:
         return None
     return went_to

@@ -10,17 +10,17 @@ from collections import deque
 from typing import Callable, Sequence
 
 from drone_mesh.communication import messages
-from drone_mesh.communication.heartbeats.circulation import CirculationGuard
+from drone_mesh.communication.heartbeats.circulation import CirculationGuard, Passage
 from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE
 from drone_mesh.communication.limits import REPEATS, RateLimit, Strangers
 from drone_mesh.communication.messages import CREATOR_AT, FORWARD_AT
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.parts import NodeBasics
 from drone_mesh.communication.routing.interfaces import IRoutingTechnique
-from drone_mesh.communication.timing import CIRCULATION_S
 from drone_mesh.communication.ways import IDelivery
 
 DATA_PERSISTENCE = 3  # our choice: users' packets are many, so a chain of losses is more likely
+SENT_KEPT_S = 30.0  # our choice: on a busy channel a packet is under way for seconds
 
 
 class Delivery(IDelivery):
@@ -62,7 +62,9 @@ class Delivery(IDelivery):
         self._announced = RateLimit(REPEATS)
         self._missing_to_report: deque[tuple[int, int, int]] = deque()
         self._reporting = False
-        self._relayed = CirculationGuard(antenna.medium.stretched(CIRCULATION_S))  # own packets
+        self._kept_s = antenna.medium.stretched(SENT_KEPT_S)
+        self._relayed = CirculationGuard(self._kept_s)  # own packets
+        self._begun_s = -math.inf  # what this node sent before its start comes back, too
         self.total_sent = 0
 
     # Sending ---------------------------------------------------------------------------------
@@ -97,10 +99,17 @@ class Delivery(IDelivery):
             self.neighbour_lost(to, came_from)
         return False
 
-    def went_to(self, payload: bytes) -> int | None:
-        """The relay that this packet was just sent to; None unless this node sent it."""
-        sent = self._relayed.first_passage(messages.identity(payload), self._deadlines.now_s)
-        return None if sent is None else sent[1]
+    def begin(self) -> None:
+        """The node starts."""
+        self._begun_s = self._deadlines.now_s
+
+    def own_passage(self, payload: bytes) -> Passage | None:
+        """When this node sent this packet, and to which relay; None: not within SENT_KEPT_S."""
+        return self._relayed.first_passage(messages.identity(payload), self._deadlines.now_s)
+
+    def remembers_all(self) -> bool:
+        """Whether it knows all packets of this node that may be under way."""
+        return self._deadlines.now_s - self._begun_s > self._kept_s
 
     def _most_attempts(self, payload: bytes) -> int:
         return self._attempts * (DATA_PERSISTENCE if messages.is_data(payload) else 1)

@@ -30,7 +30,8 @@ class Forwarding:
         self._complaints = basics.complaints
         self._report = basics.report
         self._told = RateLimit(CREATORS_TOLD)
-        self._circulation = CirculationGuard(basics.antenna.medium.stretched(CIRCULATION_S))
+        self._circulates_s = basics.antenna.medium.stretched(CIRCULATION_S)
+        self._circulation = CirculationGuard(self._circulates_s)
 
     def forward(
         self, payload: bytes, creator: int, from_: int, kind: int, forward: int, now_s: float
@@ -46,22 +47,18 @@ class Forwarding:
             self._flood(payload, routing.directions(forward, from_, creator), now_s)
             return
         if creator == self._node_id:
-            went_to = self._delivery.went_to(payload)
-            if went_to is None:  # in its name, but not its own: it says nothing about a route
-                reason = "a packet in this node's name that it did not send"
-                self._complaints.dropped(reason, payload, now_s)
-            else:
-                self._drop_circulating(payload, went_to, now_s)
+            self._own_came_back(payload, now_s)
             return
         identity: Hashable
+        hops: int | None
         if kind == _HEARTBEAT:  # most packets; these four values are cheaper than their bytes
             know_gateway, gateway, hops = messages.heartbeat_body(payload)
             identity = (creator, forward, know_gateway, gateway)
         else:
-            identity, hops = messages.identity(payload), 0
+            identity, hops = messages.identity(payload), None
         first = self._circulation.first_passage(identity, now_s)
         if first is not None:
-            went_to = came_round(first, from_, hops)
+            went_to = came_round(first, creator, from_, hops)
             if went_to is not None:
                 self._drop_circulating(payload, went_to, now_s)
                 return
@@ -90,7 +87,7 @@ class Forwarding:
                 return
             if self._delivery.send(forwarded, to, 0, from_):  # keywords cost more
                 if first is None:
-                    self._circulation.passed(identity, from_, to, now_s, hops)
+                    self._circulation.passed(identity, from_, to, now_s, hops or 0)
                 return
             lost = to
         self.stranded(payload, now_s)
@@ -107,6 +104,17 @@ class Forwarding:
                 return directions[0]
         up = self._delivery.default_hop()
         return NO_ROUTE if up == from_ else up
+
+    def _own_came_back(self, payload: bytes, now_s: float) -> None:
+        """Drop it. Only one that was just sent says something about a route; see `SENT_KEPT_S`."""
+        sent = self._delivery.own_passage(payload)
+        if sent is not None:
+            _from, went_to, sent_s, _hops = sent
+            if now_s - sent_s < self._circulates_s:
+                self._drop_circulating(payload, went_to, now_s)
+        elif self._delivery.remembers_all():
+            reason = "a packet in this node's name that it did not send"
+            self._complaints.dropped(reason, payload, now_s)
 
     def _flood(self, payload: bytes, next_hops: Sequence[int], now_s: float) -> None:
         forwarded = messages.next_hop(payload, self._node_id, self._node_id)

@@ -60,6 +60,7 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
 
     def start(self) -> None:
         """Start the technique, which introduces the node."""
+        self._delivery.begin()
         self._technique.start_routing(self)
 
     def on_time(self, now_s: float) -> None:

@@ -17,8 +17,8 @@ def test_a_passage_is_remembered_for_half_a_second_whenever_it_came():
             if now_s >= first_s:
                 first = guard.first_passage(b"packet", now_s)
                 assert (first is not None) == (now_s < first_s + 0.5), (first_s, now_s)
-                assert first is None or came_round(first, 4) == 3
-                assert first is None or came_round(first, 2) is None
+                assert first is None or came_round(first, creator=1, came_from=4) == 3
+                assert first is None or came_round(first, creator=1, came_from=2) is None
 
 
 def test_it_keeps_the_packets_of_half_a_second_in_each_of_two_tables():
