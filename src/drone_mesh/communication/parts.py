@@ -56,12 +56,19 @@ class NodeBasics:
         if not is_common and not self.complaints.foreign_neighbour(self.now_s):
             self.complaints.add("a neighbour has another origin", f"node {neighbour}", self.now_s)
 
-    def may_be_at(self, place: Location, gateway: bool) -> bool:
-        """Whether the gateway, or else the next hop, can be at `place`; complains if not."""
+    def may_be_at(self, place: Location, gateway: bool, says_so: bool) -> bool:
+        """Whether the gateway, or else the next hop, can be at `place`; counts it if not.
+
+        `says_so`: that node itself says that it is there now. Complains if it goes on to do so.
+        """
         possible = self.places.is_possible(place, self.range_m, gateway)
+        is_wrong = says_so and self.places.is_still_wrong(gateway, not possible, self.now_s)
         if not possible:
             reason = f"a place where the {'gateway' if gateway else 'next hop'} cannot be"
-            self.complaints.add(reason, place.in_words(), self.now_s)
+            if is_wrong:
+                self.complaints.add(reason, place.in_words(), self.now_s)
+            else:
+                self.complaints.counts[reason] += 1
         return possible
 
 

@@ -9,6 +9,8 @@ from drone_mesh.drone.location import Location
 
 UNKNOWN_HOPS = 10  # our choice: to the gateway, for a router that never was connected
 SAME_PLACE_M = 0.5  # our choice: places travel as float32, heights in whole metres
+# Our choice: a node of 2019 does not say that a place is its goal; it is out of reach by then.
+WRONG_FOR_S = 30.0
 
 
 class KnownPlaces:
@@ -24,6 +26,7 @@ class KnownPlaces:
         self.good_seen_s = 0.0  # when it was there
         self.connected_at: Location | None = None  # where this node was connected last
         self._connected_hops = UNKNOWN_HOPS  # to its gateway, there
+        self._wrong_since_s: dict[bool, float] = {}  # places of the gateway, and of the next hop
 
     def connected_here(self, here: Location | None, hops: int) -> None:
         """The node is connected, `hops` away from its gateway."""
@@ -36,6 +39,13 @@ class KnownPlaces:
         hops = self._connected_hops if gateway else 1
         here = self.connected_at
         return here is None or math.dist(here, place) <= (hops + 1) * range_m
+
+    def is_still_wrong(self, gateway: bool, wrong: bool, now_s: float) -> bool:
+        """Whether the gateway, or the next hop, has reported only wrong places for some time."""
+        if not wrong:
+            self._wrong_since_s.pop(gateway, None)
+            return False
+        return now_s - self._wrong_since_s.setdefault(gateway, now_s) >= WRONG_FOR_S
 
     @property
     def asks_gateway(self) -> bool:
@@ -70,6 +80,7 @@ class KnownPlaces:
     def forget_gateway(self) -> None:
         """The node prefers another gateway."""
         self.gateway, self._by_gateway, self.gateway_disputed = None, False, False
+        self._connected_hops = UNKNOWN_HOPS
 
     def left_own_place(self, gateway: int) -> None:
         """The node flies: the next step back leads to the place of `gateway`, if that is known."""

@@ -16,6 +16,7 @@ from drone_mesh.communication.mesh_node import NodeSettings
 from drone_mesh.communication.messages import (
     GatewayPlace,
     MovementNegotiationMessage,
+    is_goal,
     place_in,
 )
 from drone_mesh.communication.observer import MeshEventKind
@@ -115,7 +116,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
             return
         if creator == self.control.gateway:
             place = place_in(payload)
-            if self._parts.may_be_at(place, gateway=True):
+            if self._parts.may_be_at(place, gateway=True, says_so=not is_goal(payload)):
                 self.places.update_gateway(place, self._deadlines.now_s)
 
     def receive_movement_negotiation(self, payload: bytes, creator: int, from_: int) -> None:
@@ -137,8 +138,9 @@ class MeshnetworkRouter(MeshnetworkComponent):
             control.gateway_sent_place()
         elif gateway is not None:
             self._on_gateway_place(gateway)
-        if (is_gateway or is_next_hop) and not self._parts.may_be_at(location, is_gateway):
-            return
+        if is_gateway or is_next_hop:
+            if not self._parts.may_be_at(location, is_gateway, says_so=not is_goal):
+                return
         self._neighbours.set_place(node, location, now_s)
         if is_gateway:
             self.places.update_gateway(location, now_s)
@@ -162,9 +164,9 @@ class MeshnetworkRouter(MeshnetworkComponent):
             self._on_gateway_place(gateway)
 
     def _on_gateway_place(self, gateway: GatewayPlace) -> None:
-        if self._parts.may_be_at(gateway.place, gateway=True) and self.control.may_use(
-            gateway.gateway
-        ):
+        if not self.control.may_use(gateway.gateway):
+            return
+        if self._parts.may_be_at(gateway.place, gateway=True, says_so=False):
             seen_s = self._deadlines.now_s - gateway.age_s
             self.places.hear_of_gateway(gateway.place, seen_s, self._states.connected)
 

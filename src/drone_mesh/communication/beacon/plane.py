@@ -303,11 +303,12 @@ class BeaconPlane(IControlPlane):
     def _take_gateway_place(self, node: int, beacon: Beacon) -> None:
         """Where the gateway is, as it says itself or the parent does."""
         places, now_s, place = self._basics.places, self._routes.now_s, beacon.gateway_place
-        if node == self._routes.gateway:
+        is_gateway = node == self._routes.gateway
+        if is_gateway:
             place = None if beacon.motion is None else beacon.motion.place
         elif node != self._routes.parent:
             return
-        if place is None or not self._basics.may_be_at(place, gateway=True):
+        if place is None or not self._basics.may_be_at(place, gateway=True, says_so=is_gateway):
             return
         self._own.gateway_place = place
         if not self._proofs.has_key:

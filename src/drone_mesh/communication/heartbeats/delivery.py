@@ -62,6 +62,7 @@ class Delivery(IDelivery):
         self._announced = RateLimit(REPEATS)
         self._missing_to_report: deque[tuple[int, int, int]] = deque()
         self._reporting = False
+        self._without_proof = basics.seals.without_proof  # which is put on later than it is sent
         self._kept_s = antenna.medium.stretched(SENT_KEPT_S)
         self._relayed = CirculationGuard(self._kept_s)  # own packets
         self._begun_s = -math.inf  # what this node sent before its start comes back, too
@@ -105,7 +106,8 @@ class Delivery(IDelivery):
 
     def own_passage(self, payload: bytes) -> Passage | None:
         """When this node sent this packet, and to which relay; None: not within SENT_KEPT_S."""
-        return self._relayed.first_passage(messages.identity(payload), self._deadlines.now_s)
+        identity = messages.identity(self._without_proof(payload))
+        return self._relayed.first_passage(identity, self._deadlines.now_s)
 
     def remembers_all(self) -> bool:
         """Whether it knows all packets of this node that may be under way."""

@@ -567,6 +567,43 @@ def test_a_place_where_the_next_hop_or_the_gateway_cannot_be_is_dropped():
     assert rig.mesh.complaints.counts["a place where the gateway cannot be"] == 2
 
 
+def lines_about_places(caplog):
+    """What the log says of places that cannot be."""
+    lines = [record.getMessage().split(": ") for record in caplog.records]
+    return [why for _node, why, *_place in lines if "cannot be" in why]
+
+
+@pytest.mark.parametrize(
+    "place", [FAR_NEXT_HOP, FAR_GATEWAY, hearsay("00 00 20 42"), FAR_GATEWAY + " 00" * 9 + " 80"]
+)
+def test_a_place_that_cannot_be_may_be_a_goal_or_hearsay_and_is_no_line_in_the_log(caplog, place):
+    rig = Rig()
+    rig.connect_through(2)
+    rig.hear(place)
+    rig.wait(5.0)
+    rig.hear(place)
+    assert rig.mesh.places.gateway is None
+    assert not lines_about_places(caplog)
+
+
+@pytest.mark.parametrize(("place", "who"), [(FAR_NEXT_HOP, "next hop"), (FAR_GATEWAY, "gateway")])
+def test_a_node_that_reports_for_half_a_minute_where_it_cannot_be_has_its_line(caplog, place, who):
+    rig = Rig()
+    rig.connect_through(2)
+    for _ in range(4):
+        rig.hear(place)
+        rig.wait(10.0)
+        rig.hear("00 02 04 01 01 01 00 01")  # the gateway answers
+    assert lines_about_places(caplog) == [f"a place where the {who} cannot be"]
+
+
+def test_a_place_of_a_gateway_that_it_does_not_prefer_is_not_judged():
+    rig = Rig()
+    rig.connect_through(2)
+    rig.hear("07 02 7d 01 01 01 00 08 00 00 20 42 00 00 80 40")  # gateway 8, 40 m away
+    assert not rig.mesh.complaints.counts
+
+
 def test_what_others_say_of_the_gateway_does_not_replace_its_own_word_but_makes_the_node_ask_it():
     rig = lone_rig()
     rig.antenna.dead = set()
