@@ -84,7 +84,8 @@ class Delivery(IDelivery):
             return False
         if payload[CREATOR_AT] == self._node_id and payload[FORWARD_AT] != to:
             now_s = self._deadlines.now_s
-            self._relayed.passed(messages.identity(payload), self._node_id, to, now_s)
+            identity = messages.identity(self._without_proof(payload))
+            self._relayed.passed(identity, self._node_id, to, now_s)
         if self._shared:
             return self._hand_over(payload)
         while failures < self._attempts or failures < self._most_attempts(payload):

@@ -27,6 +27,7 @@ class Forwarding:
         self._routing = routing
         self._floods = routing.FLOODS
         self._delivery = delivery
+        self._searches = basics.antenna.medium.shared
         self._complaints = basics.complaints
         self._report = basics.report
         self._told = RateLimit(CREATORS_TOLD)
@@ -125,7 +126,8 @@ class Forwarding:
 
     def _drop_circulating(self, payload: bytes, used: int, now_s: float) -> None:
         forward = messages.addressee(payload)
-        self._complaints.dropped("a packet that circulates", payload, now_s)
+        # No line: while drones fly, loops come and go.
+        self._complaints.counts["dropped a packet that circulates"] += 1
         self._routing.circulated(forward, used)
         self.stranded(payload, now_s)
 
@@ -135,7 +137,10 @@ class Forwarding:
         if kind != MessageType.MOVE_TO_LOCATION:
             return
         reason = f"no route to drone {forward}"
-        self._complaints.add(reason, "an order for it ends here", now_s)
+        if self._searches:
+            self._complaints.counts[reason] += 1  # its gateway looks for the drone
+        else:
+            self._complaints.add(reason, "an order for it ends here", now_s)
         self._report(MeshEventKind.NO_ROUTE, forward)
         self._send_missing(creator, forward)
 

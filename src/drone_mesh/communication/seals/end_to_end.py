@@ -122,6 +122,10 @@ class NotProven(PacketError):
     """A packet is not what its creator sealed for this node, or is a replay."""
 
 
+class Replayed(NotProven):
+    """It is, but it was received before: mostly a copy that took another way."""
+
+
 class EndToEnd:
     """Seals the packets that one node creates, and checks those for it. Component's thread only."""
 
@@ -296,7 +300,7 @@ class EndToEnd:
                 if window is None:
                     nonce.windows[creator] = ReplayWindow(sequence)
                 elif not window.use(window.expand(sequence)):
-                    raise NotProven("a replayed packet")
+                    raise Replayed("a replayed packet")
                 return
         kind = payload[TYPE_AT]
         if kind == _HEARTBEAT:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 WIDTH = 512  # our choice: packets of a busy sender that may overtake each other in its queue
+LATELY_S = 10.0  # our choice: on a busy channel a packet and its copies are under way for seconds
 
 
 class ReplayWindow:
@@ -32,6 +33,36 @@ class ReplayWindow:
             return False
         self._seen |= bit
         return True
+
+
+class AgedWindow(ReplayWindow):
+    """A window that also tells old values from those that were new 10 to 20 s ago."""
+
+    __slots__ = ("_before", "_mark", "turn_s")
+
+    def __init__(self, highest: int, now_s: float) -> None:
+        """What came before is unknown, so it does not count as old for that time."""
+        super().__init__(highest)
+        self._before = self._mark = -1
+        self.turn_s = now_s + LATELY_S
+
+    def turn(self, now_s: float) -> None:
+        """To be called before a value is used when `turn_s` has come."""
+        is_long_ago = now_s >= self.turn_s + LATELY_S
+        self._before = self.highest if is_long_ago else self._mark
+        self._mark = self.highest
+        self.turn_s = now_s + LATELY_S
+
+    def is_old(self, value: int, now_s: float) -> bool:
+        """Whether higher values were used so long ago."""
+        if now_s >= self.turn_s:
+            self.turn(now_s)
+        return value <= self._before
+
+    def restart(self, highest: int) -> None:
+        """`highest` and all values below it count as used, and none above it."""
+        self.highest, self._seen = highest, _MASK
+        self._mark, self._before = min(self._mark, highest), min(self._before, highest)
 
 
 _MASK = (1 << WIDTH) - 1

@@ -10,6 +10,7 @@ epoch is accepted.
 
 from __future__ import annotations
 
+import enum
 import hashlib
 import math
 import random
@@ -24,7 +25,7 @@ from drone_mesh.communication.limits import RateLimit
 from drone_mesh.communication.messages import FORWARD_AT, FROM_AT, TO_AT
 from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.seals.keys import Keys
-from drone_mesh.communication.seals.replay import ReplayWindow
+from drone_mesh.communication.seals.replay import AgedWindow
 
 TAG_BYTES = 5
 SEAL_BYTES = 2 + TAG_BYTES
@@ -65,8 +66,8 @@ class _Peer:
         self.epoch = epoch
         self.state_to_all = _epoch_state(network_key, epoch)
         self.state = _epoch_state(pair_key, epoch)
-        self.window = ReplayWindow(count)  # only the node itself can move it
-        self.window_to_all = ReplayWindow(count)  # any node with the network key can
+        self.window = AgedWindow(count, now_s)  # only the node itself can move it
+        self.window_to_all = AgedWindow(count, now_s)  # any node with the network key can
         self.heard_s = now_s
 
     def answered(self, count: int, now_s: float) -> None:
@@ -74,9 +75,9 @@ class _Peer:
 
         A few broadcasts may have overtaken the answer; one that was further ahead was not its own.
         """
-        self.window = ReplayWindow(max(count, self.window.highest))
+        self.window.restart(max(count, self.window.highest))
         ahead = self.window_to_all.highest - count
-        self.window_to_all = ReplayWindow(count + ahead if 0 < ahead <= OVERTAKING else count)
+        self.window_to_all.restart(count + ahead if 0 < ahead <= OVERTAKING else count)
         self.heard_s = now_s
 
 
@@ -94,6 +95,15 @@ class _Asked:
     def __init__(self, next_s: float = -math.inf) -> None:
         self.next_s = next_s
         self.doubts = 0  # challenges in a row that its answers showed to be needless
+
+
+class NotOpened(enum.Enum):
+    """Why a packet was not opened."""
+
+    UNKNOWN = "the epoch of its sender is not known"
+    DOUBTFUL = "its sender has restarted, or it is not from that node"
+    LATE = "a copy of a packet of the last seconds, or overtaken by an answer"
+    REPLAYED = "a packet of long ago"
 
 
 class HopSeal:
@@ -142,21 +152,25 @@ class HopSeal:
         peer = self._peers.get(payload[FROM_AT])
         if peer is None or now_s - peer.heard_s > self._fresh_s:
             return None
-        to_all = payload[FORWARD_AT] == BROADCAST
-        window = peer.window_to_all if to_all else peer.window
-        count = window.expand(payload[SEAL_AT] | payload[SEAL_AT + 1] << 8)
-        if not 0 <= count <= LAST_COUNT:
+        window, count = _place(payload, peer)
+        if not _is_authentic(payload, peer, count):
             return None
-        if to_all:
-            tag = peer.state_to_all.copy()
-            tag.update(_covered_to_all(count, payload, BROADCAST, payload[FORWARD_AT:]))
-        else:
-            tag = peer.state.copy()
-            tag.update(_covered(count, payload))
-        if not compare_digest(tag.digest(), payload[TAG_AT:]) or not window.use(count):
+        if now_s >= window.turn_s:
+            window.turn(now_s)
+        if not window.use(count):
             return None
         peer.heard_s = now_s
         return _unsealed(payload)
+
+    def why_not(self, payload: bytes, now_s: float) -> NotOpened:
+        """Why a packet was not opened a moment ago."""
+        if not self.knows(payload[FROM_AT], now_s):
+            return NotOpened.UNKNOWN
+        peer = self._peers[payload[FROM_AT]]
+        window, count = _place(payload, peer)
+        if not _is_authentic(payload, peer, count):
+            return NotOpened.DOUBTFUL
+        return NotOpened.REPLAYED if window.is_old(count, now_s) else NotOpened.LATE
 
     def knows(self, node: int, now_s: float) -> bool:
         """Whether the epoch of this neighbour is known and it was heard recently."""
@@ -265,6 +279,25 @@ class HopSeal:
         covered = packet[:TO_AT] + packet[FORWARD_AT:]
         tag = hashlib.blake2s(covered, key=key, digest_size=TAG_BYTES, person=b"epochs")
         return tag.digest()
+
+
+def _place(payload: bytes, peer: _Peer) -> tuple[AgedWindow, int]:
+    """The window of a packet, and its counter."""
+    window = peer.window_to_all if payload[FORWARD_AT] == BROADCAST else peer.window
+    return window, window.expand(payload[SEAL_AT] | payload[SEAL_AT + 1] << 8)
+
+
+def _is_authentic(payload: bytes, peer: _Peer, count: int) -> bool:
+    """Whether this packet has the tag that belongs to the counter."""
+    if not 0 <= count <= LAST_COUNT:
+        return False
+    if payload[FORWARD_AT] == BROADCAST:
+        tag = peer.state_to_all.copy()
+        tag.update(_covered_to_all(count, payload, BROADCAST, payload[FORWARD_AT:]))
+    else:
+        tag = peer.state.copy()
+        tag.update(_covered(count, payload))
+    return compare_digest(tag.digest(), payload[TAG_AT:])
 
 
 def _epoch_state(key: bytes, epoch: int) -> hashlib.blake2s:

@@ -23,16 +23,16 @@ from drone_mesh.communication.interfaces import (
 from drone_mesh.communication.medium import ChannelUse, Medium
 from drone_mesh.communication.messages import CREATOR_AT, FORWARD_AT, TO_AT, TYPE_AT
 from drone_mesh.communication.packet_types import MessageType
-from drone_mesh.communication.seals.end_to_end import EndToEnd, NotProven, reserved_bytes
+from drone_mesh.communication.seals.end_to_end import EndToEnd, NotProven, Replayed, reserved_bytes
 from drone_mesh.communication.seals.keys import Keys
 from drone_mesh.communication.seals.message_seal import MessageSeal
-from drone_mesh.communication.seals.seal import SEAL_AT, SEAL_BYTES, HopSeal
+from drone_mesh.communication.seals.seal import SEAL_AT, SEAL_BYTES, HopSeal, NotOpened
 from drone_mesh.communication.timing import MeshTiming
 
 FRESH_PERIODS = 3.0  # our choice: a neighbour sends something once per check period
 FOREIGN_AFTER_S = 20.0  # our choice: two check periods; a restarted neighbour answers by then
-FOREIGN_FORGOTTEN_S = 60.0  # our choice: then the count starts again, as some packets arrive twice
-FOREIGN_PACKETS = 3
+FORGOTTEN_S = 60.0  # our choice: then the counts start again
+LEAST_PACKETS = 3  # our choice: damage that a checksum does not show is rarer
 
 _CHALLENGE, _ANSWER = int(MessageType.SEAL_CHALLENGE), int(MessageType.SEAL_ANSWER)
 _INTRODUCTIONS = (int(MessageType.PRESENT), int(MessageType.BEACON))
@@ -68,8 +68,10 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
         self._message_seal = MessageSeal(keys)
         self._mesh: IMeshNetwork | None = None
         self._present = b""  # the last one, for neighbours that could not open it
-        # By node: since when its packets could not be opened, and how many
+        # By node, since when and how many: packets of unknown ones, and packets of somebody else
         self._unopened: dict[int, tuple[float, int]] = {}
+        self._forged: dict[int, tuple[float, int]] = {}
+        self._doubtful: dict[int, bytes] = {}  # by node: a packet that its next answer decides
         self._clock = clock
         self.complaints = Complaints(node_id)
 
@@ -195,7 +197,7 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
             try:
                 opened = self._end_to_end.open(opened)
             except NotProven as error:
-                self._not_proven(str(error), payload, now_s)
+                self._not_proven(error, payload, now_s)
                 return
         mesh.on_msg(opened, now_s)
 
@@ -226,20 +228,41 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
         elif kind == _CHALLENGE:
             self._on_challenge(payload, from_, now_s)
         elif kind == _ANSWER:
-            if self._seal.answered(payload, now_s):
-                self._unopened.pop(from_, None)
+            self._on_answer(payload, from_, now_s)
         else:
-            if from_ == self._node_id and not self._seal.knows(from_, now_s):
-                self.complaints.own_id_heard(now_s)
-            else:
-                self._complain(payload, from_, now_s)
-            self._challenge(from_, now_s)
+            self._on_unopened(payload, from_, now_s)
+
+    def _on_unopened(self, payload: bytes, from_: int, now_s: float) -> None:
+        why = self._seal.why_not(payload, now_s)
+        if why is NotOpened.LATE:
+            self.complaints.counts["packets that came late or twice"] += 1
+            if payload[FORWARD_AT] != BROADCAST:  # there, it may be the count that was forged
+                return
+        elif why is NotOpened.REPLAYED:
+            self._not_of(from_, payload, now_s)
+        elif why is NotOpened.DOUBTFUL:
+            self._doubtful[from_] = payload
+        elif from_ == self._node_id:
+            self.complaints.own_id_heard(now_s)
+        else:
+            self._not_answered(from_, payload, now_s)
+        self._challenge(from_, now_s)
+
+    def _on_answer(self, answer: bytes, from_: int, now_s: float) -> None:
+        has_restarted = self._seal.answered(answer, now_s)
+        if has_restarted is None:
+            return
+        self._unopened.pop(from_, None)
+        doubtful = self._doubtful.pop(from_, None)
+        if doubtful is not None and not has_restarted:
+            self._not_of(from_, doubtful, now_s)
 
     def _on_challenge(self, challenge: bytes, from_: int, now_s: float) -> None:
         if messages.addressee(challenge) != self._node_id:
             return
         if not self._seal.is_proven(challenge):
-            self._complain(challenge, from_, now_s)
+            known = self._seal.knows(from_, now_s)
+            (self._not_of if known else self._not_answered)(from_, challenge, now_s)
             return
         answer = self._seal.answer(challenge, now_s)
         if answer is None:
@@ -256,6 +279,8 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
         challenge = self._seal.challenge(node, now_s)
         if challenge is None:
             return
+        if not self._seal.knows(node, now_s):
+            self._unopened.setdefault(node, (now_s, 1))
         if self._antenna.medium.shared and self._seal.crowded:  # some of these ids may not exist
             self._antenna.broadcast_message(challenge)
         else:
@@ -268,30 +293,39 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
         else:
             self._antenna.send_message_to(packet)
 
-    def _not_proven(self, reason: str, payload: bytes, now_s: float) -> None:
+    def _not_proven(self, error: NotProven, payload: bytes, now_s: float) -> None:
         """Copies, and packets for an old nonce, are normal; forged orders are not."""
-        if payload[TYPE_AT] == _ORDER:
-            self.complaints.dropped(reason, payload, now_s)
+        if payload[TYPE_AT] == _ORDER and not isinstance(error, Replayed):
+            self.complaints.dropped(str(error), payload, now_s)
         else:
-            self.complaints.counts[f"dropped {reason}"] += 1
+            self.complaints.counts[f"dropped {error}"] += 1
 
-    def _complain(self, payload: bytes, from_: int, now_s: float) -> None:
-        """A restarted neighbour is normal; one that never answers a challenge is not."""
-        since_s, count = self._unopened.get(from_, (now_s, 0))
-        if now_s - since_s > FOREIGN_FORGOTTEN_S:
+    def _not_of(self, node: int, payload: bytes, now_s: float) -> None:
+        """A packet in the name of this node is not from it, or not from now."""
+        since_s, count = self._forged.get(node, (now_s, 0))
+        if now_s - since_s > FORGOTTEN_S:
             since_s, count = now_s, 0
-        self._unopened[from_] = since_s, count + 1
-        if count + 1 < FOREIGN_PACKETS or now_s - since_s < FOREIGN_AFTER_S:
-            return
-        if self._seal.knows(from_, now_s):
-            reason = f"replayed or forged packets in the name of node {from_}"
+        self._forged[node] = since_s, count + 1
+        if count + 1 >= LEAST_PACKETS:
+            reason = f"replayed or forged packets in the name of node {node}"
             self.complaints.add(reason, payload.hex(), now_s)
-        elif payload[SEAL_AT:] == _NO_SEAL:
-            reason = f"a neighbour, node {from_}, sends packets without a seal: it has no key"
-            self.complaints.foreign(from_, reason, payload, now_s)
+
+    def _not_answered(self, node: int, payload: bytes, now_s: float) -> None:
+        """A restarted neighbour is normal; one that never answers a challenge is not."""
+        if node not in self._unopened:
+            return  # it has not been challenged yet
+        since_s, count = self._unopened[node]
+        if now_s - since_s > FORGOTTEN_S:
+            del self._unopened[node]
+            return
+        self._unopened[node] = since_s, count + 1
+        if count + 1 < LEAST_PACKETS or now_s - since_s < FOREIGN_AFTER_S:
+            return
+        if payload[SEAL_AT:] == _NO_SEAL:
+            reason = f"a neighbour, node {node}, sends packets without a seal: it has no key"
         else:
             reason = (
-                f"a neighbour, node {from_}, sends packets that this node's key does not open: "
+                f"a neighbour, node {node}, sends packets that this node's key does not open: "
                 "another mesh or another key?"
             )
-            self.complaints.foreign(from_, reason, payload, now_s)
+        self.complaints.foreign(node, reason, payload, now_s)

@@ -237,6 +237,56 @@ def test_occasional_duplicates_are_not_reported_as_replayed(caplog):
     assert "replayed or forged packets in the name of node 0" in caplog.text
 
 
+def heard_by(network, node_id):
+    """What this node hears from now on."""
+    record = []
+    network.nodes[node_id].receiver = Tap(network, node_id, record)
+    return record
+
+
+def test_a_copy_of_a_packet_of_the_last_seconds_has_no_effect_and_no_line_and_costs_no_packet(caplog):
+    """A lost acknowledgement: its sender repeats a packet that was accepted."""
+    network = line(2)
+    complaints = counts(network, 1)
+    record = heard_by(network, 1)
+    network.run_for(30.0)
+    everything = seals_heard(network)
+    for _ in range(6):
+        count = len(record)
+        assert network.run_until(lambda count=count: len(record) > count, within_s=15.0)
+        network.run_for(0.07)
+        before = len(everything()), network.nodes[1].component.get_total_message_sent()
+        if record[-1].payload[4] != 254:
+            for _again in range(4):
+                network.inject(1, record[-1].payload)
+        after = len(everything()), network.nodes[1].component.get_total_message_sent()
+        assert after == before
+    assert complaints["packets that came late or twice"] >= 9
+    assert not caplog.text
+
+
+def test_packets_that_a_neighbour_shows_not_to_have_sent_are_named(caplog):
+    network = line(3)
+    network.run_for(30.0)
+    for _ in range(4):
+        network.inject(1, packet("02 02 04 01 01 00 ff 00 00 00 00 00 01 02 03"))
+        network.run_for(10.0)
+    lines = [record.getMessage() for record in caplog.records]
+    assert len(lines) == 1
+    assert "node 1: replayed or forged packets in the name of node 2" in lines[0]
+
+
+@pytest.mark.parametrize("restarted", [0, 1, 2])
+@pytest.mark.parametrize("radio", ["disc", "shared"])
+def test_a_restart_is_no_attack(radio, restarted, caplog):
+    network = line(4, node_keys, radio)
+    network.run_for(40.0)
+    for _ in range(4):
+        network.restart(restarted)
+        network.run_for(15.0)
+    assert not caplog.text
+
+
 def seals_heard(network):
     """What all nodes hear from now on, challenges and answers alone, by time."""
     record = []
