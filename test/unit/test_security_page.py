@@ -95,6 +95,8 @@ SENTENCES = [
     f"at most {MAX_NODE_ID} x {MAX_NODE_ID} per node",
     f"under {MAX_NODE_ID + 1} invented ids",
     f"| a key | one tag | {8 * keys.KEY_BYTES} | none | |",
+    f"authentic ones that are at least {replay.LATELY_S:g} s older than others that were accepted",
+    f"it takes three of them within {antenna.FORGOTTEN_S:g} s",
     f"has challenged it within {complaints.CHALLENGED_FOR_S:g} s",
     f"500 packets a second fill the channel at 250 kbit/s. An attacker that sends them for a year "
     f"makes {TRIES_PER_YEAR:.1e} attempts".replace("e+10", "e10"),

@@ -244,7 +244,9 @@ def heard_by(network, node_id):
     return record
 
 
-def test_a_copy_of_a_packet_of_the_last_seconds_has_no_effect_and_no_line_and_costs_no_packet(caplog):
+def test_a_copy_of_a_packet_of_the_last_seconds_has_no_effect_and_no_line_and_costs_no_packet(
+    caplog,
+):
     """A lost acknowledgement: its sender repeats a packet that was accepted."""
     network = line(2)
     complaints = counts(network, 1)
