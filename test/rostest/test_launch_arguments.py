@@ -1,0 +1,125 @@
+#!/usr/bin/env python3
+"""What roslaunch makes of the arguments of the launch files; nothing is started.
+
+The effect of a parameter is tested where it is read.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import unittest
+import xml.etree.ElementTree as ET
+from dataclasses import fields
+from pathlib import Path
+
+import rostest
+import yaml
+
+from drone_mesh.configuration import FactoryConfiguration
+
+LAUNCH = Path(__file__).resolve().parents[2] / "launch"
+
+
+def roslaunch(option: str, file: str, *arguments: str) -> str:
+    command = ["roslaunch", option, str(LAUNCH / file), *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
+
+def nodes(*arguments: str) -> set[str]:
+    return set(roslaunch("--nodes", "factory.launch", *arguments).split())
+
+
+def parameters(file: str, *arguments: str) -> dict[str, object]:
+    return dict(yaml.safe_load(roslaunch("--dump-params", file, *arguments)))
+
+
+def names_in(file: str) -> set[str]:
+    return {arg.get("name", "") for arg in ET.parse(LAUNCH / file).getroot().findall("arg")}
+
+
+class LaunchArgumentsTest(unittest.TestCase):
+    def test_each_setting_reaches_the_factory_and_what_the_simulator_shares_reaches_it_too(
+        self,
+    ) -> None:
+        settings = {field.name for field in fields(FactoryConfiguration)}
+        self.assertLessEqual(settings, names_in("factory.launch"))
+        values = {name: f"value of {name}" for name in {*settings, "config"}}
+        found = parameters("factory.launch", *(f"{n}:={value}" for n, value in values.items()))
+        for name, value in values.items():
+            self.assertEqual(found[f"/DroneFactory/{name}"], value)
+        for name in ("config", "max_distance", "obstacles", "obstacle_radio"):
+            self.assertEqual(found[f"/WirelessSignalSimulator/{name}"], values[name])
+
+    def test_other_arguments_of_the_factory_reach_the_manager_and_the_console(self) -> None:
+        found = parameters(
+            "factory.launch", "casus:=/my.yaml", "origin:=1,2,3", "demo:=repair",
+            "console_port:=99", "tiles:=/my.mbtiles", "hosts:=2",
+        )  # fmt: skip
+        self.assertEqual(found["/DroneManager/casus"], "/my.yaml")
+        self.assertEqual(found["/drone_mesh/origin"], "1,2,3")
+        self.assertEqual(found["/mesh_console/demo"], "repair")
+        self.assertEqual(found["/mesh_console/port"], 99)
+        self.assertEqual(found["/mesh_console/tiles"], "/my.mbtiles")
+        hosts = [(found[f"/mesh_host_{n}/index"], found[f"/mesh_host_{n}/hosts"]) for n in (1, 2)]
+        self.assertEqual(hosts, [(1, 2), (2, 2)])
+
+    def test_switches_start_a_node_or_leave_it_out(self) -> None:
+        base = nodes()
+        self.assertEqual(base, {"/WirelessSignalSimulator", "/DroneManager", "/DroneFactory"})
+        self.assertEqual(base - nodes("simulator:=false"), {"/WirelessSignalSimulator"})
+        self.assertEqual(base - nodes("manager:=false"), {"/DroneManager"})
+        self.assertEqual(nodes("actions:=true") - base, {"/fly_actions"})
+        self.assertEqual(nodes("console:=true") - base, {"/mesh_console"})
+        self.assertEqual(nodes("demo:=repair") - base, {"/mesh_console"})
+        self.assertEqual(nodes("rviz:=true") - base, {"/mesh_markers", "/mesh_rviz"})
+        self.assertEqual(nodes("hosts:=2") - base, {"/mesh_host_1", "/mesh_host_2"})
+        self.assertEqual(nodes("hosts:=0"), base)
+        alone = nodes("namespace:=site_a", "simulator:=false", "manager:=false")
+        self.assertEqual(alone, {"/site_a/DroneFactory"})
+
+    def test_an_empty_world_has_no_drones_and_its_own_settings(self) -> None:
+        own = {"gui": "true", "real_time_factor": "3", "max_distance": "4", "config": "/my.yaml"}
+        self.assertEqual(names_in("empty_world.launch"), own.keys())
+        found = parameters("empty_world.launch", *(f"{n}:={value}" for n, value in own.items()))
+        self.assertEqual(
+            (found["/DroneFactory/gateways"], found["/DroneFactory/routers"]), ("0", "0")
+        )
+        for name, value in own.items():
+            self.assertEqual(found[f"/DroneFactory/{name}"], value)
+
+    def test_each_argument_of_the_console_is_a_parameter(self) -> None:
+        names = sorted(names_in("console.launch"))
+        values = {name: "80" if name == "port" else f"value of {name}" for name in names}
+        found = parameters("console.launch", *(f"{n}:={value}" for n, value in values.items()))
+        for name, value in values.items():
+            self.assertEqual(str(found[f"/mesh_console/{name}"]), value)
+
+    def test_a_host_has_its_nodes(self) -> None:
+        found = parameters("host.launch", "first:=3", "last:=5")
+        self.assertEqual((found["/mesh_host_3_5/first"], found["/mesh_host_3_5/last"]), (3, 5))
+
+    def test_recorder_player_and_rviz_get_their_options(self) -> None:
+        def line(file: str, node: str, *arguments: str) -> str:
+            return roslaunch(f"--args={node}", file, *arguments)
+
+        record = ("record.launch", "/mesh_recorder", "bag:=/my/run")
+        self.assertIn("--lz4 --buffsize", line(*record))
+        self.assertIn("--bz2 --buffsize", line(*record, "compression:=bz2"))
+        self.assertNotIn("--lz4", line(*record, "compression:=none"))
+        self.assertIn("-o /my/run", line(*record))
+        replay = ("replay.launch", "bag:=/my.bag", "rate:=2", "start:=7", "port:=99", "tiles:=/t")
+        self.assertIn("--rate 2 --start 7 /my.bag", line(replay[0], "/mesh_replay", *replay[1:]))
+        found = parameters(*replay, "origin:=1,2,3")
+        console = {"recording": "/my.bag", "port": 99, "origin": "1,2,3", "tiles": "/t"}
+        for name, value in console.items():
+            self.assertEqual(found[f"/mesh_console/{name}"], value)
+        shown = roslaunch("--nodes", *replay, "console:=false", "rviz:=true").split()
+        self.assertEqual(set(shown), {"/mesh_replay", "/mesh_markers", "/mesh_rviz"})
+        rviz = line("rviz.launch", "/mesh_rviz", "rviz_config:=/my.rviz")
+        self.assertIn("-d /my.rviz", rviz)
+        hidden = roslaunch("--nodes", "rviz.launch", "window:=false").split()
+        self.assertEqual(hidden, ["/mesh_markers"])
+
+
+if __name__ == "__main__":
+    rostest.rosrun("drone_mesh", "launch_arguments", LaunchArgumentsTest)
