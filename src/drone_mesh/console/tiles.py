@@ -157,7 +157,10 @@ def _open_mbtiles(path: Path) -> Tiles:
         nonlocal until_s
         with lock:
             until_s = time.monotonic() + MOST_QUERY_S
-            return database.execute(query, values).fetchmany(MOST_ROWS)
+            try:
+                return database.execute(query, values).fetchmany(MOST_ROWS)
+            except UnicodeDecodeError as error:  # of what SQLite says about the damage
+                raise sqlite3.DatabaseError("damaged") from error
 
     def read(z: int, x: int, y: int) -> bytes | None:
         try:  # the rows of MBTiles count from the south

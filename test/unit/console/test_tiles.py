@@ -169,6 +169,12 @@ def test_where_an_mbtiles_file_is_damaged_the_map_ends(tmp_path):
     assert refusal(path).startswith(f"{path}: not an MBTiles file: ")
 
 
+def test_a_damaged_schema_which_sqlite_quotes_is_refused_in_one_line(tmp_path):
+    path = Path(mbtiles(tmp_path / "a.mbtiles"))
+    path.write_bytes(path.read_bytes().replace(b"CREATE TABLE", b"CREATE \xffABLE"))
+    assert refusal(path) == f"{path}: not an MBTiles file: damaged"
+
+
 @pytest.mark.parametrize("zoom", ["'x'", "-1", "1e9"])
 def test_zoom_levels_that_are_none_are_refused(tmp_path, zoom):
     path = Path(mbtiles(tmp_path / "a.mbtiles"))
