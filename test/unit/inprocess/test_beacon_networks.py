@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import random
 
 import pytest
 
@@ -420,3 +421,25 @@ def test_the_emulated_chips_carry_it():
     network.echo(0, 8, answers.append)
     assert network.run_until(lambda: len(answers) == 1, within_s=1.0)
     network.stop()
+
+
+@pytest.mark.parametrize("seed", [0, 9, 10])
+def test_a_group_between_two_gateways_heals_when_both_relays_die_some_seconds_apart(seed):
+    """It passes to the other gateway on news that are old already, and forgets the first one."""
+    rng = random.Random(seed)
+    network = Network(seed=seed, routing="beacon")
+    network.add_gateway(0, 0.0, 0.0)
+    network.add_gateway(1, 36.0, 0.0)
+    network.add_router(2, 7.0, rng.uniform(-1.0, 1.0))
+    network.add_router(3, 29.0, rng.uniform(-1.0, 1.0))
+    for node, x in ((4, 14.5), (5, 18.0), (6, 21.5)):
+        network.add_router(node, x, rng.uniform(-2.0, 2.0))
+    assert network.run_until(network.all_connected, within_s=60.0)
+    network.run_for(rng.uniform(30.0, 60.0))
+    first, second = (2, 3) if rng.random() < 0.5 else (3, 2)
+    network.power(first, False)
+    network.run_for(rng.uniform(0.0, 8.0))
+    network.power(second, False)
+    network.run_for(15.0)
+    assert not network.all_connected([4, 5, 6])
+    assert network.run_until(lambda: network.all_connected([4, 5, 6]), within_s=60.0)

@@ -193,7 +193,7 @@ class RepairActions(abc.ABC):
     ) -> None:
         """Send a bid to all neighbours; `node` is its creator if it is relayed.
 
-        `about`: the goal of a flight that the bid announces, or the gateway's place where it failed.
+        `about`: the goal of a flight that it announces, or the gateway's place where one failed.
         """
         me = self.node_id
         creator = me if node is None else node

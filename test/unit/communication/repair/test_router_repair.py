@@ -809,6 +809,22 @@ def test_a_router_that_knows_no_gateway_location_does_not_bid():
     assert rig.sent(BID) == [own_bid(3, -1.0)]
 
 
+def test_a_router_that_knows_where_its_relay_stood_and_not_where_the_gateway_is_bids_its_way():
+    """As after its mesh has passed to another gateway, whose place nobody has told yet."""
+    rig = Rig()
+    rig.engine.place = Location(12.0, 0.0, 0.0)
+    rig.connect_through(2)
+    rig.hear(NEIGHBOUR_2_AT_0_8)
+    rig.antenna.dead = {2}
+    rig.know_neighbour(3)
+    rig.wait_until(BIDS_S)
+    assert rig.sent(BID) == [own_bid(3, 4.0)]
+    rig.hear(bid(3, 1.0))
+    rig.wait(TO_DECISION_S)
+    (goal,) = rig.engine.goals
+    assert goal.distance_m(NEIGHBOUR_PLACE) < 1.2
+
+
 def test_a_router_that_knows_only_the_place_of_the_gateway_bids_for_flying_there():
     """Otherwise a group of such drones would stay for ever."""
     rig = Rig()

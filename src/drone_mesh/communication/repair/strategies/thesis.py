@@ -18,14 +18,12 @@ class Thesis(GroupRepair):
     def _score(self, step: Step) -> float:
         """Distance to the gateway's place in metres, or NO_BID (docs/protocol.md, "Negotiation").
 
+        Without one, as while its mesh passes from one gateway to another: to where it would fly.
         For the second choice the nearest drone flies, unless another one has a first choice.
         """
-        own, gateway = self.mesh.own_place(), self.mesh.gateway_place
+        own = self.mesh.own_place()
         if own is None:
             self.reason = "does not know where it is"
             return NO_BID
-        if gateway is None:
-            self.reason = "does not know where the gateway is"
-            return NO_BID
-        distance_m = min(own.distance_m(gateway), MAX_SCORE_M)
+        distance_m = min(own.distance_m(self.mesh.gateway_place or step.place), MAX_SCORE_M)
         return 1.0 / (1.0 + distance_m) if self._is_second_choice(step) else distance_m
