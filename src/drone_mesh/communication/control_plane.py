@@ -129,7 +129,11 @@ class IControlPlane(abc.ABC):
     @property
     @abc.abstractmethod
     def gateway(self) -> int:
-        """The preferred gateway, a gateway with internet itself; NO_ROUTE: none is known."""
+        """The preferred gateway, a gateway with internet itself; NO_ROUTE: none is known.
+
+        With a key any node can still say that it is one, so those that have proved it come first
+        (`IMeshSeals.may_be_gateway`); test_captured_gateway.py tries every technique.
+        """
 
     @property
     @abc.abstractmethod

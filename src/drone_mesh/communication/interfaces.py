@@ -230,7 +230,10 @@ class IMeshSeals:
         return payload
 
     def may_be_gateway(self, node: int) -> bool:
-        """Whether to believe a forwarded packet that `node` is a gateway."""
+        """Whether `node` has proved to this node that it is a gateway; True without a key.
+
+        A control plane asks this before it prefers a gateway by the word of others.
+        """
         return True
 
     def foreign_neighbour(self) -> str:

@@ -138,9 +138,9 @@ class MeshnetworkRouter(MeshnetworkComponent):
             control.gateway_sent_place()
         elif gateway is not None:
             self._on_gateway_place(gateway)
-        if is_gateway or is_next_hop:
-            if not self._parts.may_be_at(location, is_gateway, says_so=not is_goal):
-                return
+        judged = is_gateway or is_next_hop
+        if judged and not self._parts.may_be_at(location, is_gateway, says_so=not is_goal):
+            return
         self._neighbours.set_place(node, location, now_s)
         if is_gateway:
             self.places.update_gateway(location, now_s)

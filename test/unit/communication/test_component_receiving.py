@@ -332,7 +332,7 @@ def test_a_packet_in_its_name_that_it_did_not_send_says_nothing_about_a_route(fo
     assert NOT_SENT in rig.mesh.complaints.counts
 
 
-def test_its_own_packet_that_comes_back_after_seconds_is_no_forgery_and_says_nothing_about_a_route():
+def test_its_own_packet_that_comes_back_after_seconds_is_no_forgery_nor_news_of_a_route():
     rig = Rig()
     rig.wait(31.0)
     rig.hear("09 03 00 01 01")

@@ -50,6 +50,7 @@ class BeaconPlane(IControlPlane):
             basics.range_m,
             basics.neighbours.place_of,
             self._antenna.medium.shared,
+            basics.seals.may_be_gateway,
         )
         self._step_m = MOVED * basics.range_m
         self._motion = OwnMotion(basics.pilot.place, self._step_m)

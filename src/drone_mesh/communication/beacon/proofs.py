@@ -74,6 +74,7 @@ class Proofs:
             self.due_s = math.inf
             return
         self.due_s = now_s + AGAIN_S * (1.0 + self._basics.rng.random())
+        self._routes.tried[gateway] += not self._basics.seals.may_be_gateway(gateway)
         self._courier.send_own(messages.heartbeat(me, me, gateway, gateway, True, gateway))
         if self._basics.places.asks_gateway:
             self._ask()

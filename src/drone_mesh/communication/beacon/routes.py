@@ -6,6 +6,7 @@ docs/protocol.md, "Beacons", describes the rules.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from operator import attrgetter, itemgetter
 from typing import Callable, Iterator, NamedTuple, Tuple
 
@@ -35,6 +36,9 @@ STALE = 5.0  # intervals: a neighbour whose number was not a new one for longer 
 REACH = 0.97  # of the range: two nodes further apart are expected to lose each other
 LEAVES, GONE = 1.0, 3.0  # hops that a detour may cost around a link that will break, or should have
 ANOTHER_GATEWAY = 1.5  # hops that another gateway must be nearer
+UNPROVEN = 32.0  # hops: any gateway that proved to be one is nearer than one that did not
+TRIES = 4  # our choice: heartbeats in vain to one that did not, then another one gets its chance
+MOST_DOUBTS = 7  # times UNPROVEN, which is less than OFFLINE
 OFFLINE = 256.0  # hops: any gateway with internet is nearer than one without
 SEEN_S = 10.0  # our choice: an older place of a node does not tell the way to it
 NEAR = 2.0  # intervals: an older report that a neighbour hears a node shows no way to it
@@ -61,9 +65,15 @@ class BeaconRoutes(IRoutes):
         range_m: float,
         place_of: Callable[[int], HeardPlace | None],
         shared: bool,
+        may_be_gateway: Callable[[int], bool] = lambda _node: True,
     ) -> None:
-        """`place_of`: where a node was seen last; `shared`: whether the channel is."""
+        """`place_of`: where a node was seen last; `shared`: whether the channel is.
+
+        `may_be_gateway`: as for IMeshSeals.
+        """
         self._node_id = node_id
+        self._may_be_gateway = may_be_gateway
+        self.tried: Counter[int] = Counter()  # by gateway: heartbeats before its first proof
         self._is_gateway = is_gateway
         self._has_internet = is_gateway
         self._range_m = range_m
@@ -321,6 +331,9 @@ class BeaconRoutes(IRoutes):
         cost = self._hops_through(neighbour) + self.risk(neighbour)
         if self._is_offline(neighbour.beacon):
             cost += OFFLINE
+        gateway = neighbour.beacon.gateway
+        if not self._may_be_gateway(gateway):
+            cost += UNPROVEN * min(1 + self.tried[gateway] // TRIES, MOST_DOUBTS)
         return cost, neighbour.node != self.parent, -neighbour.heard_s, neighbour.node
 
     def _hops_through(self, neighbour: Neighbour) -> float:
