@@ -64,7 +64,7 @@ def test_two_routing_techniques_are_compared_and_one_run_is_drawn(run_example, t
 )
 def test_a_comparison_that_cannot_end_well_is_refused_at_once(monkeypatch, capsys, arguments, why):
     monkeypatch.setitem(sys.modules, "matplotlib", None)  # as if it were not installed
-    for name in [name for name in sys.modules if name.startswith("drone_mesh.report")]:
+    for name in [name for name in sys.modules if name.startswith("drone_mesh.lab.run_report")]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.syspath_prepend(str(ROOT / "examples"))
     monkeypatch.setattr(sys, "argv", ["own_routing.py", *arguments])

@@ -18,10 +18,10 @@ from drone_mesh.lab.healing_figures import (
 )
 from drone_mesh.lab.metrics import METRICS
 from drone_mesh.lab.results import Results, load_results, number
+from drone_mesh.lab.run_report.drawing import in_style, svg_element, svg_of_its_own
 from drone_mesh.lab.show import replay
 from drone_mesh.lab.store import EXPERIMENT
 from drone_mesh.lab.tables import Table, all_tables
-from drone_mesh.report.drawing import in_style, svg_element, svg_of_its_own
 
 _TEMPLATE = Path(__file__).resolve().parent / "report.html"
 PNG_DPI = 200

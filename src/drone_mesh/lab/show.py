@@ -108,8 +108,8 @@ def _print_story(shown: Replay) -> None:
 
 def _write_page(options: argparse.Namespace, shown: Replay, title: str) -> None:
     # Only a page needs matplotlib and jinja2.
-    from drone_mesh.report.page import render_page
-    from drone_mesh.report.story import tell_story
+    from drone_mesh.lab.run_report.page import render_page
+    from drone_mesh.lab.run_report.story import tell_story
 
     text = render_page(tell_story(shown.states, shown.record.events), title)
     try:

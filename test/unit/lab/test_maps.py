@@ -6,7 +6,7 @@ import math
 
 from matplotlib.figure import Figure
 
-from drone_mesh.report.maps import draw_map, draw_motion
+from drone_mesh.lab.run_report.maps import draw_map, draw_motion
 from drone_mesh.state.model import MeshStatus, NodeStatus
 
 PIXELS_PER_POINT = 100 / 72  # at the resolution of matplotlib's figures

@@ -10,8 +10,8 @@ from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.drone.roles import Role
-from drone_mesh.report.drawing import figure_with_rows, svg_of
-from drone_mesh.report.story import RunStory
+from drone_mesh.lab.run_report.drawing import figure_with_rows, svg_of
+from drone_mesh.lab.run_report.story import RunStory
 from drone_mesh.state.model import EventRecord
 from drone_mesh.state.outages import Outage
 from drone_mesh.view.palette import LIGHT

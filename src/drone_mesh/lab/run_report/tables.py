@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Sequence, Union
 
 from drone_mesh.communication.observer import MeshEventKind
-from drone_mesh.report.story import RunStory
+from drone_mesh.lab.run_report.story import RunStory
 from drone_mesh.state.model import EventRecord
 from drone_mesh.state.outages import MeshSample, Outage
 

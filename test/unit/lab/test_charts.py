@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from drone_mesh.report.charts import grouped, with_gaps
+from drone_mesh.lab.run_report.charts import grouped, with_gaps
 from drone_mesh.state.model import EventRecord
 
 

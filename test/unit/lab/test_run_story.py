@@ -9,10 +9,10 @@ from dataclasses import replace
 import pytest
 
 from drone_mesh.drone.roles import Role
-from drone_mesh.report.charts import outages_figure, phases_of
-from drone_mesh.report.page import ROWS_SHOWN, render_page
-from drone_mesh.report.story import NothingRecorded, RunStory, tell_story
-from drone_mesh.report.tables import key_numbers, outages_in_words, repair_rows, write_csv
+from drone_mesh.lab.run_report.charts import outages_figure, phases_of
+from drone_mesh.lab.run_report.page import ROWS_SHOWN, render_page
+from drone_mesh.lab.run_report.story import NothingRecorded, RunStory, tell_story
+from drone_mesh.lab.run_report.tables import key_numbers, outages_in_words, repair_rows, write_csv
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
 
 

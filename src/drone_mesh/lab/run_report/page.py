@@ -6,10 +6,10 @@ from pathlib import Path
 
 import jinja2
 
-from drone_mesh.report.charts import messages_figure, outages_figure, timeline_figure
-from drone_mesh.report.maps import maps_figure
-from drone_mesh.report.story import RunStory
-from drone_mesh.report.tables import (
+from drone_mesh.lab.run_report.charts import messages_figure, outages_figure, timeline_figure
+from drone_mesh.lab.run_report.maps import maps_figure
+from drone_mesh.lab.run_report.story import RunStory
+from drone_mesh.lab.run_report.tables import (
     EVENT_KINDS_LEFT_OUT,
     key_numbers,
     outages_in_words,

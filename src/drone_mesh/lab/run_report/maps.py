@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.transforms import ScaledTranslation
 
 from drone_mesh.drone.roles import Role
-from drone_mesh.report.drawing import figure_with_columns, svg_of
-from drone_mesh.report.story import RunStory
+from drone_mesh.lab.run_report.drawing import figure_with_columns, svg_of
+from drone_mesh.lab.run_report.story import RunStory
 from drone_mesh.state.condition import Condition, condition_of
 from drone_mesh.state.links import Link, LinkUse, links_by_use, shortest
 from drone_mesh.state.model import MeshStatus, footprint, position_is_known
