@@ -57,7 +57,7 @@ def test_a_drawn_layout_is_flown_by_the_drones_it_names_and_the_nearest_others(p
         ("Point", degrees(-3.0, -3.0), {"name": "the gate"}),
     )
     page.answer_held("#held-now")
-    load(page, tmp_path / "field.geojson", drawn)
+    load(page, tmp_path / "field.geojson", "\ufeff" + drawn)
     assert page.wait_for_held() == "field.geojson: 2 drones will leave"
     page.page.wait_for_selector("#toasts :text('ordered 2 of 2 drones')")
     page.wait_for("17 is there", lambda: (page.row(17, X), page.row(17, Y)) == ("3.0", "15.0"))
