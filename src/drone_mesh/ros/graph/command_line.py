@@ -27,6 +27,7 @@ from drone_mesh.ros.graph.orderly_stop import end_without_dead_master
 from drone_mesh.stopping import ends_as
 
 SPEAKER_VARIABLE = "DRONE_MESH_SPEAKER"  # the node of a launch file that says why it cannot start
+LAUNCHING = "drone_mesh.ros.graph.launching"  # the module that is roslaunch with an exit status
 FAILED = 2  # exit code: the tool could not do its work; 1 means that it did, with a bad result
 
 
@@ -125,6 +126,16 @@ def start_node(about: str | None, name: str, *, disable_signals: bool = False) -
     except rospy.ROSException as error:  # it is told to end while it registers
         print(f"{program}: {error}", file=sys.stderr)
         sys.exit(FAILED)
+
+
+def end_launch() -> None:
+    """End the roslaunch that started this node, which can never start, or it repeats that."""
+    parent = os.getppid()
+    command = Path(f"/proc/{parent}/cmdline").read_bytes()
+    if LAUNCHING.encode() in command:
+        os.kill(parent, signal.SIGUSR1)
+    elif b"/roslaunch\0" in command:
+        os.kill(parent, signal.SIGINT)
 
 
 def run_tool(name: str, work: Callable[[], int]) -> None:

@@ -7,6 +7,8 @@ uses this module: python3 -m drone_mesh.ros.graph.launching [what roslaunch acce
 
 from __future__ import annotations
 
+import os
+import signal
 import sys
 from typing import ClassVar
 
@@ -40,6 +42,12 @@ class WatchedLaunch(roslaunch.parent.ROSLaunchParent, ProcessListener):
             self.failed.append(process_name)
 
 
+def _end(_number: int, _frame: object) -> None:
+    """A node cannot start with its arguments."""
+    WatchedLaunch.failed.append("")
+    os.kill(os.getpid(), signal.SIGINT)
+
+
 def main() -> None:
     """Launch, and exit with 1 if a required node failed."""
     try:
@@ -49,6 +57,7 @@ def main() -> None:
                 check_namespace(word[len(NAMESPACE) :])
     except MeshError as error:
         sys.exit(f"roslaunch: {error}")
+    signal.signal(signal.SIGUSR1, _end)  # from command_line.end_launch
     roslaunch.parent.ROSLaunchParent = WatchedLaunch  # type: ignore[misc]
     roslaunch.main(["roslaunch", *sys.argv[1:]])
     if WatchedLaunch.failed:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+import sys
 import time
 from functools import partial
 from pathlib import Path
@@ -26,7 +27,7 @@ from drone_mesh.layouts import FIELD_CASE, GRID_CASE, Layouts
 from drone_mesh.msg import MeshEvent, MeshState, PacketSample
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.bounded_master import master_answers
-from drone_mesh.ros.graph.command_line import run_tool, start_node
+from drone_mesh.ros.graph.command_line import end_launch, start_node
 from drone_mesh.ros.graph.conversions import event_record, mesh_status
 from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
 from drone_mesh.ros.graph.master_watch import MasterWatch
@@ -35,12 +36,13 @@ from drone_mesh.ros.views.console_controls import RosControls
 from drone_mesh.ros.views.recording import Recording
 from drone_mesh.ros.views.state_source import OLD_STATE_S
 from drone_mesh.secret_file import read_secret
-from drone_mesh.stopping import StopRequest
+from drone_mesh.stopping import StopRequest, ends_as
 from drone_mesh.web import LOOPBACK
 from drone_mesh.web.listening import MAX_PORT
 
 CHECK_PERIOD_S = 1.0  # wall time between two checks of the master
 REPAIR_DEMO = "repair"
+WAS_UP = "~was_up"  # in this launch: what ails it now is no bad argument
 
 log = logging.getLogger(__name__)
 
@@ -134,7 +136,10 @@ def main() -> None:
     /DroneManager/casus (str): the file of the layouts; /drone_mesh/origin (str).
     """
     start_node(main.__doc__, "mesh_console")
-    run_tool("console", _run)
+    status = ends_as("console")(_run)()
+    if status == 1 and not rospy.has_param(WAS_UP):
+        end_launch()
+    sys.exit(status)
 
 
 def _run() -> int:
@@ -173,6 +178,7 @@ def _run() -> int:
     runner.start()
     if demo:
         print("the demonstration begins when a browser opens this page:", flush=True)
+    rospy.set_param(WAS_UP, True)
     print(token.greeting(address, runner.port), flush=True)
     reading = None if whole is None else Recording(Path(recording), whole, runner)
     try:
