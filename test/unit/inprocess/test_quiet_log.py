@@ -9,10 +9,11 @@ from scenarios import LAYOUTS
 
 from drone_mesh.communication.seals.keys import MeshKey
 from drone_mesh.inprocess import Network
-from drone_mesh.layouts import Layouts
+from drone_mesh.layouts import GRID_CASE, Layouts
 
 KEY = MeshKey(bytes(range(16)))
 ALL = sorted({*LAYOUTS.cases, *Layouts({}).cases})
+LARGE = [case for case in ALL if len(LAYOUTS.orders(case)) > 1]
 
 
 def fly_to(layout, seed, **options):
@@ -38,4 +39,13 @@ def assert_quiet(caplog):
 @pytest.mark.parametrize("radio", ["disc", "shared"])
 def test_the_default_run_has_a_quiet_log(radio, routing, key, caplog):
     fly_to(0, seed=2, radio=radio, routing=routing, key=key)
+    assert_quiet(caplog)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("layout", [case for case in ALL if case != GRID_CASE])
+@pytest.mark.parametrize(("radio", "key"), [("disc", None), ("disc", KEY), ("shared", None)])
+def test_every_layout_has_a_quiet_log(radio, key, layout, caplog):
+    for seed in range(4 if layout in LARGE else 1):
+        fly_to(layout, seed=seed, radio=radio, key=key)
     assert_quiet(caplog)

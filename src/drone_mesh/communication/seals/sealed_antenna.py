@@ -268,6 +268,7 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
         if answer is None:
             self.complaints.counts["challenges without an answer"] += 1
             return
+        self._unopened.pop(from_, None)  # it has a key of this mesh: only the handshake is slow
         self._send(answer)
         if self._present:
             present = messages.readdressed(self._present, from_)
