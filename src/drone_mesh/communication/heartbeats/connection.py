@@ -266,7 +266,7 @@ class GatewayConnection:
 
     def check(self, patience: float) -> None:
         """The part of the periodic check for a connected router."""
-        asked = self._relay_check.run(self.gateway, self.next_hop(), self.hops)
+        asked = self._relay_check.run(self.gateway, self.next_hop(), self.hops, self._answered_s)
         if self.proven(patience):
             return
         fresh_periods = self._parts.antenna.medium.place_periods

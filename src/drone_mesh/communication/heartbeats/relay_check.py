@@ -17,6 +17,7 @@ from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.place_requests import ask_for_place
 
 ASK_PERIODS = 3.0  # our choice, in check periods: one packet and its answer in half a minute
+WAIT_PERIODS = 0.9  # our choice, in check periods: a question that is younger may be answered yet
 LEAST_UNANSWERED = 2  # our choice: for a next hop chosen because another one swallowed packets
 
 _log = logging.getLogger(__name__)
@@ -27,13 +28,22 @@ class Swallowing:
 
     def __init__(self, check_period_s: float) -> None:
         self._ask_period_s = ASK_PERIODS * check_period_s
+        self._wait_s = WAIT_PERIODS * check_period_s
         self._answers = False  # whether this gateway knows its place and answers at all
         self._unanswered = 0
         self._asked_s = -math.inf
 
     def must_ask(self, now_s: float) -> bool:
-        """Whether to ask the gateway in this check: in each one after a question without answer."""
-        return self._unanswered > 0 or now_s - self._asked_s >= self._ask_period_s
+        """Whether to ask the gateway in this check: sooner after a question without answer.
+
+        Checks follow each other faster while the surroundings change.
+        """
+        wait_s = self._wait_s if self._unanswered else self._ask_period_s
+        return now_s - self._asked_s >= wait_s
+
+    def is_over(self, now_s: float, heartbeat_s: float) -> bool:
+        """Whether the latest question had its time, and the gateway answered a heartbeat since."""
+        return now_s - self._asked_s >= self._wait_s and heartbeat_s >= self._asked_s
 
     def asked(self, now_s: float) -> None:
         """The gateway was asked for its place."""
@@ -72,17 +82,18 @@ class RelayCheck:
         self.swallowing = Swallowing(parts.timing.check_period_s)
         self._detour = NO_ROUTE
 
-    def run(self, gateway: int, next_hop: int, hops: int) -> bool:
+    def run(self, gateway: int, next_hop: int, hops: int, heartbeat_s: float) -> bool:
         """Check the route to `gateway`; returns whether the gateway was asked for its place.
 
-        If no answers come, later heartbeats go through another neighbour.
+        `heartbeat_s`: when it last answered a heartbeat. If it answers only those, later ones go
+        through another neighbour.
         """
         parts, now_s = self._parts, self._parts.now_s
         sealed = parts.has_key
         relayed = next_hop not in (gateway, NO_ROUTE)
         if not (sealed and relayed and parts.routing.TAKES_SHORTCUTS):
             return False
-        if self.swallowing.noticed(hops):
+        if self.swallowing.noticed(hops) and self.swallowing.is_over(now_s, heartbeat_s):
             self._detours.avoid(next_hop, now_s + SWALLOWER_AVOIDED_S)
             _log.warning(
                 "node %d: node %d carries heartbeats to gateway %d, but no other packets",

@@ -8,8 +8,10 @@ import pytest
 from seal_rig import KEY, packet
 
 from drone_mesh.communication.data.ticket import TO_GATEWAY, TicketState
+from drone_mesh.communication.heartbeats import relay_check
 from drone_mesh.communication.heartbeats.detours import Detours
 from drone_mesh.communication.heartbeats.relay_check import RelayCheck, Swallowing
+from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.routing.child_table_tree import ChildTableTree
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.inprocess import Network
@@ -78,21 +80,39 @@ def test_without_another_route_a_node_keeps_its_connection():
         assert network.connected(2)
 
 
-def test_a_relay_that_swallowed_is_tried_again_after_ten_minutes():
+def check_of_node_8(now_s=100.0):
+    """Two questions to the gateway, through 1, have no answer; the second was sent at 90 s."""
     neighbours = SimpleNamespace(ids=lambda: (1, 2), hops_of=lambda _node: 1)
     detours = Detours(neighbours)
     parts = SimpleNamespace(
         node_id=8,
-        now_s=100.0,
+        now_s=now_s,
         timing=MeshTiming(),
         has_key=True,
         routing=ChildTableTree(),
     )
     check = RelayCheck(parts, detours)
     check.swallowing.answered()
-    for _ in range(2):
-        check.swallowing.asked(90.0)
-    check.run(gateway=0, next_hop=1, hops=2)
+    for at_s in (80.0, 90.0):
+        check.swallowing.asked(at_s)
+    return check, detours
+
+
+@pytest.mark.parametrize(
+    ("now_s", "heartbeat_s"),
+    [(100.0, 89.0), (93.0, 91.0)],
+    ids=["heartbeats are not answered either", "the answer may be on its way"],
+)
+def test_a_relay_is_not_suspected_while(now_s, heartbeat_s, monkeypatch):
+    monkeypatch.setattr(relay_check, "ask_for_place", lambda _parts, _gateway: None)
+    check, _detours = check_of_node_8(now_s)
+    check.run(gateway=0, next_hop=1, hops=2, heartbeat_s=heartbeat_s)
+    assert check.take_detour() == NO_ROUTE
+
+
+def test_a_relay_that_swallowed_is_tried_again_after_ten_minutes():
+    check, detours = check_of_node_8()
+    check.run(gateway=0, next_hop=1, hops=2, heartbeat_s=91.0)
     assert check.take_detour() == 2
     assert detours.avoids(1, 699.0)
     assert not detours.avoids(1, 701.0)
