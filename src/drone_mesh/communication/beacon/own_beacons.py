@@ -26,7 +26,6 @@ class OwnBeacons:
         self._frame, self._routes, self._below, self._step_m = basics.frame, routes, below, step_m
         self.room = messages.BODY_BYTES - basics.seals.reserved_bytes(MessageType.BEACON)
         self.asks = True  # whether the next one asks for those of the neighbours
-        self.gateway_place: Location | None = None  # what the latest beacon with one said
         self._told_place: Location | None = None  # what this node's beacons have said
         self._sent = 0
         self._shown: tuple[float, Motion] | None = None  # what the others expect of this drone
@@ -79,7 +78,7 @@ class OwnBeacons:
 
     def _next_gateway_place(self) -> Location | None:
         """The gateway's place, if it is this beacon's turn to spread it."""
-        place, told = self.gateway_place, self._told_place
+        place, told = self._routes.gateway_place, self._told_place
         if self._routes.is_root or place is None:
             return None
         every = GATEWAY_PLACE_EVERY

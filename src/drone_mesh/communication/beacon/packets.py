@@ -15,7 +15,7 @@ Velocity = Tuple[float, float, float]  # m/s: north, east, up, as in a Location
 
 ANCESTORS = 3  # beyond the parent; more do not fit, fewer leave loops among moving nodes
 SEQUENCE_NUMBERS = 256
-_INTERVAL_S = 0.05  # unit of an interval
+INTERVAL_S = 0.05  # unit of an interval
 _PLACE_M = 0.1  # unit of a place
 _WRAP = 2**16
 _FASTEST_M_S = 50.0  # a velocity is coded by its square root, so slow ones are precise
@@ -152,7 +152,7 @@ class Beacon(NamedTuple):
             flags |= _HAS_GATEWAY_PLACE
             body += _GATEWAY_PLACE.pack(*_units(self.gateway_place))
         listed = self.below.list_bytes()
-        interval = max(1, min(_LONGEST, math.ceil(self.interval_s / _INTERVAL_S)))
+        interval = max(1, min(_LONGEST, math.ceil(self.interval_s / INTERVAL_S)))
         head = _HEAD.pack(
             flags | len(listed),
             interval | _OFFLINE if self.offline else interval,
@@ -221,7 +221,7 @@ class Beacon(NamedTuple):
             hops,
             parent,
             tuple(ancestors),
-            max(1, interval & _LONGEST) * _INTERVAL_S,
+            max(1, interval & _LONGEST) * INTERVAL_S,
             motion,
             gateway_place,
             digest,

@@ -196,7 +196,7 @@ class BeaconPlane(IControlPlane):
         if before not in (gateway, NO_ROUTE):
             self._basics.report(MeshEventKind.GATEWAY_CHANGED, gateway)
             self._basics.places.forget_gateway()
-            self._own.gateway_place = None
+            self._routes.gateway_place = None
             self._proofs.begin()
 
     def _show(self) -> None:
@@ -261,6 +261,9 @@ class BeaconPlane(IControlPlane):
             reason = "a neighbour's place that is out of reach"
             self._basics.complaints.add(reason, beacon.motion.place.in_words(), now_s)
             beacon = beacon._replace(motion=None)
+        longest_s = self._trickle.longest_s
+        if beacon.interval_s > longest_s:  # who promises it could fall silent and stay the way
+            beacon = beacon._replace(interval_s=longest_s)
         is_quiet = now_s < self._look_s and not routes.is_news(creator, beacon)
         self._below.heard(creator, beacon)
         is_new = routes.heard(creator, beacon)
@@ -311,7 +314,7 @@ class BeaconPlane(IControlPlane):
             return
         if place is None or not self._basics.may_be_at(place, gateway=True, says_so=is_gateway):
             return
-        self._own.gateway_place = place
+        self._routes.gateway_place = place
         if not self._proofs.has_key:
             places.update_gateway(place, now_s)
             return

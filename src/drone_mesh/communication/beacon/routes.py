@@ -22,6 +22,7 @@ from drone_mesh.communication.beacon.packets import (
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.neighbours import HeardPlace
 from drone_mesh.communication.ways import IRoutes
+from drone_mesh.drone.location import Location
 
 _WAY_UP = itemgetter(
     *map(Beacon._fields.index, ("gateway", "hops", "parent", "ancestors", "offline"))
@@ -34,6 +35,7 @@ BACK = 2  # sequence numbers: a new neighbour that is further behind the others 
 PROVEN_S = 12.0  # our choice: a router is connected for so long after its parent has heard it
 STALE = 5.0  # intervals: a neighbour whose number was not a new one for longer leads nowhere
 REACH = 0.97  # of the range: two nodes further apart are expected to lose each other
+NEEDS = 1.05  # of the range: a link that is longer is luck, and places are rounded
 LEAVES, GONE = 1.0, 3.0  # hops that a detour may cost around a link that will break, or should have
 ANOTHER_GATEWAY = 1.5  # hops that another gateway must be nearer
 UNPROVEN = 32.0  # hops: any gateway that proved to be one is nearer than one that did not
@@ -87,6 +89,7 @@ class BeaconRoutes(IRoutes):
         self._own_number = 0  # of the latest beacon as a gateway
         self.proved_s = -math.inf  # when the parent, at that time, last proved that it hears
         self.motion: Motion | None = None  # this node's own
+        self.gateway_place: Location | None = None  # what the latest beacon with one said
         self.now_s = 0.0
         # By neighbour and gateway: the newest number, and when it came. A number counts only for
         # the neighbour that sent it, so a false one makes no other neighbour look old.
@@ -337,11 +340,20 @@ class BeaconRoutes(IRoutes):
         return cost, neighbour.node != self.parent, -neighbour.heard_s, neighbour.node
 
     def _hops_through(self, neighbour: Neighbour) -> float:
-        """What the way up through a neighbour costs at least, without its own link."""
-        beacon = neighbour.beacon
-        if self.gateway in (NO_ROUTE, beacon.gateway):
+        """What the way up through a neighbour costs at least, without its own link.
+
+        It has as many hops as its distance needs at least, whatever the neighbour claims; one that
+        tells no place, or one out of reach, counts as if it were here.
+        """
+        beacon, place = neighbour.beacon, self.gateway_place
+        if self.gateway not in (NO_ROUTE, beacon.gateway):
+            return beacon.hops + ANOTHER_GATEWAY
+        if place is None or self.motion is None or self.gateway == NO_ROUTE:
             return beacon.hops
-        return beacon.hops + ANOTHER_GATEWAY
+        errs = neighbour.motion is None or neighbour.apart_m > WRONG * self._range_m
+        from_ = self.motion if errs or neighbour.motion is None else neighbour.motion
+        needed = from_.place.distance_m(place) / (NEEDS * self._range_m)
+        return max(beacon.hops, math.ceil(needed))
 
     def risk(self, neighbour: Neighbour) -> float:
         """What losses on the link to a neighbour, or its expected end (Su et al. 2001), cost."""

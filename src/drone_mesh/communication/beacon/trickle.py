@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import random
 
+from drone_mesh.communication.beacon.packets import INTERVAL_S
 from drone_mesh.communication.medium import Medium
 
 HOPS_PER_BEACON = 400  # our choice: a beacon takes half a hop, and ten neighbours send as many
@@ -22,6 +23,7 @@ class Trickle:
         self._rng = rng
         self._least_s = max(LEAST_S, HOPS_PER_BEACON * medium.hop_s)
         self._most_s = max(AT_REST_S, 1.5 * self._least_s)
+        self.longest_s = self._most_s + INTERVAL_S  # that any node says, as beacons round it up
         self._soon_s = SOON_HOPS * medium.hop_s
         self._sent_s = -math.inf
         self._changed = True  # during this interval

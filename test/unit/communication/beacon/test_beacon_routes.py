@@ -314,3 +314,37 @@ def test_other_threads_may_ask_for_ways_while_beacons_come_in(routes):
         asking.join()
         sys.setswitchinterval(before)
     assert not errors
+
+
+def located(routes, own_x, gateway_x=0.0):
+    routes.motion = Motion(Location(0.0, own_x, 0.0), STILL)
+    routes.gateway, routes.gateway_place = 0, Location(0.0, gateway_x, 0.0)
+    return routes
+
+
+def test_a_neighbour_has_as_many_hops_as_its_distance_from_the_gateway_needs(routes):
+    """The range is 10 m; 25 m from the gateway nobody is one hop from it."""
+    located(routes, 28.0)
+    routes.heard(1, beacon(hops=2, parent=5, x=20.0))
+    routes.choose()
+    routes.heard(2, beacon(hops=1, x=25.0))
+    assert not routes.choose()
+    assert routes.parent == 1
+    routes.heard(3, beacon(hops=1, x=20.0))  # claims two at most, which is no better
+    assert not routes.choose()
+
+
+@pytest.mark.parametrize("x", [None, 10.0], ids=["no place", "a place out of reach"])
+def test_a_neighbour_that_tells_no_place_of_use_counts_as_if_it_were_here(routes, x):
+    located(routes, 22.0)
+    routes.heard(1, beacon(hops=2, parent=5, x=15.0))
+    routes.choose()
+    routes.heard(2, beacon(hops=1, x=x))
+    assert not routes.choose()
+
+
+def test_a_way_that_seems_too_short_is_taken_where_there_is_no_other(routes):
+    located(routes, 28.0)
+    routes.heard(2, beacon(hops=1, x=25.0))
+    routes.choose()
+    assert (routes.parent, routes.hops) == (2, 2)

@@ -6,6 +6,7 @@ import random
 
 import pytest
 
+from drone_mesh.communication.beacon.packets import NO_ANCESTORS, Beacon
 from drone_mesh.communication.beacon.trickle import AT_REST_S, Trickle
 from drone_mesh.communication.medium import Medium
 
@@ -23,6 +24,15 @@ def test_the_interval_grows_to_a_bound_that_still_shows_a_dead_parent_in_time(tr
     for _ in range(10):
         trickle.sent(trickle.due_s)
     assert trickle.interval_s == AT_REST_S
+
+
+def test_a_beacon_of_the_longest_interval_says_no_longer_one(trickle):
+    for _ in range(10):
+        trickle.sent(trickle.due_s)
+    body = Beacon(0, 1, 1, 0, NO_ANCESTORS, trickle.interval_s).to_body(27)
+    said = Beacon.from_body(body, None)
+    assert said is not None
+    assert said.interval_s <= trickle.longest_s
 
 
 def test_an_interval_is_a_third_longer_than_the_one_before_it(trickle):
