@@ -3,12 +3,10 @@
 
 from __future__ import annotations
 
-import itertools
 import json
 import os
 import re
 import signal
-import struct
 import subprocess
 import sys
 import tempfile
@@ -24,12 +22,9 @@ import rospy
 import rostest
 from rostest_support import WALL_LIMIT_S, call, receives, wait_for
 
-from drone_mesh.drone.roles import Role
 from drone_mesh.msg import HostReport, MeshState, NodeState
-from drone_mesh.ros.graph.conversions import ros_time, state_msg
 from drone_mesh.ros.views.bag import playable, read_states, topics_in_bag
 from drone_mesh.srv import PowerSwitch, SetSpeed
-from drone_mesh.state.model import MeshStatus, NodeStatus
 
 TOOLS = ("status", "snapshot", "report")
 NODES = (
@@ -89,25 +84,6 @@ def record_in_an_older_definition(path: Path) -> None:
     node = older["drone_mesh/NodeState"](id=4, connected=True, on=True, position=[1.0, 2.0, 0.0])
     with rosbag.Bag(str(path), "w") as bag:
         bag.write("/mesh/state", older["drone_mesh/MeshState"](nodes=[node]))
-
-
-def flights(seconds: int) -> list[MeshStatus]:
-    """A gateway, and a router that flies 1 m/s to the east."""
-    gateway = NodeStatus(0, role=Role.GATEWAY, connected=True, on=True, position=(0.0, 0.0, 0.0))
-    return [
-        MeshStatus(
-            float(s),
-            [gateway, NodeStatus(3, connected=True, on=True, position=(float(s), 0.0, 5.0))],
-        )
-        for s in range(1, seconds + 1)
-    ]
-
-
-def record_runs(path: Path, *runs: list[MeshStatus]) -> None:
-    """A bag of small chunks, recorded over restarts of the simulation."""
-    with rosbag.Bag(str(path), "w", chunk_threshold=4096) as bag:
-        for status in itertools.chain(*runs):
-            bag.write("/mesh/state", state_msg(status), ros_time(status.stamp_s))
 
 
 def recorder_listens() -> bool:
@@ -313,58 +289,6 @@ class ToolsTest(unittest.TestCase):
         events = (self.folder / "events.csv").read_text(encoding="utf-8")
         self.assertTrue("<td>2 off</td>" in page, f"the page lacks the cause of the loss: {events}")
         self.assertIn("flight decided", events)
-
-    def test_5_what_can_be_read_of_a_damaged_recording_is_shown(self) -> None:
-        bag = self.folder / "run.bag"
-        record_runs(bag, flights(100))
-        whole = bag.read_bytes()
-        middle = whole.index(struct.pack("<3f", 50.0, 0.0, 5.0))
-        index = whole.index(b"op=\x04", middle)
-        for damage in (bytes(400), bytes(b ^ 0x55 for b in whole[middle : middle + 400])):
-            bag.write_bytes(whole[:middle] + damage + whole[middle + 400 :])
-            self._look_into_damaged(bag)
-        bag.write_bytes(whole[: index - 4] + bytes(40) + whole[index + 36 :])
-        self._look_into_damaged(bag)
-        record = self.folder / "flight.jsonl"
-        lines = [json.loads(line) for line in gateway_record()]
-        del lines[2]["events"], lines[3]["nodes"][1]["hops"]
-        record.write_text("\ufeff" + "".join(f"{json.dumps(line)}\n" for line in lines))
-        self._look_into_damaged(record)
-
-    def _look_into_damaged(self, recording: Path) -> None:
-        tools = (
-            ("status", "--bag", str(recording)),
-            ("snapshot", "--bag", str(recording), f"{self.folder}/damaged.png"),
-            ("report", str(recording), "-o", f"{self.folder}/damaged.html"),
-            ("flight_trace", str(recording), f"{self.folder}/damaged.csv"),
-        )
-        for tool in tools:
-            finished = run(*tool)
-            said = finished.stderr.splitlines()[-1]
-            self.assertRegex(said, rf"^{tool[0]}: .*: damaged at \d+\.0 s( to \d+\.0 s)?: \d+ mess")
-            self.assertNotIn("Traceback", finished.stderr)
-            self.assertEqual(finished.returncode, 2)
-            self.assertTrue(finished.stdout, tool)
-        for name in ("damaged.png", "damaged.html", "damaged.csv"):
-            (self.folder / name).unlink()
-
-    def test_6_of_several_runs_in_one_recording_one_is_taken_and_told(self) -> None:
-        bag, trace = self.folder / "runs.bag", self.folder / "runs.csv"
-        record_runs(bag, flights(100), flights(30))
-        last = run("status", "--bag", str(bag), "--at", "5")
-        self.assertEqual(last.returncode, 0, last.stderr)
-        self.assertIn("contains 2 runs", last.stderr)
-        first = run("status", "--bag", str(bag), "--at", "99", "--run", "1")
-        self.assertEqual((first.returncode, first.stderr), (0, ""))
-        self.assertIn(" 99.0, 0.0, 5.0 ", first.stdout)
-        self.assertIn("ends at 30.0 s", run("status", "--bag", str(bag), "--at", "99").stderr)
-        self.assertIn("2 drones, 29.0 s", run("flight_trace", str(bag), str(trace)).stdout)
-        self.assertEqual(len(trace.read_text().splitlines()), 61)
-        written = run("flight_trace", str(bag), str(trace), "--run", "1")
-        self.assertIn("2 drones, 99.0 s", written.stdout, written.stderr)
-        missing = run("flight_trace", str(bag), str(trace), "--run", "3")
-        self.assertEqual(missing.returncode, 2)
-        self.assertIn("no run 3; it contains 2", missing.stderr)
 
     def test_4_what_is_no_bag_is_refused_in_one_line(self) -> None:
         nonsense = self.folder / "nonsense.bag"
