@@ -49,6 +49,10 @@ class IInProcessAir(abc.ABC):
     on_packet: Callable[[bytes], object] = len
     """Called with each packet that a mesh hands to its antenna, except on the disc, which has
     `carries`; set by experiments."""
+    hears: Callable[[int, int], bool] | None = None
+    """Whether the second node hears the first one, if they are in range; None: every link works
+    both ways. Packets on the disc follow it, those on other airs their link model. Set by
+    experiments."""
 
     @property
     @abc.abstractmethod

@@ -55,8 +55,6 @@ class InProcessAir(IInProcessAir):
         self.jammed = False  # a jammer, heard everywhere: no packet arrives; set by experiments
         # Whether two places within range hear each other; set if there are obstacles.
         self.sees: Callable[[Location, Location], bool] | None = None
-        # Whether the second node hears the first one, if they are in range; set for one-way links.
-        self.hears: Callable[[int, int], bool] | None = None
         # Whether a packet may arrive at all; set by experiments that count packets or lose some.
         self.carries: Callable[[bytes], bool] | None = None
         # The links between nodes at rest: looked up for each packet, and changed only when a node

@@ -62,6 +62,12 @@ class Pick(Part):
         return self
 
 
+class Broken(Pick):
+    """Drones whose radios send, or receive, nothing for a while."""
+
+    for_s: Optional[Above0] = None
+
+
 class Link(Part):
     """One link between two drones, or a number of random ones."""
 
@@ -183,14 +189,16 @@ class Fault(Part):
     """One event in the network, at a time or when a condition holds."""
 
     ACTIONS: ClassVar[Tuple[str, ...]] = (
-        "kill", "revive", "cut_link", "jam", "gateway_off", "loss", "battery", "churn", "order",
-        "layouts", "send", "load", "wind",
+        "kill", "revive", "mute", "deaf", "cut_link", "jam", "gateway_off", "loss", "battery",
+        "churn", "order", "layouts", "send", "load", "wind",
     )  # fmt: skip
 
     at_s: Optional[AtLeast0] = None
     when: Optional[str] = None
     kill: Optional[Pick] = None
     revive: Optional[Pick] = None
+    mute: Optional[Broken] = None
+    deaf: Optional[Broken] = None
     cut_link: Optional[Link] = None
     jam: Optional[Jam] = None
     gateway_off: Optional[GatewayOff] = None

@@ -14,6 +14,7 @@ from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.radio import InProcessAir
 from drone_mesh.inprocess.shared_air import SharedAir
 from drone_mesh.lab.faults import Jam
+from drone_mesh.lab.one_way import OneWay
 
 
 @dataclass
@@ -35,6 +36,7 @@ class Impairments:
     network: Network
     stream: Callable[[str], random.Random]
     loss: float
+    one_way: OneWay
     traffic: dict[int, Traffic] = field(default_factory=dict)  # by type
     lost: int = 0
     jams: list[Jam] = field(default_factory=list)
@@ -45,6 +47,7 @@ class Impairments:
     def __post_init__(self) -> None:
         self._links: dict[tuple[int, int], random.Random] = {}
         air = self.network.air
+        self.one_way.put(self.network)
         if isinstance(air, InProcessAir):
             air.carries = self.carries
         else:

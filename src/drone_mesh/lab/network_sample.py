@@ -51,13 +51,21 @@ def _leads(network: Network, start: int, leads: dict[int, bool]) -> bool:
         step = nodes[node_id].component.get_route_to_gateway()
         if step == NO_ROUTE or step not in nodes or not nodes[step].antenna.powered:
             return False
-        if step not in network.air.in_range(node_id):
+        if not _both_ways(network, node_id, step):
             return False
         node_id = step
     result = leads[node_id]
     for passed in chain:
         leads[passed] = result
     return result
+
+
+def _both_ways(network: Network, one: int, other: int) -> bool:
+    """Whether each of the two nodes could hear the other one."""
+    hears = network.air.hears
+    if other not in network.air.in_range(one):
+        return False
+    return hears is None or (hears(one, other) and hears(other, one))
 
 
 def route_hops(network: Network, served: frozenset[int]) -> dict[int, int]:
@@ -81,7 +89,11 @@ def physical_graph(network: Network) -> Graph:
     alive = set(powered)
     return Graph(
         {
-            node_id: [other for other in network.air.in_range(node_id) if other in alive]
+            node_id: [
+                other
+                for other in network.air.in_range(node_id)
+                if other in alive and _both_ways(network, node_id, other)
+            ]
             for node_id in powered
         }
     )

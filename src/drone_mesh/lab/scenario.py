@@ -85,6 +85,7 @@ class Radio(PartOfKind):
         "shared": frozenset({"rate", "links", "loss"}),
         "chips": frozenset({"rate", "links", "loss"}),
     }
+    OF_ALL_KINDS = frozenset({"asymmetry_db"})
 
     kind: Literal["disc", "shared", "chips"] = "disc"
     rate: Optional[Literal["250k", "1M", "2M"]] = None  # not disc: of the air; default: 250k
@@ -92,6 +93,7 @@ class Radio(PartOfKind):
     loss: Share = 0.0  # disc: of the packets on each link; others: of all frames
     delay_s: AtLeast0 = 0.002
     jitter_s: AtLeast0 = 0.0
+    asymmetry_db: AtLeast0 = 0.0  # each radio sends with up to so much less power, drawn
 
 
 class MotionSettings(PartOfKind):
@@ -225,7 +227,7 @@ class Sequence(Part):
         "killed_in_negotiation", "killed_in_flight",
     )  # fmt: skip
     INCIDENTS: ClassVar[Tuple[str, ...]] = (
-        *DEATHS, "silent_for_a_while", "links_cut", "restarted_cut_off",
+        *DEATHS, "silent_for_a_while", "links_cut", "restarted_cut_off", "goes_mute", "goes_deaf",
     )  # fmt: skip
 
     drones: Annotated[List[NodeId], Field(min_length=2, max_length=2)] = [8, 60]  # least, most

@@ -9,6 +9,7 @@ from drone_mesh.communication.seals.keys import Keys, MeshKey
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.positions import PositionErrors
+from drone_mesh.lab.one_way import OneWay
 from drone_mesh.lab.places import StartPoint, draw_places
 from drone_mesh.lab.propagation import obstacles_of
 from drone_mesh.lab.scenario import Scenario
@@ -19,7 +20,9 @@ from drone_mesh.nrf24.settings import DEFAULT_RATE, data_rate
 _KEY = MeshKey(b"the key of a lab")
 
 
-def network_of(scenario: Scenario, streams: Streams, places: list[StartPoint]) -> Network:
+def network_of(
+    scenario: Scenario, streams: Streams, places: list[StartPoint], one_way: OneWay
+) -> Network:
     gateways = {place.node_id for place in places if place.gateway}
 
     def key_of(node: int) -> Keys:
@@ -38,7 +41,7 @@ def network_of(scenario: Scenario, streams: Streams, places: list[StartPoint]) -
         ),
         key=key_of if scenario.key else None,
         positions=PositionErrors(**scenario.positions.model_dump()),
-        **_radio(scenario, streams),
+        **_radio(scenario, streams, one_way),
     )
     grounded = streams.of("grounded")
     for place in places:
@@ -56,7 +59,7 @@ def places_of(scenario: Scenario, streams: Streams) -> list[StartPoint]:
     return draw_places(scenario.layout, scenario.range_m, streams.of("layout"), obstacles)
 
 
-def _radio(scenario: Scenario, streams: Streams) -> dict[str, Any]:
+def _radio(scenario: Scenario, streams: Streams, one_way: OneWay) -> dict[str, Any]:
     """The arguments of the network about its medium."""
     radio, part = scenario.radio, scenario.obstacles
     if radio.kind == "disc":
@@ -65,19 +68,21 @@ def _radio(scenario: Scenario, streams: Streams) -> dict[str, Any]:
     return {
         "radio": radio.kind,
         "rate": rate,
-        "links": _links(scenario, rate, streams),
+        "links": _links(scenario, rate, streams, one_way),
         "fading": part.fading,
         "rician_k_db": part.rician_k_db,
     }
 
 
-def _links(scenario: Scenario, rate: str, streams: Streams) -> LinkModel:
+def _links(scenario: Scenario, rate: str, streams: Streams, one_way: OneWay) -> LinkModel:
     """Which frames arrive undamaged if no other frame is on the air."""
     links: LinkModel = IdealDisc(scenario.range_m)
     if scenario.radio.links == "distance" or scenario.obstacles.fading != "none":
         links = LogDistance.with_edge_at(
             scenario.range_m, streams.of("links"), bits_per_s=data_rate(rate).value
         )
+    if one_way.occurs:
+        links = ScriptedLoss(links, one_way.loses)
     if scenario.radio.loss:
         rng = streams.of("frames")
         return ScriptedLoss(links, lambda _hop: rng.random() < scenario.radio.loss)

@@ -77,6 +77,8 @@ class SequenceRun(Simulation):
         """Also: links to nodes with a path to the gateway still work, wherever the drone flies."""
         air = self.network.air
         assert isinstance(air, InProcessAir)
+        if node in self.impairments.one_way.mute | self.impairments.one_way.deaf:
+            return False
         helpers = physical_graph(self.network).hops_from([GATEWAY], {node})
         return super().is_able(node) and not all(air.is_cut(node, other) for other in helpers)
 
@@ -166,6 +168,22 @@ class SequenceRun(Simulation):
         for node in self._rng.sample(alive, min(self._rng.randint(1, 3), len(alive))):
             self.timeline.note("restart", [node])
             self.network.restart(node)
+
+    def _goes_mute(self) -> Times:
+        """Nobody hears a router any more, for a while or for good."""
+        return self._breaks("mute", self.impairments.one_way.mute)
+
+    def _goes_deaf(self) -> Times:
+        """A router hears nobody any more, for a while or for good."""
+        return self._breaks("deaf", self.impairments.one_way.deaf)
+
+    def _breaks(self, what: str, broken: set[int]) -> Times:
+        node = self._rng.choice(self._alive())
+        with self.timeline.disruption(what, [node]):
+            broken.add(node)
+        if self._rng.random() < 0.5:
+            yield from self._passing(self._rng.uniform(20.0, 200.0))
+            broken.discard(node)
 
     def _killed_at(self, kind: MeshEventKind, after_s: float) -> Times:
         """Kill the first router with an event of this kind, shortly after it."""

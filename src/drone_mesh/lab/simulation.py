@@ -27,6 +27,7 @@ from drone_mesh.lab.network_sample import (
     route_hops,
     sample_of,
 )
+from drone_mesh.lab.one_way import OneWay
 from drone_mesh.lab.probes import ProbeSender
 from drone_mesh.lab.propagation import ChannelAir, obstacles_of, put_obstacles
 from drone_mesh.lab.record import AirFigures, Place, RunRecord, ServiceGap, Topology
@@ -52,9 +53,10 @@ class Simulation:
         """Raises ConfigurationError for a layout that cannot be drawn."""
         self.scenario = scenario
         places = places_of(scenario, streams)
-        self.network = network_of(scenario, streams, places)
+        one_way = OneWay(scenario, streams)
+        self.network = network_of(scenario, streams, places, one_way)
         self.simulating_s = 0.0  # processor time in the network, without the lab's own
-        self.impairments = Impairments(self.network, streams.of, scenario.radio.loss)
+        self.impairments = Impairments(self.network, streams.of, scenario.radio.loss, one_way)
         self._planner = put_obstacles(self.network, self.impairments, scenario)
         self.flights = Flights(self.network)
         self.timeline = Timeline(

@@ -22,7 +22,7 @@ from drone_mesh.lab.propagation import put_noise
 from drone_mesh.lab.scenario import Scenario
 from drone_mesh.lab.streams import Streams
 
-HEALING_STARTS_WITH = frozenset({"kill", "cut_link", "jam", "gateway_off"})
+HEALING_STARTS_WITH = frozenset({"kill", "mute", "deaf", "cut_link", "jam", "gateway_off"})
 """Faults from which the time to heal is measured."""
 
 
@@ -162,6 +162,18 @@ class Timeline:
     def _revive(self, fault: Fault, rng: random.Random) -> list[int]:
         nodes = pick_drones(fault.what, False, self._network, self._impairments, rng)
         self._power(nodes, True)
+        return nodes
+
+    def _mute(self, fault: Fault, rng: random.Random) -> list[int]:
+        return self._break(fault, rng, self._impairments.one_way.mute)
+
+    def _deaf(self, fault: Fault, rng: random.Random) -> list[int]:
+        return self._break(fault, rng, self._impairments.one_way.deaf)
+
+    def _break(self, fault: Fault, rng: random.Random, broken: set[int]) -> list[int]:
+        nodes = pick_drones(fault.what, True, self._network, self._impairments, rng)
+        broken.update(nodes)
+        self._after(fault.what.for_s, lambda _: broken.difference_update(nodes))
         return nodes
 
     def _cut_link(self, fault: Fault, rng: random.Random) -> list[int]:

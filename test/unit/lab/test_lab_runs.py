@@ -215,6 +215,56 @@ def test_a_cut_link_is_mended_after_its_time() -> None:
     assert shares[50.0] == 1.0
 
 
+@pytest.mark.parametrize("broken", ["mute", "deaf"])
+@pytest.mark.parametrize("radio", ["disc", "shared", "chips"])
+@pytest.mark.parametrize("routing", ["child_table_tree", "beacon"])
+def test_a_radio_that_is_mute_or_deaf_for_a_while_is_served_by_nobody_meanwhile(
+    broken: str, radio: str, routing: str
+) -> None:
+    fault = {"at_s": 15, broken: {"ids": [2], "for_s": 40}}
+    layout, kind = {"kind": "line", "drones": 3}, {"kind": radio}
+    record = run(
+        faults=[fault], layout=layout, radio=kind, routing=routing, duration_s=100,
+        grounded_share=1.0,
+    )  # fmt: skip
+    served = {sample.now_s: sample.served for sample in record.samples}
+    assert served[14.0] == served[100.0] == {1, 2}
+    assert all(served[at_s] == {1} for at_s in map(float, range(16, 55)))
+    connected = {sample.now_s: sample.connected for sample in record.samples}
+    assert connected[54.0] == {1}
+    assert measure_all(record)["split"] == 1
+
+
+@pytest.mark.parametrize("kind", ["disc", "shared", "chips"])
+def test_with_asymmetry_some_links_work_one_way_only_and_no_router_counts_on_them(
+    kind: str,
+) -> None:
+    content = {
+        "layout": {"kind": "line", "drones": 6},
+        "radio": {"kind": kind, "asymmetry_db": 8},
+        "routing": "beacon",
+        "grounded_share": 1.0,
+        "duration_s": 30,
+    }
+    simulation = Simulation(Scenario.model_validate(content), Streams(1, 0))
+    hears, record = simulation.network.air.hears, simulation.run()
+    assert hears is not None
+    links = [(node, node + 1) for node in range(5)]
+    both = [link for link in links if hears(*link) and hears(*link[::-1])]
+    one_way = [link for link in links if hears(*link) != hears(*link[::-1])]
+    assert both
+    assert one_way
+    reached = record.end.graph.hops_from([0]).keys()
+    assert record.samples[-1].connected == reached - {0}
+    assert record.samples[-1].served == reached - {0}
+
+
+def test_without_asymmetry_the_air_asks_nobody_who_hears_whom() -> None:
+    content = {"layout": {"kind": "line", "drones": 2}, "radio": {"kind": "shared"}}
+    simulation = Simulation(Scenario.model_validate(content), Streams(1, 0))
+    assert simulation.network.air.hears is None
+
+
 def test_a_jammed_circle_loses_packets_only_while_it_is_jammed() -> None:
     faults = [{"at_s": 12, "jam": {"center": [24, 0], "radius_m": 4, "for_s": 10}}]
     simulation = Simulation(

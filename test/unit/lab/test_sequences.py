@@ -93,3 +93,19 @@ def test_an_unknown_incident_is_refused(tmp_path):
     path.write_text("name: x\nbase:\n  sequence: {incidents: [flood]}\n", encoding="utf-8")
     with pytest.raises(ConfigurationError, match=r"line 3.*unknown incident flood: use cut_"):
         load_experiment(path)
+
+
+@pytest.mark.parametrize("routing", ["beacon", "child_table_tree"])
+@pytest.mark.parametrize("number", [0, 2, 4])
+def test_mute_and_deaf_radios_make_no_repair_harmful_and_no_drone_fly_for_ever(number, routing):
+    incidents = ["goes_mute", "goes_deaf"]
+    content = {
+        "sequence": {"incidents": incidents, "drones": [8, 14]},
+        "sample_s": 2,
+        "routing": routing,
+    }
+    record = SequenceRun(Scenario.model_validate(content), Streams(0, number)).run()
+    assert {item.action for item in record.happened} & {"mute", "deaf"}
+    assert not harm(record)
+    broken = {node for item in record.happened for node in item.nodes}
+    assert set(record.left_behind) <= broken  # nobody else is cut off for that
