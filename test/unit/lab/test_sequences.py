@@ -8,7 +8,13 @@ import pytest
 
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.lab.experiment import load_experiment
-from drone_mesh.lab.metrics.harm import harm, left_able, left_placeless, resting_close
+from drone_mesh.lab.metrics.harm import (
+    flew_connected,
+    harm,
+    left_able,
+    left_placeless,
+    resting_close,
+)
 from drone_mesh.lab.plan import Plan
 from drone_mesh.lab.scenario import Scenario
 from drone_mesh.lab.sequence import SequenceRun, run_sequence
@@ -97,7 +103,7 @@ def test_an_unknown_incident_is_refused(tmp_path):
 
 @pytest.mark.parametrize("routing", ["beacon", "child_table_tree"])
 @pytest.mark.parametrize("number", [0, 2, 4])
-def test_mute_and_deaf_radios_make_no_repair_harmful_and_no_drone_fly_for_ever(number, routing):
+def test_mute_and_deaf_radios_cut_off_nobody_else_and_make_no_connected_drone_fly(number, routing):
     incidents = ["goes_mute", "goes_deaf"]
     content = {
         "sequence": {"incidents": incidents, "drones": [8, 14]},
@@ -106,6 +112,6 @@ def test_mute_and_deaf_radios_make_no_repair_harmful_and_no_drone_fly_for_ever(n
     }
     record = SequenceRun(Scenario.model_validate(content), Streams(0, number)).run()
     assert {item.action for item in record.happened} & {"mute", "deaf"}
-    assert not harm(record)
+    assert flew_connected(record) == left_able(record) == 0
     broken = {node for item in record.happened for node in item.nodes}
     assert set(record.left_behind) <= broken  # nobody else is cut off for that
