@@ -11,7 +11,7 @@ import pytest
 from drone_mesh.communication import complaints, limits
 from drone_mesh.communication.beacon import proofs, trickle
 from drone_mesh.communication.data import packets as data
-from drone_mesh.communication.heartbeats import detours, relay_check
+from drone_mesh.communication.heartbeats import detours, node_search, relay_check
 from drone_mesh.communication.interfaces import BROADCAST, MAX_NODE_ID, PAYLOAD_BYTES
 from drone_mesh.communication.messages import TO_AT
 from drone_mesh.communication.packet_types import MessageType
@@ -78,6 +78,9 @@ SENTENCES = [
     f"{limits.LIMIT_PERIOD_S:g} s are over",
     f"| {limits.REPEATS} announcements in {limits.LIMIT_PERIOD_S:g} s;",
     f"| one in {detours.AVOIDED_S:g} s |",
+    f"after {node_search.FIRST_PAUSE_S:g}, {2 * node_search.FIRST_PAUSE_S:g}, "
+    f"{4 * node_search.FIRST_PAUSE_S:g} s and so on up to {node_search.LONGEST_PAUSE_S:g} s; "
+    f"on a shared channel one in {node_search.SEARCH_EVERY_S:g} s. Each",
     f"bytes 0..{seal.SEAL_AT - 1}, under the key of the pair. Packets with forward {BROADCAST}",
     f"byte {TO_AT} counts as {BROADCAST}",
     f"random number of {seal._EPOCH_BITS} bits that a node draws at each start",
