@@ -42,6 +42,7 @@ PARSERS = re.compile(  # calls that read the content of a file, or what others s
     r"rosbag\.Bag|yaml\.\w*load|read_(mapping|mapping_text|text)"
 )
 OTHERS = {  # modules that parse no file of a user, and what it is instead
+    "internet/mqtt_internet": "MQTT",
     "lab/plan": "its own memory",
     "lab/show": "its own memory",
     "lab/worker": "its own memory",
