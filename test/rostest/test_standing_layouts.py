@@ -123,11 +123,13 @@ class StandingLayoutsTest(unittest.TestCase):
         self.assertIn("drone 1 to x -3, y 3, z 0 m\ndrone 9 to x -2, y 3, z 0 m\n", drawn.stdout)
         self.missions_and_gateways_stay()
         layout = subprocess.Popen(  # 17 is off and elsewhere, since the test before
-            ["rosrun", "drone_mesh", "layout", "17"], stdout=subprocess.PIPE, text=True
+            ["rosrun", "drone_mesh", "layout", "--at-once", "17"], stdout=subprocess.PIPE, text=True
         )
         self.assertIn("ordered", layout.stdout.readline())
         wait_for("it waits for 17", FLIGHTS_S, lambda: any(map(waits_for_17, self.open())))
         (number,) = (progress.id for progress in self.open())
+        (kept,) = json.loads(rospy.get_param("/DroneManager/standing"))
+        self.assertTrue(kept["at_once"])
         os.kill(layout.pid, signal.SIGINT)
         self.assertEqual(layout.wait(60), 130)
         self.assertTrue(self.wait_until_over(number).over)

@@ -272,6 +272,14 @@ class ToolsTest(unittest.TestCase):
         self.assertEqual(late.returncode, 2)
         self.assertRegex(late.stderr, r"no state at 100000 s; the recording ends at \d+\.\d s")
         self.assertEqual(run("snapshot", "--bag", str(bag), f"{self.folder}/bag.png").returncode, 0)
+        small = f"{self.folder}/small.png"
+        sized = run("snapshot", "--bag", str(bag), "--size", "320x200", small)
+        self.assertEqual(sized.returncode, 0, sized.stderr)
+        size = Path(small).read_bytes()[16:24]  # of the PNG's header
+        self.assertEqual(size, bytes.fromhex("00000140 000000c8"))
+        for when, coloured in (("always", True), ("never", False)):
+            table = run("status", "--bag", str(bag), "--colour", when).stdout
+            self.assertEqual("\x1b[" in table, coloured)
         trace = run("flight_trace", str(bag), f"{self.folder}/flight.csv")
         self.assertEqual(trace.returncode, 0, trace.stderr)
         self.assertEqual(Path(f"{self.folder}/flight.csv").read_text()[:11], "t,id,x,y,z\n")

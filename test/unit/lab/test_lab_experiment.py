@@ -336,6 +336,16 @@ def evil(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return write(tmp_path, f"name: trial\n{base}{metrics}")
 
 
+def test_a_plan_without_estimate_makes_no_trial_runs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = str(write(tmp_path, GOOD))
+    assert main(["plan", path, "--no-estimate"]) == 0
+    assert "trial runs" not in capsys.readouterr().out
+    assert main(["plan", path]) == 0
+    assert "trial runs" in capsys.readouterr().out
+
+
 def test_only_a_run_loads_code_and_says_so_before(
     evil: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

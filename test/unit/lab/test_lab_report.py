@@ -142,6 +142,13 @@ def test_plot_writes_a_figure_that_is_light_or_dark_as_its_viewer_prefers(
     assert svg.startswith("<svg")
     assert "@media(prefers-color-scheme:dark)" in svg
     assert "var(--ink)" in svg
+    one = tmp_path / "one.svg"
+    only = ["--cells", "layout.drones=5,timing.connection_lost_after_s=5"]
+    assert main(["plot", str(results_folder), "healed_over_time", str(one), *only]) == 0
+    assert len(one.read_text(encoding="utf-8")) < len(svg)
+    none = ["--cells", "layout.drones=7"]
+    assert main(["plot", str(results_folder), "healed_over_time", str(one), *none]) == 1
+    assert "no cell matches layout.drones=7" in capsys.readouterr().err
     assert main(["plot", str(results_folder), "phase", str(out)]) == 1
     assert "no figure phase; there are " in capsys.readouterr().err
     assert main(["plot", str(results_folder), "drones", str(out), "--metric", "heald"]) == 1

@@ -142,6 +142,20 @@ def test_a_scan_ends_with_options_that_the_gateway_takes(capsys):
     assert 1 <= radio.channel <= 82
 
 
+@pytest.mark.slow
+def test_a_range_test_counts_what_another_node_acknowledges_at_each_power_and_rate(capsys):
+    line = ["--emulated", "30", "range", "--to", "1", "--packets", "2"]
+    assert main([*line, "--distance", "30"]) == 0
+    rows = capsys.readouterr().out.splitlines()
+    assert [row.split(",")[:3] for row in rows[1:5]] == [
+        ["250", power, "2"] for power in ("0", "-6", "-12", "-18")
+    ]
+    assert rows[5].startswith("# measured in 2019 ")
+    assert main([*line, "--all-rates"]) == 0
+    rows = capsys.readouterr().out.splitlines()
+    assert {row.split(",")[0] for row in rows[1:]} == {"250", "1000", "2000"}
+
+
 class BusyMachine:
     """Each sleep takes a second longer than the chip notices: the process waited for a core."""
 

@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from drone_mesh.communication.repair.options import RepairOptions
+from drone_mesh.communication.repair.options import LostPlace, RepairOptions
 from drone_mesh.communication.seals.key_file import write_key_file
 from drone_mesh.communication.seals.keys import MeshKey
 from drone_mesh.communication.timing import MeshTiming
@@ -109,6 +109,7 @@ def test_each_option_reaches_what_it_is_for():
         "--check-period 5 --connection-lost-after 60 --report-period 45 "
         "--latitude 10 --longitude -20.5 "
         "--height 3 --debug 2.5 --log-level debug --repair home --clearance 3 --range 40 "
+        "--lost-place above "
         "--routing drone_mesh.communication.routing.child_table_tree:"
         "ChildTableTree "
         "--drone mavlink:/dev/serial0,921600 --origin 52.0907,5.1214,3 --max-height 40 "
@@ -128,7 +129,7 @@ def test_each_option_reaches_what_it_is_for():
         timing=MeshTiming(5.0, 60.0, report_period_s=45.0),
         routing="drone_mesh.communication.routing.child_table_tree:ChildTableTree",
         repair="home",
-        repair_options=RepairOptions(clearance_m=3.0, range_m=40.0),
+        repair_options=RepairOptions(3.0, 40.0, LostPlace.ABOVE),
         location=Location(latitude=10.0, longitude=-20.5, height=3.0),
         flight=FlightOptions(
             "mavlink:/dev/serial0,921600",
@@ -159,6 +160,8 @@ def test_the_token_comes_from_the_environment_or_from_a_file_which_wins(tmp_path
     environment = {"DRONE_MESH_TOKEN": "of the environment it is"}
     assert parse_gateway([], environment).http.token == "of the environment it is"
     assert parse_gateway(["--token-file", str(file)], environment).http.token == TOKEN
+    names = ["--name", "gateway.field", "--name", "field.lan"]
+    assert parse_gateway(names, {}).http.names == ("gateway.field", "field.lan")
 
 
 def test_emulated_nodes_need_no_id():

@@ -45,7 +45,9 @@ def test_trace_names_the_nodes_on_the_route(rig, capsys):
 def test_send_reports_that_the_message_arrived(rig, capsys, to):
     assert commands.send(["--node", "2", to, "21.5 degrees"]) == 0
     assert "delivered" in capsys.readouterr().out
-    assert [message.payload for message in rig.network.received[0]] == [b"21.5 degrees"]
+    assert commands.send(["--socket", str(socket_path(2)), to, "22 degrees"]) == 0
+    said = [message.payload for message in rig.network.received[0]]
+    assert said == [b"21.5 degrees", b"22 degrees"]
 
 
 def test_send_takes_an_argument_that_is_no_text_as_the_bytes_that_it_is(rig):
