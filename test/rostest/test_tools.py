@@ -290,10 +290,12 @@ class ToolsTest(unittest.TestCase):
         for picture in ("live.png", "bag.png"):
             self.assertEqual((self.folder / picture).read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
         finished = run(
-            "report", str(bag), "-o", f"{self.folder}/run.html", "--csv", str(self.folder)
+            *("report", str(bag), "-o", f"{self.folder}/run.html", "--csv", str(self.folder)),
+            *("--title", "A field day"),
         )
         self.assertEqual(finished.returncode, 0, finished.stderr)
         page = (self.folder / "run.html").read_text(encoding="utf-8")
+        self.assertIn("<h1>A field day</h1>", page)
         events = (self.folder / "events.csv").read_text(encoding="utf-8")
         self.assertTrue("<td>2 off</td>" in page, f"the page lacks the cause of the loss: {events}")
         self.assertIn("flight decided", events)
