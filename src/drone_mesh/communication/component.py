@@ -232,7 +232,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
         place, flies_there = asker
         if flies_there:
             self._neighbours.motion.flies_for_repair(creator, self._deadlines.now_s)
-        self._neighbours.set_place(creator, place, self._deadlines.now_s)
+        self._neighbours.set_place(creator, place, self._deadlines.now_s, flies_there)
         self._on_place_taken(place)
         self._send_location(creator)
         if flies_there:
@@ -267,7 +267,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
     def _on_last_place(self, last: LastPlace) -> None:
         """A node reports where another one was last heard."""
         heard_s = self._deadlines.now_s - last.age_s
-        self._neighbours.set_place(last.node, last.place, heard_s)
+        self._neighbours.passes(last.node, last.place, heard_s)
 
     def _send_location(self, asker: int) -> None:
         goal = self._pilot.goal

@@ -181,7 +181,7 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         self, node: int, location: Location, is_goal: bool, gateway: GatewayPlace | None
     ) -> None:
         now_s = self._deadlines.now_s
-        self._neighbours.set_place(node, location, now_s)
+        self._neighbours.set_place(node, location, now_s, is_goal)
         if node == self.control.gateway:
             self.places.update_gateway(location, now_s)
             self.control.gateway_sent_place()

@@ -6,7 +6,7 @@ import math
 from typing import Iterable, NamedTuple
 
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.seen_motion import SeenMotion
+from drone_mesh.communication.seen_motion import FLIGHT_S, SeenMotion
 from drone_mesh.drone.location import Location
 
 NAMED_AFTER_DEATH_S = 60.0  # our choice: lists of six hops had a dead node for up to 59 s
@@ -43,6 +43,7 @@ class Neighbours:
         self._gateways: dict[int, int] = {}
         self._hops: dict[int, int] = {}
         self._places: dict[int, HeardPlace] = {}
+        self._goals_s: dict[int, float] = {}  # when those in flight told their goal, their place
         self.silent = False  # all neighbours (2 or more) fell silent together; none heard since
 
     def heard(self, node: int, now_s: float) -> bool:
@@ -151,13 +152,24 @@ class Neighbours:
         """The hops that `node` reported last; 255: none."""
         return self._hops.get(node, NO_ROUTE)
 
-    def set_place(self, node: int, place: Location, heard_s: float) -> None:
-        """`node`, a neighbour or not, was at `place` at `heard_s`; older information is ignored."""
+    def set_place(self, node: int, place: Location, heard_s: float, is_goal: bool = False) -> None:
+        """`node`, a neighbour or not, was at `place` at `heard_s`; older information is ignored.
+
+        Or, if `is_goal`, it flies there: that counts as its place from then on.
+        """
         known = self._places.get(node)
         if known is None or heard_s >= known.heard_s:
+            self._goals_s.pop(node, None)
+            if is_goal:
+                self._goals_s[node] = heard_s
             self._places[node] = HeardPlace(place, heard_s)
             if known is None or known.place != place:  # most nodes stand
                 self.motion.reported(node, place, heard_s)
+
+    def passes(self, node: int, place: Location, heard_s: float) -> None:
+        """`node` was at `place`, perhaps on its way: then the goal that it told counts."""
+        if heard_s - self._goals_s.get(node, -math.inf) > FLIGHT_S:
+            self.set_place(node, place, heard_s)
 
     def place_of(self, node: int) -> HeardPlace | None:
         """The last reported place of `node`."""

@@ -141,7 +141,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
         judged = is_gateway or is_next_hop
         if judged and not self._parts.may_be_at(location, is_gateway, says_so=not is_goal):
             return
-        self._neighbours.set_place(node, location, now_s)
+        self._neighbours.set_place(node, location, now_s, is_goal)
         if is_gateway:
             self.places.update_gateway(location, now_s)
         if is_next_hop:

@@ -6,6 +6,7 @@ import pytest
 
 from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.seen_motion import SeenMotion
+from drone_mesh.drone.location import Location
 
 
 @pytest.fixture
@@ -41,3 +42,26 @@ def test_after_a_flight_all_links_are_new(neighbours, leaves):
     leaves(neighbours)
     neighbours.named((3,), 200.0)
     assert neighbours.out_of_reach() == set()
+
+
+GOAL, ON_THE_WAY = Location(8.0, 0.0, 0.0), Location(4.0, 0.0, 4.0)
+
+
+def test_the_goal_of_a_drone_in_flight_counts_although_it_is_seen_on_the_way(neighbours):
+    """Beacons tell where it is just now; another drone must not land at its goal meanwhile."""
+    neighbours.set_place(2, GOAL, 101.0, is_goal=True)
+    neighbours.passes(2, ON_THE_WAY, 102.0)
+    assert neighbours.place_of(2).place == GOAL
+
+
+def test_where_it_is_seen_counts_once_it_tells_no_goal_any_more(neighbours):
+    neighbours.set_place(2, GOAL, 101.0, is_goal=True)
+    neighbours.passes(2, ON_THE_WAY, 112.0)
+    assert neighbours.place_of(2).place == ON_THE_WAY
+
+
+def test_what_it_says_itself_at_rest_counts_at_once(neighbours):
+    neighbours.set_place(2, GOAL, 101.0, is_goal=True)
+    neighbours.set_place(2, ON_THE_WAY, 102.0)
+    neighbours.passes(2, GOAL, 102.5)
+    assert neighbours.place_of(2).place == GOAL

@@ -302,7 +302,7 @@ class BeaconPlane(IControlPlane):
         if beacon.gateway <= MAX_NODE_ID:
             neighbours.set_gateway(node, beacon.gateway)
         if beacon.motion is not None:
-            neighbours.set_place(node, beacon.motion.place, self._routes.now_s)
+            neighbours.passes(node, beacon.motion.place, self._routes.now_s)
 
     def _take_gateway_place(self, node: int, beacon: Beacon) -> None:
         """Where the gateway is, as it says itself or the parent does."""

@@ -131,7 +131,7 @@ class ConnectionRepair(RepairActions):
         if score in (TOOK_OFF, TOOK_OFF_HOME):
             self._parts.neighbours.motion.flies_for_repair(node, self.now_s)
             if about is not None:
-                self._parts.neighbours.set_place(node, about, self.now_s)
+                self._parts.neighbours.set_place(node, about, self.now_s, is_goal=True)
                 self.on_taken(about)
         self._strategy.on_bid(node, score, from_, about)
 

@@ -130,6 +130,13 @@ def test_a_drone_in_flight_answers_with_its_goal_and_says_so():
     assert not answer[18] & 0x80
 
 
+def test_where_others_saw_a_drone_in_flight_does_not_replace_the_goal_that_it_told():
+    rig = Rig()
+    rig.hear("06 06 02 01 fe 00 00 00 41 00 00 00 00 01 80")  # flies to latitude 8
+    rig.hear("05 05 45 01 01 00 00 06 00 00 80 40 00 00 00 00 04 00")  # was at latitude 4, 4 m up
+    assert rig.mesh._neighbours.place_of(6).place == Location(8.0, 0.0, 0.0)
+
+
 def test_it_is_the_gateways_when_that_is_the_next_hop():
     rig = Rig()
     rig.connect_to_gateway()
