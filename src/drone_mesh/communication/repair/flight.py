@@ -100,6 +100,7 @@ class RepairFlight:
             self._diversions += 1
             self._go_to(self._spot())
         elif not self.on_ground and self._is_taken_by(place, self._leg_end):
+            self._diversions += 1
             self.fly_on()
 
     def _is_taken_by(self, place: Location, spot: Location) -> bool:
@@ -149,7 +150,8 @@ class RepairFlight:
             and here.distance_m(self.goal) > longest_m
         ):
             end = at_whole_metres(here.towards(self.goal, self._leg_m))
-            self._leg_end = self._taken.at_or_beside(end, Landing(self.goal))
+            free = self._taken.is_free(end)
+            self._leg_end = end if free else self._beside(end, Landing(self.goal))
         self._parts.pilot.step_back_to(self._leg_end)
         ask_all_for_places(self._parts)
 
@@ -164,6 +166,9 @@ class RepairFlight:
         return here.distance_m(self.goal) > LANDED_WITHIN_M
 
     def _spot(self) -> Location:
+        return self._beside(self._wanted, self._landing)
+
+    def _beside(self, place: Location, landing: Landing) -> Location:
         """A free spot; two drones that divert at the same time skip different numbers of spots."""
         skip = self._parts.node_id % 5 if self._diversions > 1 else 0
-        return self._taken.beside(self._wanted, self._landing, skip)
+        return self._taken.beside(place, landing, skip)
