@@ -14,7 +14,7 @@ from drone_mesh.communication.limits import RateLimit
 
 SHARED_FOR_S = 60.0  # our choice: for so long after the last packet of the other, both say so
 OFF_S = 30.0  # our choice: the antenna of a node that gives way is off for 1 to 2 times this
-INTRODUCTIONS = 3  # our choice: per minute, to show the other one that the id is in use
+INTRODUCTIONS = 3  # our choice: in OFF_S, so that the other one hears one each time it comes back
 
 
 class OwnId:
@@ -25,7 +25,7 @@ class OwnId:
         self._rng = rng
         self.connected_s = math.inf  # when the node was first connected, since it last gave way
         self._heard_s = -math.inf
-        self._introductions = RateLimit(INTRODUCTIONS, SHARED_FOR_S)
+        self._introductions = RateLimit(INTRODUCTIONS, OFF_S)
 
     @property
     def was_heard(self) -> bool:

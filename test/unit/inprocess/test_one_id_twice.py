@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import random
+
 import pytest
 
+from drone_mesh.communication.own_id import OwnId
 from drone_mesh.communication.seals.keys import MeshKey
 from drone_mesh.inprocess import Network
 
@@ -38,3 +41,12 @@ def test_the_later_of_two_radios_with_one_id_gives_way_and_both_name_it(routing,
     assert told == [2, 2]
     mesh.stop()
     twin.stop()
+
+
+def test_whoever_comes_back_after_giving_way_finds_the_id_introduced_again():
+    """The other one introduces itself only so often, but anew when the first can be back."""
+    earlier, later = OwnId(random.Random(1)), OwnId(random.Random(2))
+    assert [earlier.heard(11.0) for _ in range(4)] == [True, True, True, False]
+    back_s = later.give_way(11.0)
+    assert 41.0 <= back_s <= 71.0
+    assert [earlier.heard(41.0) for _ in range(4)] == [True, True, True, False]
