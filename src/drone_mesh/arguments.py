@@ -10,7 +10,7 @@ import math
 import re
 from typing import Callable
 
-MOST = 10**9  # our choice: for numbers without a bound of their own
+MOST = 10**9  # for numbers without a bound of their own
 
 _WHOLE = re.compile(r"-?[0-9]{1,18}", re.ASCII)
 _DECIMAL = re.compile(r"-?([0-9]+\.?[0-9]*|\.[0-9]+)(e[-+]?[0-9]+)?", re.ASCII | re.IGNORECASE)

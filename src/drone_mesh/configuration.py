@@ -28,8 +28,8 @@ from drone_mesh.drone.goal import MAX_HEIGHT_M
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.yaml_file import read_mapping
 
-MIN_REAL_TIME_FACTOR = 0.001  # our choice: one step of the world in 10 s
-MAX_REAL_TIME_FACTOR = 1000.0  # our choice: above it the steps of the clock are too large
+MIN_REAL_TIME_FACTOR = 0.001  # one step of the world in 10 s
+MAX_REAL_TIME_FACTOR = 1000.0  # above it the steps of the clock are too large
 MAX_SEED = 2**32 - 1
 RANDOM_SEED = "random"  # requests a new seed although the file has a fixed one
 

@@ -17,11 +17,11 @@ import threading
 from collections import Counter, deque
 from typing import Callable, Protocol
 
-FAILURE_PERIOD_S = 30.0  # our choice: one traceback per kind of failure in this time
-RETRY_AFTER_S = 1.0  # our choice: pause before failed work that is still due runs again
-MOST_WAITING = 1000  # our choice: packets for one node; four from each other node
-REQUESTS_PER_STEP = 4  # our choice: of simulated time, which goes on while further ones wait
-REQUEST_PAUSE_S = 0.05  # our choice: wall; then as many again, if simulated time stands still
+FAILURE_PERIOD_S = 30.0  # one traceback per kind of failure in this time
+RETRY_AFTER_S = 1.0  # pause before failed work that is still due runs again
+MOST_WAITING = 1000  # packets for one node; four from each other node
+REQUESTS_PER_STEP = 4  # of simulated time, which goes on while further ones wait
+REQUEST_PAUSE_S = 0.05  # wall; then as many again, if simulated time stands still
 _WAKE = None  # in the queue: no function, only check the deadlines again
 
 _log = logging.getLogger(__name__)

@@ -23,7 +23,7 @@ from drone_mesh.yaml_file import (
 FIELD_CASE = 0
 GRID_CASE = 100
 MAX_CASE = 2**32 - 1  # Casus.srv: uint32 caseID
-MAX_NAME = 100  # characters, of a formation; our choice
+MAX_NAME = 100  # characters, of a formation
 
 _FIELD_PLACES = {  # node id -> longitude, latitude: the field case of the project plan
     1: (-13, 24),

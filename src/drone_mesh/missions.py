@@ -13,8 +13,8 @@ from drone_mesh.errors import ConfigurationError, GoalRefused
 from drone_mesh.mobility.pilot import TrackPilot, along
 from drone_mesh.yaml_file import YamlFile, is_number, is_whole_up_to, read_mapping
 
-MOST_WAYPOINTS = 1000  # our choice
-MAX_SPEED_M_S = 20.0  # our choice
+MOST_WAYPOINTS = 1000
+MAX_SPEED_M_S = 20.0
 KEYS = ("drones", "waypoints", "height", "speed", "loop")
 
 

@@ -15,8 +15,8 @@ from yaml.constructor import ConstructorError
 from drone_mesh.arguments import is_decimal, is_whole
 from drone_mesh.errors import ConfigurationError
 
-# Our choices: far above what a configuration or a layout of 254 drones needs, and low enough to
-# refuse a wrong or hostile file at once.
+# Far above what a configuration or a layout of 254 drones needs, and low enough to refuse
+# a wrong or hostile file at once.
 MAX_FILE_BYTES = 500_000
 MAX_DEPTH = 10
 MAX_VALUE_CHARACTERS = 250

@@ -22,7 +22,7 @@ from drone_mesh.raspberry.emulated_air import column_place
 from drone_mesh.stopping import ends_as
 
 DEMONSTRATION_ORIGIN = Origin(52.0907, 5.1214, 3.0)  # Utrecht; only without --origin
-MOST_COPTERS = 16  # our choice
+MOST_COPTERS = 16
 POLL_S = 0.5
 
 

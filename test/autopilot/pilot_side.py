@@ -14,7 +14,7 @@ from drone_mesh.drone.mavlink.telemetry import Message
 from drone_mesh.errors import MeshError
 
 SYSTEM_ID = 254  # not the node's: no failsafe watches it
-AGAIN_S = 1.0  # our choice
+AGAIN_S = 1.0
 POLL_S = 0.05
 MOST_TEXTS = 200
 REPORTS_HZ = {

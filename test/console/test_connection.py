@@ -17,7 +17,7 @@ from test_page import PLACES, on_screen
 TOKEN = "a-token-for-this-test"
 TOO_BIG = 1009  # RFC 6455, 7.4.1
 REFUSED = "net::ERR_CONNECTION_REFUSED"  # a page without its console says that it tries again
-BEHIND_S = 2.0  # simulated; our choice: what a page shows may be this old
+BEHIND_S = 2.0  # simulated; what a page shows may be this old
 
 
 def test_a_page_reconnects_by_itself_after_the_server_was_restarted(start_console, visit):

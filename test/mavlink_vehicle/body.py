@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 from drone_mesh.drone.location import Location
 
-LANDING_SPEED_M_S = 1.0  # our choice
-ARRIVED_M = 0.05  # our choice
-DRAIN_PERCENT_S = 0.05  # our choice: discharge per second in the air
+LANDING_SPEED_M_S = 1.0
+ARRIVED_M = 0.05
+DRAIN_PERCENT_S = 0.05  # discharge per second in the air
 
 
 @dataclass

@@ -18,8 +18,8 @@ from mavlink_vehicle.vehicle import MavlinkVehicle
 
 Address = Tuple[str, int]
 
-TICK_S = 0.05  # our choice: ten centimetres of flight at 2 m/s
-FORGET_PEER_S = 10.0  # our choice: a peer silent for this long gets no more messages
+TICK_S = 0.05  # ten centimetres of flight at 2 m/s
+FORGET_PEER_S = 10.0  # a peer silent for this long gets no more messages
 MOST_BYTES = 4096
 LOOPBACK = "127.0.0.1"
 

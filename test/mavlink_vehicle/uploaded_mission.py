@@ -10,8 +10,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.telemetry import Message, sender_of
 
-MOST_ITEMS = 500  # our choice
-ASK_AGAIN_S = 1.0  # our choice; MAVLink recommends 0.25 to 1.5 s
+MOST_ITEMS = 500
+ASK_AGAIN_S = 1.0  # MAVLink recommends 0.25 to 1.5 s
 MOST_TRIES = 5  # as MAVLink recommends
 
 _WAY_POINTS = frozenset(

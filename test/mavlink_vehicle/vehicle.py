@@ -20,7 +20,7 @@ from mavlink_vehicle.uploaded_mission import UploadedMission
 RETURN_HEIGHT_M = 15.0  # ArduPilot's RTL_ALT
 GROUND_STATION_LOST_S = 5.0  # ArduPilot's FS_GCS_TIMEOUT
 LOW_BATTERY_PERCENT = 15.0  # PX4's BAT_LOW_THR
-MOST_DISTANCE_M = 100_000.0  # our choice: a target farther away is invalid
+MOST_DISTANCE_M = 100_000.0  # a target farther away is invalid
 DISARMS_AFTER_S = 10.0  # on the ground, armed, nothing to do: both autopilots disarm
 
 ACCEPTED = mavlink.MAV_RESULT_ACCEPTED

@@ -17,7 +17,7 @@ from drone_mesh.errors import MeshError
 _UNKNOWN: Position = (0.0, 0.0, 0.0)
 
 
-MAX_TOPIC_LENGTH = 200  # our choice; ROS itself sets no limit
+MAX_TOPIC_LENGTH = 200  # ROS itself sets no limit
 # wiki.ros.org/Names; relative and private names have a different meaning in each node.
 _TOPIC = re.compile(r"/?[A-Za-z]\w*(/\w+)*", re.ASCII)
 

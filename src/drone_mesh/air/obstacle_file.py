@@ -14,7 +14,7 @@ from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.yaml_file import YamlFile, read_mapping
 
-MAX_BOXES = 1000  # our choice: every view draws all of them
+MAX_BOXES = 1000  # every view draws all of them
 _EXPECTED = {
     "center": "three numbers, metres, each -10000..10000",
     "size": "three numbers, metres, each above 0, at most 10000",

@@ -13,10 +13,10 @@ from drone_mesh.drone.goal import MAX_HEIGHT_M
 
 METRE_DB = 0.4  # dB per metre inside, the same source as brick
 NO_PATH = "no path past the obstacles"  # reason for refusing a goal
-BOX_CLEARANCE_M = 0.5  # our choice: least distance between a flight and a box, above and beside it
+BOX_CLEARANCE_M = 0.5  # least distance between a flight and a box, above and beside it
 ABOVE_M = BOX_CLEARANCE_M + 1e-6  # height above a box at which a flight is just clear of it
 BESIDE_M = 0.01  # distance of a corner of the path from its box, so that it does not touch it
-MOST_BOXES = 10  # our choice: on one path; the search time grows with the cube
+MOST_BOXES = 10  # on one path; the search time grows with the cube
 
 
 @dataclass(frozen=True)

@@ -36,10 +36,10 @@ from drone_mesh.execution import PacketInbox, Submit
 
 logger = logging.getLogger(__name__)
 
-RECEIVE_TIMEOUT_S = 0.1  # our choice: how soon the receiving thread notices its end
-DEBUG_PERIOD_S = 10.0  # our choice: one line per check period
-POWER_WANTED_S = 1.0  # our choice: longer than the pause between two questions of a repair
-DUPLICATE_S = 0.5  # our choice: the same bytes again within this time are a duplicate
+RECEIVE_TIMEOUT_S = 0.1  # how soon the receiving thread notices its end
+DEBUG_PERIOD_S = 10.0  # one line per check period
+POWER_WANTED_S = 1.0  # longer than the pause between two questions of a repair
+DUPLICATE_S = 0.5  # the same bytes again within this time are a duplicate
 
 
 class PacketAntenna(IWirelessCommunication):

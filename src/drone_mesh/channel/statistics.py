@@ -38,7 +38,7 @@ class RadioStatistics:
         return 1.0 + self.tries / self.sent if self.sent else 1.0
 
 
-AIRTIME_WINDOW_S = 1.0  # our choice: the airtime share is measured over at least this time
+AIRTIME_WINDOW_S = 1.0  # the airtime share is measured over at least this time
 
 
 class ChannelMeter:

@@ -7,9 +7,9 @@ import math
 
 from drone_mesh.communication.throttle import Throttle
 
-COMPLAINT_PERIOD_S = 30.0  # our choice: one line per reason and node in this time
-FOREIGN_FOR_S = 60.0  # our choice: a neighbour sends several packets in this time
-CHALLENGED_FOR_S = 10.0  # our choice: a neighbour with a key challenges one without every 2 s
+COMPLAINT_PERIOD_S = 30.0  # one line per reason and node in this time
+FOREIGN_FOR_S = 60.0  # a neighbour sends several packets in this time
+CHALLENGED_FOR_S = 10.0  # a neighbour with a key challenges one without every 2 s
 
 _log = logging.getLogger(__name__)
 

@@ -18,10 +18,10 @@ from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.ways import IDelivery
 
 HOLD, DROP = -1, -2  # verdicts; any other one is the next hop
-MOST_HELD = 64  # our choice: packets that wait for a next hop
-MOST_HOPS_TRIED = 8  # our choice: by one node for one packet
-REMEMBERED_S = 3.0  # our choice: longer than a packet is held
-SAME_S = 0.5  # our choice: a packet that comes again from the same neighbour within it is a copy
+MOST_HELD = 64  # packets that wait for a next hop
+MOST_HOPS_TRIED = 8  # by one node for one packet
+REMEMBERED_S = 3.0  # longer than a packet is held
+SAME_S = 0.5  # a packet that comes again from the same neighbour within it is a copy
 
 
 class Transit:

@@ -12,9 +12,9 @@ from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused, LocationUnknown
 
-STANDS_STILL_WITHIN_M = 1e-3  # our choice: far below what a drone flies in a second
-ASKS_WITHOUT_ANSWER = 10  # our choice: then the mesh continues with an unknown position
-SETS_OUT_WITHIN_S = 10.0  # our choice: a goal may reach a busy engine seconds later
+STANDS_STILL_WITHIN_M = 1e-3  # far below what a drone flies in a second
+ASKS_WITHOUT_ANSWER = 10  # then the mesh continues with an unknown position
+SETS_OUT_WITHIN_S = 10.0  # a goal may reach a busy engine seconds later
 
 
 class Flight:

@@ -33,7 +33,7 @@ from drone_mesh.errors import GoalRefused
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
-SEARCH_WITHIN_S = 600.0  # our choice: search for nodes that were heard within this time
+SEARCH_WITHIN_S = 600.0  # search for nodes that were heard within this time
 
 
 class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-LIMIT_PERIOD_S = 10.0  # our choice: one check period
-STRANGERS = 16  # our choice: losses per period of nodes that never took a packet
-REPEATS = 64  # our choice: announcements of one missing node per period; lossy links need many
+LIMIT_PERIOD_S = 10.0  # one check period
+STRANGERS = 16  # losses per period of nodes that never took a packet
+REPEATS = 64  # announcements of one missing node per period; lossy links need many
 
 
 class RateLimit:

@@ -9,7 +9,7 @@ from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.seen_motion import FLIGHT_S, SeenMotion
 from drone_mesh.drone.location import Location
 
-NAMED_AFTER_DEATH_S = 60.0  # our choice: lists of six hops had a dead node for up to 59 s
+NAMED_AFTER_DEATH_S = 60.0  # lists of six hops had a dead node for up to 59 s
 
 
 class HeardPlace(NamedTuple):

@@ -12,9 +12,9 @@ import random
 
 from drone_mesh.communication.limits import RateLimit
 
-SHARED_FOR_S = 60.0  # our choice: for so long after the last packet of the other, both say so
-OFF_S = 30.0  # our choice: the antenna of a node that gives way is off for 1 to 2 times this
-INTRODUCTIONS = 3  # our choice: in OFF_S, so that the other one hears one each time it comes back
+SHARED_FOR_S = 60.0  # for so long after the last packet of the other, both say so
+OFF_S = 30.0  # the antenna of a node that gives way is off for 1 to 2 times this
+INTRODUCTIONS = 3  # in OFF_S, so that the other one hears one each time it comes back
 
 
 class OwnId:

@@ -16,8 +16,8 @@ from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.parts import NodeBasics, NodeParts
 from drone_mesh.drone.location import Location
 
-NEAR_CLEARANCES = 3.0  # our choice: a drone that moves aside once is still within that
-MOST_TOLD = 4  # our choice: more drones do not stand that near to one place
+NEAR_CLEARANCES = 3.0  # a drone that moves aside once is still within that
+MOST_TOLD = 4  # more drones do not stand that near to one place
 _BODY = MessageType.LAST_PLACE.about.layout
 _OLDEST_AGE_S = 2**16 - 1
 

@@ -7,9 +7,9 @@ import math
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.drone.location import Location
 
-UNKNOWN_HOPS = 10  # our choice: to the gateway, for a router that never was connected
-SAME_PLACE_M = 0.5  # our choice: places travel as float32, heights in whole metres
-# Our choice: a node of 2019 does not say that a place is its goal; it is out of reach by then.
+UNKNOWN_HOPS = 10  # to the gateway, for a router that never was connected
+SAME_PLACE_M = 0.5  # places travel as float32, heights in whole metres
+# A node of 2019 does not say that a place is its goal; it is out of reach by then.
 WRONG_FOR_S = 30.0
 
 

@@ -33,8 +33,8 @@ from drone_mesh.drone.location import Location
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
-GOAL_AGAIN_S = 0.15  # our choice: broadcasts are not acknowledged, and it is soon out of reach
-SHORT_FLIGHT = 0.25  # of the range, our choice: the discs before and after share 84 % of their area
+GOAL_AGAIN_S = 0.15  # broadcasts are not acknowledged, and it is soon out of reach
+SHORT_FLIGHT = 0.25  # of the range: the discs before and after share 84 % of their area
 
 
 class MeshnetworkRouter(MeshnetworkComponent):

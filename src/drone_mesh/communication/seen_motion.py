@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 from drone_mesh.drone.location import Location
 
-STEP = 0.1  # of the range, our choice: positions of satellites err by far less
-REPORTS = 3.0  # our choice: one may be lost
-FLIGHT_S = 10.0  # our choice: a repair flight asks for places each second, and some are lost
+STEP = 0.1  # of the range: positions of satellites err by far less
+REPORTS = 3.0  # one may be lost
+FLIGHT_S = 10.0  # a repair flight asks for places each second, and some are lost
 
 
 class _Track(NamedTuple):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-MOST_PARTS = 8  # our choice: 80 bytes and more; the rest is cut off
+MOST_PARTS = 8  # 80 bytes and more; the rest is cut off
 
 
 def split(text: str, room: int) -> list[tuple[int, bytes]]:

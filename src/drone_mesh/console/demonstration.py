@@ -29,12 +29,12 @@ Places = Dict[int, Place]  # by node
 _PLACES = ((0.0, 4 / 9), (0.0, 12 / 9), (0.0, 18 / 9), (4 / 9, 15 / 9), (-3 / 9, 15 / 9))
 _CHAIN = 2  # routers; the last of them is switched off
 _TURNS = ((1, 0), (-1, 0), (0, 1), (0, -1))  # cosine and sine: ways in which the chain may point
-_FREE_M = 1.5  # our choice: between its places and the drones that only watch
+_FREE_M = 1.5  # between its places and the drones that only watch
 _READY_WITHIN_S = 300.0  # simulated, as all that follows: a fleet may have to repair itself first
-_ORDER_AGAIN_S = 5.0  # our choice: a drone that had no route may have one then
+_ORDER_AGAIN_S = 5.0  # a drone that had no route may have one then
 _SETTLE_S = 25.0  # two default check periods: each node has asked for its next hop's position
 _REPAIR_WITHIN_S = 240.0
-_AT_PLACE_M = 0.5  # our choice
+_AT_PLACE_M = 0.5
 # Simulated seconds per second: waiting is sped up, and brief events are slowed down.
 _FAST, _WAITING, _BIDDING, _FLYING = 5.0, 3.0, 0.2, 0.5
 _SLOW_DOWN_S = 4.0  # before the wait ends, so that a slow page does not miss what follows

@@ -18,7 +18,7 @@ from drone_mesh.drone.roles import Role
 from drone_mesh.earth_files import WRITERS, Placemarks, Point, tracks_of
 from drone_mesh.state.model import MeshStatus, known_positions, position_is_known
 
-MOST_STATES = 600  # of the history; our choice: 254 drones then take some seconds
+MOST_STATES = 600  # of the history; 254 drones then take some seconds
 T = TypeVar("T")
 
 _TYPES = {"geojson": "application/geo+json", "kml": "application/vnd.google-earth.kml+xml"}

@@ -40,7 +40,7 @@ from drone_mesh.view.fan import fan_out
 from drone_mesh.view.palette import node_colour_name
 from drone_mesh.view.scene import shape_named
 
-EVENTS_KEPT = 1000  # our choice: more than a person scrolls back
+EVENTS_KEPT = 1000  # more than a person scrolls back
 EVENTS_PER_FRAME = 300  # of a burst of thousands only the newest are read
 SAMPLES_KEPT = 600  # ten minutes
 SAMPLE_PERIOD_S = 1.0  # wall time

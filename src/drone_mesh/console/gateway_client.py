@@ -9,7 +9,7 @@ from typing import Any
 from drone_mesh.console.controls import MeshControls, OrderRefused
 from drone_mesh.web.json_client import NoAnswer, ask_json
 
-ANSWER_WITHIN_S = 5.0  # our choice: the gateway itself answers within two seconds
+ANSWER_WITHIN_S = 5.0  # the gateway itself answers within two seconds
 
 
 class GatewayClient:

@@ -26,7 +26,7 @@ from drone_mesh.web import LOOPBACK
 from drone_mesh.web.json_client import NoAnswer
 from drone_mesh.web.listening import MAX_PORT
 
-ASK_PERIOD_S = 1.0  # our choice
+ASK_PERIOD_S = 1.0
 GATEWAY_TOKEN = "DRONE_MESH_TOKEN"  # as of the gateway
 PAGE_TOKEN = "DRONE_MESH_CONSOLE_TOKEN"
 

@@ -14,7 +14,7 @@ from drone_mesh.state.model import EventRecord, MeshStatus
 from drone_mesh.state.outages import MeshSample, take_sample
 
 KEPT_S = 1800.0  # simulated
-KEPT_BYTES = 64_000_000  # our choice; 254 nodes with 200 neighbours each need some 20 kB per state
+KEPT_BYTES = 64_000_000  # 254 nodes with 200 neighbours each need some 20 kB per state
 PERIOD_S = 0.4  # wall, between two states of a live run
 MOST_MARKS = 400
 _MARKED = {

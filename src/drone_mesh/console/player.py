@@ -9,7 +9,7 @@ from drone_mesh.console.frames import FrameStore
 from drone_mesh.console.history import History
 from drone_mesh.drone.geodesy import Origin
 
-_AHEAD = 60.0  # our choice: a longer jump, in simulated seconds, shows no single events
+_AHEAD = 60.0  # a longer jump, in simulated seconds, shows no single events
 
 
 class Player:

@@ -10,7 +10,7 @@ from drone_mesh.drone.roles import Role
 from drone_mesh.state.model import UNKNOWN_POSITION, EventRecord, MeshStatus, NodeStatus
 from drone_mesh.state.routes import route_to_gateway
 
-REPORTS_MISSING_S = 75.0  # our choice: two reports of the default period, and a half
+REPORTS_MISSING_S = 75.0  # two reports of the default period, and a half
 
 More = Dict[int, Dict[str, Any]]
 """By node, the fields for the page that only real nodes have."""

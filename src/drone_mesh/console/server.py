@@ -64,12 +64,12 @@ STATIC = Path(__file__).resolve().parent / "static"
 FRAME_PERIOD_S = 0.2  # 5 Hz
 SEND_TIMEOUT_S = 10.0
 MOST_PAGES = 32
-REFUSAL_LOG_PERIOD_S = 10.0  # our choice
+REFUSAL_LOG_PERIOD_S = 10.0
 MOST_ORDERS_WAITING = 16  # per page
 ORDER_THREADS = 8
-EVENT_WITHIN_S = 5.0  # wall, our choice: after the answer to an order; hosts report every second
-ALIVE_PERIOD_S = 0.5  # our choice: a page takes two seconds without a message for silence
-MOST_LATE_S = 3.0  # our choice: an order of a page that has heard nothing for longer is refused
+EVENT_WITHIN_S = 5.0  # wall: after the answer to an order; hosts report every second
+ALIVE_PERIOD_S = 0.5  # a page takes two seconds without a message for silence
+MOST_LATE_S = 3.0  # an order of a page that has heard nothing for longer is refused
 ALL_ACTIONS = (
     "fly", "power", "layout", "formation", "speed", "add", "remove", "mission",
     "demonstrate", "packets",

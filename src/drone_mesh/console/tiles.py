@@ -31,9 +31,9 @@ from drone_mesh.errors import ConfigurationError
 _log = logging.getLogger(__name__)
 
 LEAFLET = Path(__file__).resolve().parent / "leaflet"
-KEPT_BY_BROWSER_S = 3600  # our choice
+KEPT_BY_BROWSER_S = 3600
 MOST_ZOOM = 22
-# Our choices, of a file: far above what pictures of 512 pixels and their directories need.
+# Of a file: far above what pictures of 512 pixels and their directories need.
 MOST_TILE_BYTES = 4_000_000
 MOST_UNPACKED_BYTES = 1_000_000
 MOST_WORDS = 2_000  # characters

@@ -18,7 +18,7 @@ from drone_mesh.arguments import finite
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError
 
-MAX_LATITUDE_DEG = 85.0  # our choice: closer to a pole, east and north become meaningless
+MAX_LATITUDE_DEG = 85.0  # closer to a pole, east and north become meaningless
 ALTITUDE_RANGE_M = (-500.0, 9000.0)  # of the earth's surface, rounded outwards
 _DIGEST_BYTES = 2
 _RESOLUTION_DEG = 1e7  # origins are equal if they agree within MAVLink's 1e-7 degrees

@@ -11,7 +11,7 @@ from drone_mesh.errors import GoalRefused
 
 MAX_COORDINATE_M = 5000.0  # latitude and longitude: -5000..5000 m
 MAX_HEIGHT_M = 500.0  # height of the underside: 0..500 m
-ROUNDING_M = 0.01  # our choice: places travel as float32 and in steps
+ROUNDING_M = 0.01  # places travel as float32 and in steps
 
 
 def check_goal(latitude: float, longitude: float, height: float) -> None:

@@ -7,9 +7,9 @@ from typing import Sequence
 from drone_mesh.drone.flight_path import Point
 from drone_mesh.drone.location import Location
 
-LEAD_S = 2.5  # our choice: the target ahead, in seconds of flight; with 1.5 ArduCopter is slow
-SHORTEST_LEAD_M = 2.0  # our choice: more than the noise of a position
-CORNER_M = 1.0  # our choice: distance at which a corner counts as passed
+LEAD_S = 2.5  # the target ahead, in seconds of flight; with 1.5 ArduCopter is slow
+SHORTEST_LEAD_M = 2.0  # more than the noise of a position
+CORNER_M = 1.0  # distance at which a corner counts as passed
 
 
 class Route:

@@ -22,7 +22,7 @@ __all__ = [
     "tracks_of",
 ]
 
-MAX_CHARACTERS = 300_000  # our choice: 254 places of a program that writes a style for each
+MAX_CHARACTERS = 300_000  # 254 places of a program that writes a style for each
 WRITERS = {"geojson": geojson_of, "kml": kml_of}
 _READERS = {".geojson": read_geojson, ".json": read_geojson, ".kml": read_kml}
 _OTHERS = {  # what drone programs save beside these

@@ -13,7 +13,7 @@ from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError, GoalRefused
 
-STEP_M = 0.5  # our choice: a track has a place whenever the drone has moved so far
+STEP_M = 0.5  # a track has a place whenever the drone has moved so far
 MOST_PLACES = 20_000  # of all tracks
 _ID = re.compile(r"[0-9]{1,3}")
 _NAMED = re.compile(r"(?:drone|node|router|gateway)\s*([0-9]{1,3})", re.IGNORECASE)

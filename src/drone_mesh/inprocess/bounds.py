@@ -14,7 +14,7 @@ from drone_mesh.inprocess.clock import Clock
 
 SHORTEST_PATH = "shortest_path"
 JUST_IN_RANGE = 0.95  # of the range
-RECOMPUTE_EVERY_S = 0.1  # our choice: period for recomputing links, which change when drones fly
+RECOMPUTE_EVERY_S = 0.1  # period for recomputing links, which change when drones fly
 
 
 class LinkMap:

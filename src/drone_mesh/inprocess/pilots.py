@@ -13,7 +13,7 @@ from drone_mesh.inprocess.drone import InProcessDrone
 from drone_mesh.inprocess.interfaces import IInProcessAir
 from drone_mesh.mobility import Segment, Track
 
-STEP_S = 0.1  # our choice: positions at 10 Hz, as a GPS receiver gives them
+STEP_S = 0.1  # positions at 10 Hz, as a GPS receiver gives them
 
 
 class Pilots:

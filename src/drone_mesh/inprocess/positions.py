@@ -12,7 +12,7 @@ from drone_mesh.errors import LocationUnknown
 from drone_mesh.inprocess.clock import Clock
 from drone_mesh.inprocess.drone import InProcessDrone
 
-CORRELATED_S = 10.0  # our choice: the error of a receiver drifts; after this time it is another one
+CORRELATED_S = 10.0  # the error of a receiver drifts; after this time it is another one
 
 
 @dataclass(frozen=True)

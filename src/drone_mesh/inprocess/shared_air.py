@@ -26,7 +26,7 @@ from drone_mesh.nrf24.emulator.links import Hop, LinkModel
 from drone_mesh.nrf24.emulator.space import Space
 from drone_mesh.nrf24.settings import RadioSettings
 
-MOST_GAIN_DB = 10.0  # our choice: Rayleigh fading exceeds it once in 22,000 blocks
+MOST_GAIN_DB = 10.0  # Rayleigh fading exceeds it once in 22,000 blocks
 
 
 @dataclass(eq=False)

@@ -30,9 +30,9 @@ from drone_mesh.users.desk import UsersDesk
 from drone_mesh.web.access import Access
 from drone_mesh.web.allowance import Allowance
 
-MOST_ORDERS_AT_ONCE = 300  # our choice: a whole fleet
-ORDER_PERIOD_S = 0.05  # our choice, wall: of further orders; a full channel carries fewer
-ORDER_LOG_PERIOD_S = 10.0  # our choice: between two lines about one drone
+MOST_ORDERS_AT_ONCE = 300  # a whole fleet
+ORDER_PERIOD_S = 0.05  # wall: of further orders; a full channel carries fewer
+ORDER_LOG_PERIOD_S = 10.0  # between two lines about one drone
 
 _log = logging.getLogger(__name__)
 

@@ -24,8 +24,8 @@ from drone_mesh.internet.guarded_app import UNDONE, Refusal
 from drone_mesh.internet.numbers import DecimalDigits, WholeDigits
 from drone_mesh.users.desk import HANDOVER_S, Sending, UsersDesk, in_json
 
-LONGEST_WAIT_S = 60.0  # our choice
-SIGN_OF_LIFE_S = 15.0  # our choice: a comment line for a client without messages
+LONGEST_WAIT_S = 60.0
+SIGN_OF_LIFE_S = 15.0  # a comment line for a client without messages
 MOST_UNREAD = 256  # messages waiting for a slow client; with more, its connection ends
 _POLL_S = 0.02
 

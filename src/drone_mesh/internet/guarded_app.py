@@ -27,8 +27,8 @@ from drone_mesh.internet.request_guard import RequestGuard
 from drone_mesh.web.access import Access, TooManyGuesses
 from drone_mesh.web.server_thread import ServerThread
 
-REFUSAL_LOG_PERIOD_S = 10.0  # our choice
-MOST_CONNECTIONS = 64  # our choice; further ones get 503
+REFUSAL_LOG_PERIOD_S = 10.0
+MOST_CONNECTIONS = 64  # further ones get 503
 
 _log = logging.getLogger(__name__)
 

@@ -18,7 +18,7 @@ from drone_mesh.internet.http_settings import HttpSettings
 from drone_mesh.internet.status import ReadStatus
 from drone_mesh.users.desk import UsersDesk
 
-ANSWER_WITHIN_S = 2.0  # our choice: over ten times the duration of an order to a lost node
+ANSWER_WITHIN_S = 2.0  # over ten times the duration of an order to a lost node
 
 _log = logging.getLogger(__name__)
 

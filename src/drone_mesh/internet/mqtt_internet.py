@@ -38,12 +38,12 @@ from drone_mesh.internet.mqtt_topics import Broker, Topics
 from drone_mesh.users.desk import UsersDesk
 
 QOS = 1  # at least once
-KEEP_ALIVE_S = 15  # our choice: time until a broken connection is noticed and the last will is sent
-MOST_WAITING = 10_000  # our choice: messages for an absent broker; then new ones are dropped
-STATE_PERIOD_S = 5.0  # our choice
-RETRY_S = 0.5  # our choice: pause after the mesh's queue was full
+KEEP_ALIVE_S = 15  # time until a broken connection is noticed and the last will is sent
+MOST_WAITING = 10_000  # messages for an absent broker; then new ones are dropped
+STATE_PERIOD_S = 5.0
+RETRY_S = 0.5  # pause after the mesh's queue was full
 RETAINED = "retained messages are not sent: each new connection would send them again"
-_DELAYS_S = (1, 30)  # our choice: shortest and longest pause between attempts to connect
+_DELAYS_S = (1, 30)  # shortest and longest pause between attempts to connect
 
 _log = logging.getLogger(__name__)
 

@@ -16,10 +16,10 @@ from drone_mesh.web.server_thread import MAX_HEAD_BYTES
 if TYPE_CHECKING:
     from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-MOST_BODY_BYTES = 1024  # our choice: five times the longest goal in JSON
-MOST_DISCARDED_BYTES = 10_000_000  # our choice: of a refused body
-BODY_WITHIN_S = 2.0  # our choice
-MOST_TARGET_BYTES = 1024  # our choice: five times the longest valid address
+MOST_BODY_BYTES = 1024  # five times the longest goal in JSON
+MOST_DISCARDED_BYTES = 10_000_000  # of a refused body
+BODY_WITHIN_S = 2.0
+MOST_TARGET_BYTES = 1024  # five times the longest valid address
 
 
 class _PromptBody:

@@ -23,7 +23,6 @@ from drone_mesh.lab.scenario import Scenario
 from drone_mesh.lab.scenario_checks import check_scenario
 from drone_mesh.yaml_file import KeyPath, read_mapping, read_value
 
-# Our choices.
 MOST_CELLS = 10_000
 MOST_COMBINATIONS = 1_000_000  # of the axes, before `where`
 MOST_RUNS = 10_000_000  # docs/lab.md: shards keep the memory small

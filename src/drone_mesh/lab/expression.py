@@ -15,7 +15,7 @@ _ALLOWED = (
 )  # fmt: skip
 
 
-MOST_CHARACTERS = 1_000  # our choice
+MOST_CHARACTERS = 1_000
 _TIMES = "times()"  # no axis has such a name
 
 

@@ -14,7 +14,7 @@ from drone_mesh.state.formation_preview import preview
 from drone_mesh.state.model import MeshStatus
 from drone_mesh.state.standing_orders import PartState, StandingOrders
 
-LOOK_S = 1.0  # our choice: /mesh/state comes at least as often at real time
+LOOK_S = 1.0  # /mesh/state comes at least as often at real time
 
 Order = Callable[[int, float, float, int], None]
 """Orders a drone to x, y and a height, in metres."""

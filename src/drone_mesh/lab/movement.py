@@ -13,7 +13,7 @@ from drone_mesh.lab.streams import Streams
 from drone_mesh.mobility import Area, Track, tracks_of
 from drone_mesh.mobility.trace_files import read_trace
 
-LEAST_BETWEEN_ORDERS_S = 5.0  # our choice: of one drone; a model may turn more often
+LEAST_BETWEEN_ORDERS_S = 5.0  # of one drone; a model may turn more often
 LOOK_S = 1.0  # period at which the goals of told drones are compared
 
 

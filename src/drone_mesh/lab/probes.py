@@ -18,7 +18,7 @@ from drone_mesh.lab.network_sample import gateways_of, physical_graph
 from drone_mesh.lab.scenario import Probes
 
 KINDS = ("up", "down", "echo", "any")
-PORT = 77  # our choice: of these messages
+PORT = 77  # of these messages
 
 
 @dataclass

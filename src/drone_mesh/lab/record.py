@@ -18,7 +18,7 @@ from drone_mesh.lab.timeline import HandedIn, Happened, OrderAttempt
 from drone_mesh.state.model import EventRecord
 
 Place = Tuple[float, float, float]  # x, y, z in metres
-HOLD_S = 5.0  # our choice: least uninterrupted service that counts as healed
+HOLD_S = 5.0  # least uninterrupted service that counts as healed
 
 
 class Topology(NamedTuple):

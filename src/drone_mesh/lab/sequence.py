@@ -18,7 +18,7 @@ from drone_mesh.lab.streams import Streams
 
 GATEWAY = 0
 CONNECTED_WITHIN_S = 60.0
-LEAST_DISTANCE_M = 1.0  # our choice: of drones at the start
+LEAST_DISTANCE_M = 1.0  # of drones at the start
 NOTICED_S = 12.0  # time in which each node checks its connection
 REST_S = 60.0  # time without changes
 MOST_S = 1500.0  # after the last fault

@@ -15,7 +15,7 @@ from scipy import stats
 RESAMPLES = 2000
 CONFIDENCE = 0.95
 ROUNDING = 1e-12  # values that differ by less are equal
-FEWEST = 5  # our choice: resampling fewer values is meaningless
+FEWEST = 5  # resampling fewer values is meaningless
 SEED = 1  # for resampling: the same rows produce the same report
 
 

@@ -11,7 +11,7 @@ from drone_mesh.mobility.area import Area
 from drone_mesh.mobility.settings import Mobility
 from drone_mesh.mobility.track import Legs, Segment
 
-TURN_RAD = 1.0  # our choice: standard deviation of the direction around the drone's mean direction
+TURN_RAD = 1.0  # standard deviation of the direction around the drone's mean direction
 
 
 def gauss_markov(mobility: Mobility, area: Area, start: Vector, rng: random.Random) -> Legs:

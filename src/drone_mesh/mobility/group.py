@@ -12,7 +12,7 @@ from drone_mesh.mobility.random_waypoint import random_waypoint
 from drone_mesh.mobility.settings import Mobility
 from drone_mesh.mobility.track import Legs, Track, legs_between, rest
 
-WANDERING = 0.5  # our choice: mean speed within the group, as a share of the group's
+WANDERING = 0.5  # mean speed within the group, as a share of the group's
 
 
 def reference_point(mobility: Mobility, area: Area, rng: random.Random) -> Legs:

@@ -8,7 +8,7 @@ from drone_mesh.drone.flight_path import Vector
 from drone_mesh.mobility.area import Area
 from drone_mesh.mobility.settings import Mobility
 
-ARC_CORNERS = 16  # our choice: of a half circle
+ARC_CORNERS = 16  # of a half circle
 
 
 def lanes(mobility: Mobility, area: Area) -> list[Vector]:

@@ -18,7 +18,7 @@ from drone_mesh.mobility.settings import Knot
 
 TraceRow = Tuple[float, int, float, float, float]  # t (s), drone, x, y, z (m)
 
-MOST_BYTES = 50_000_000  # our choice, unpacked: 250 drones that say where they are for an hour
+MOST_BYTES = 50_000_000  # unpacked: 250 drones that say where they are for an hour
 CSV_HEADER = ["t", "id", "x", "y", "z"]
 
 

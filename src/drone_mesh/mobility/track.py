@@ -10,7 +10,7 @@ from typing import Iterable, Iterator, NamedTuple, Sequence
 
 from drone_mesh.drone.flight_path import CLIMB_ENDS_AT, DESCENT_STARTS_AT, Vector
 
-MOST_LEGS_KEPT = 512  # our choice: of the past; a longer look back raises ValueError
+MOST_LEGS_KEPT = 512  # of the past; a longer look back raises ValueError
 
 
 class Segment(NamedTuple):

@@ -26,9 +26,9 @@ __all__ = ["NRF24LowLevelInterface"]  # for users; see docs/architecture.md
 logger = logging.getLogger(__name__)
 
 POLL_S = 5e-3  # three payloads fit in the FIFO, and take 5.4 ms to arrive at 250 kbit/s
-VERIFY_PERIOD_S = 1.0  # our choice: how long a brown-out may stay unnoticed while listening
+VERIFY_PERIOD_S = 1.0  # how long a brown-out may stay unnoticed while listening
 IRQ_PATIENCE = 3  # contradictions between pin and chip; a single one may be a race
-RESTART_PERIOD_S = 1.0  # our choice: shortest time between two attempts to find a lost chip
+RESTART_PERIOD_S = 1.0  # shortest time between two attempts to find a lost chip
 
 
 class IrqWatch:

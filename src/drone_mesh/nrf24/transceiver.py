@@ -45,7 +45,7 @@ POWER_UP_S = 5e-3  # Tpd2stby is up to 4.5 ms, depending on the crystal [DS Tabl
 CE_PULSE_S = 20e-6  # Thce is 10 us; a pulse sends one packet and does not keep the chip in TX
 CE_TO_CSN_S = 5e-6  # Tpece2csn is 4 us
 TIMEOUT_S = 95e-3  # the longest transaction takes 87.1 ms
-_REMEMBERED = 64  # our choice: payloads whose PID is known; with others between, one may be lost
+_REMEMBERED = 64  # payloads whose PID is known; with others between, one may be lost
 _DRAIN_LIMIT = 32  # payloads at a time; the FIFO holds three, more arrive only while we read
 # How long an acknowledgement in progress may still take after CE went low.
 TX_DELAY_S = {DataRate.KBPS_250: 505e-6, DataRate.MBPS_1: 280e-6, DataRate.MBPS_2: 240e-6}

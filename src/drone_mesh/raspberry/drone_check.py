@@ -13,8 +13,8 @@ from drone_mesh.drone.engines import MAVLINK
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.raspberry.options import Options
 
-WITHIN_S = 30.0  # our choice: to the first heartbeat, and again to the last parameter
-HOME_WITHIN_S = 6.0  # our choice: after the parameters; it comes every 2 s
+WITHIN_S = 30.0  # to the first heartbeat, and again to the last parameter
+HOME_WITHIN_S = 6.0  # after the parameters; it comes every 2 s
 POLL_S = 0.05
 
 

@@ -10,7 +10,7 @@ from typing import Any
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.communication.observer import MeshEvent, MeshEventKind, Observers
 
-EVENTS_KEPT = 500  # our choice: an hour of a mesh with frequent changes
+EVENTS_KEPT = 500  # an hour of a mesh with frequent changes
 
 _ABOUT_GATEWAYS = frozenset(
     (MeshEventKind.CONNECTED, MeshEventKind.DISCONNECTED, MeshEventKind.GATEWAY_CHANGED)

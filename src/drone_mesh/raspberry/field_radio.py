@@ -32,7 +32,7 @@ TEST_TYPE = 255  # type of the field tools' packets; no node processes it
 RPD_VALID_S = 250e-6  # settling 130 us and 40 us of signal [DS 6.4], plus a margin
 SWITCH_S = 505e-6  # an acknowledgement that is being sent must not be cut off
 SEND_WITHIN_S = 95e-3  # the longest transaction takes 87.1 ms
-LEAST_POLLS = 50  # our choice: on a busy machine the time may pass while this process is paused
+LEAST_POLLS = 50  # on a busy machine the time may pass while this process is paused
 _POLL_S = 100e-6
 
 

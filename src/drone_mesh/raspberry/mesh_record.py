@@ -12,7 +12,7 @@ from typing import Any, Callable
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.execution import Submit
 
-PERIOD_S = 1.0  # our choice
+PERIOD_S = 1.0
 
 _log = logging.getLogger(__name__)
 

@@ -29,7 +29,7 @@ from drone_mesh.users.desk import UsersDesk
 from drone_mesh.users.local_socket import LocalSocket
 from drone_mesh.users.socket_path import socket_path
 
-ALIVE_WITHIN_S = 20.0  # our choice: two check periods, shorter than WatchdogSec of the units
+ALIVE_WITHIN_S = 20.0  # two check periods, shorter than WatchdogSec of the units
 
 _log = logging.getLogger(__name__)
 

@@ -10,7 +10,7 @@ from drone_mesh.communication.interfaces import NO_ROUTE, KnownNode
 from drone_mesh.communication.observer import MeshEvent, MeshEventKind, MeshObserver
 from drone_mesh.communication.reports.node_reports import ReportedNode
 
-LOST_AFTER_CHECKS = 3  # our choice: a route that is missing for a moment is not an event
+LOST_AFTER_CHECKS = 3  # a route that is missing for a moment is not an event
 
 
 @dataclass

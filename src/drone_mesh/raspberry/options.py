@@ -40,14 +40,14 @@ from drone_mesh.raspberry.wiring_options import (
     wired_hardware,
 )
 
-MOST_EMULATED = 17  # our choice: as in the field case, and what one machine can emulate
+MOST_EMULATED = 17  # as in the field case, and what one machine can emulate
 CHECK_DRONE = "check-drone"  # the last argument of raspberry_router
 LOG_LEVELS = ("debug", "info", "warning", "error")
 
 _BROADCASTS = {mode.value: mode for mode in BroadcastMode}
 
-OUTDOOR_CLEARANCE_M = 5.0  # our choice: satellite positions are accurate to a few metres
-OUTDOOR_RANGE_M = 100.0  # our choice: hardly any loss so near (nrf24/emulator/nrf24_range.csv)
+OUTDOOR_CLEARANCE_M = 5.0  # satellite positions are accurate to a few metres
+OUTDOOR_RANGE_M = 100.0  # hardly any loss so near (nrf24/emulator/nrf24_range.csv)
 
 
 @dataclass(frozen=True)

@@ -29,11 +29,11 @@ from drone_mesh.raspberry.service_manager import ServiceManager
 from drone_mesh.stopping import StopRequest, ends_as
 from drone_mesh.users.local_socket import warn_of_unreachable
 
-POLL_PERIOD_S = 0.5  # our choice: how often the main thread checks the nodes
-ALIVE_PERIOD_S = 5.0  # our choice: several times in WatchdogSec of the units
-STATUS_PERIOD_S = 60.0  # our choice: one line a minute for each node
-LONELY_AFTER_S = 15.0  # our choice: one check period and half of the next
-LONELY_AGAIN_S = 300.0  # our choice: period of the repeated warning
+POLL_PERIOD_S = 0.5  # how often the main thread checks the nodes
+ALIVE_PERIOD_S = 5.0  # several times in WatchdogSec of the units
+STATUS_PERIOD_S = 60.0  # one line a minute for each node
+LONELY_AFTER_S = 15.0  # one check period and half of the next
+LONELY_AGAIN_S = 300.0  # period of the repeated warning
 END_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 _log = logging.getLogger(__name__)

@@ -37,8 +37,8 @@ from drone_mesh.stopping import ends_as
 
 REPORT_ROUNDS = 20
 PARTNER_ID = 1  # with an emulated radio
-FARTHEST_M = 100_000.0  # our choice: no radio reaches further
-USUAL_NODES = 17  # our choice: the field case
+FARTHEST_M = 100_000.0  # no radio reaches further
+USUAL_NODES = 17  # the field case
 DISSECTOR = Path(__file__).with_name("drone_mesh.lua")
 
 

@@ -15,11 +15,11 @@ from drone_mesh.raspberry.field_radio import TEST_TYPE, FieldRadio
 
 Lines = Iterator[str]
 
-SPI_ROUNDS = 500  # our choice: each writes and reads an address of five bytes
-BURST = 100  # our choice: packets at full power, to make the supply dip
+SPI_ROUNDS = 500  # each writes and reads an address of five bytes
+BURST = 100  # packets at full power, to make the supply dip
 CHANNELS = 126
 BAR = 40  # columns of a bar
-SUGGESTED = 3  # channels; our choice
+SUGGESTED = 3  # channels
 BAND_END = 83  # the licence-free band ends at 2483.5 MHz
 WIFI = ((1, 12), (6, 37), (11, 62))  # Wi-Fi channel and its middle, as a channel of the radio
 MOST_NODES = ((50, "250k"), (101, "1M"), (254, "2M"))  # docs/performance.md, "The shared channel"

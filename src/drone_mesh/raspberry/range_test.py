@@ -21,11 +21,11 @@ from drone_mesh.raspberry.field_radio import SWITCH_S, TEST_TYPE, FieldRadio
 Lines = Iterator[str]
 
 RETRANSMITS = 15
-CONFIRM_WITHIN_S = 0.3  # our choice: a confirmation takes at most 0.09 s on the air
-CHANGE_WITHIN_S = 0.5  # our choice: writing the registers takes 6 ms, on a busy machine longer
-JOIN_WITHIN_S = 3.0  # our choice: seven announcements
+CONFIRM_WITHIN_S = 0.3  # a confirmation takes at most 0.09 s on the air
+CHANGE_WITHIN_S = 0.5  # writing the registers takes 6 ms, on a busy machine longer
+JOIN_WITHIN_S = 3.0  # seven announcements
 FAILED_PACKET_S = 0.06  # 16 frames at 250 kbit/s take 48 ms
-LONGEST_HOLD_S = 600  # our choice
+LONGEST_HOLD_S = 600
 
 _BODY = struct.Struct("<5sBH")  # kind of request, index of the rate, hold_s
 _FOLLOW, _FOLLOWING, _RETURN = b"RANGE", b"MOVED", b"ENDED"

@@ -19,7 +19,7 @@ from drone_mesh.communication.observer import in_hops
 from drone_mesh.stopping import ends_as
 from drone_mesh.users.local_client import NODE_VARIABLE, LocalClient, Refused, node_here
 
-MOST_SECONDS = 86400.0  # our choice: a day
+MOST_SECONDS = 86400.0  # a day
 
 _node_id = whole(0, MAX_NODE_ID)
 _port = whole(0, MAX_DATA_PORT)

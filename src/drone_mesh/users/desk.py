@@ -15,9 +15,9 @@ from drone_mesh.communication.data.transport import ReceivedMessage, Receiver, T
 from drone_mesh.errors import MessageRefused, QueueFull
 from drone_mesh.execution import Submit
 
-HANDOVER_S = 5.0  # our choice: a node accepts a message within this time
-LONGEST_WAIT_S = 300.0  # our choice: a reliable message is given up before
-STEP_S = 0.1  # our choice: how soon a wait notices that it has to end
+HANDOVER_S = 5.0  # a node accepts a message within this time
+LONGEST_WAIT_S = 300.0  # a reliable message is given up before
+STEP_S = 0.1  # how soon a wait notices that it has to end
 MOST_UNREAD = 256  # messages that may wait for a slow listener; the oldest is dropped
 
 

@@ -17,7 +17,7 @@ from drone_mesh.errors import MeshError
 from drone_mesh.users.socket_path import node_of, served_sockets, socket_folder, socket_path
 
 NODE_VARIABLE = "DRONE_MESH_NODE"  # the id to use if a program does not name one
-CONNECT_WITHIN_S = 5.0  # our choice
+CONNECT_WITHIN_S = 5.0
 
 
 class NodeUnreachable(MeshError):

@@ -29,9 +29,9 @@ from drone_mesh.errors import ConfigurationError, MessageRefused
 from drone_mesh.users.desk import Sending, UsersDesk, check_wait, in_json
 from drone_mesh.users.socket_path import is_served
 
-MOST_REQUEST_BYTES = 4096  # our choice: a message of 1,024 bytes in base64 takes 1,400
-MOST_CLIENTS = 32  # our choice
-REQUEST_WITHIN_S = 5.0  # our choice
+MOST_REQUEST_BYTES = 4096  # a message of 1,024 bytes in base64 takes 1,400
+MOST_CLIENTS = 32
+REQUEST_WITHIN_S = 5.0
 _POLL_S = 0.1  # how soon a listener's thread notices the end of the node
 
 _log = logging.getLogger(__name__)

@@ -7,7 +7,7 @@ from typing import Sequence, Tuple
 
 from drone_mesh.state.model import NodeStatus, position_is_known
 
-COINCIDENT_M = 0.25  # our choice: closer than this, two drones of 0.2 m look like one
+COINCIDENT_M = 0.25  # closer than this, two drones of 0.2 m look like one
 
 Slot = Tuple[int, int]  # number of the node in its group, from 0; size of the group
 

@@ -18,7 +18,7 @@ ROTOR_RADIUS_M = 0.037
 BLADE_WIDTH_M = 0.012
 ROTOR_LOW_M, ROTOR_HIGH_M = 0.070, 0.074
 DISC_HIGH_M = 0.072
-ROTOR_RAD_PER_S = 9.0  # our choice: a real one is a blur
+ROTOR_RAD_PER_S = 9.0  # a real one is a blur
 
 _Place = Tuple[float, float]
 

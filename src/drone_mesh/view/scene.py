@@ -25,7 +25,7 @@ from drone_mesh.state.trouble import find_trouble, summarise
 from drone_mesh.view.fan import Slot, fan_offset, fan_out
 from drone_mesh.view.palette import LIGHT, Colour
 
-MOST_LINKS = 600  # our choice, per use: more cannot be told apart
+MOST_LINKS = 600  # per use: more cannot be told apart
 DRONE_WIDTH_M = max(Role.ROUTER.size_m)
 HALF_DIAGONAL_M = DRONE_WIDTH_M / math.sqrt(2)
 WIDEST_OF_CROWDING = 0.3  # greatest drawn width of a drone, as a share of the drones' distance

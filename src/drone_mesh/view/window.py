@@ -18,7 +18,7 @@ from drone_mesh.view.scene import DronePicture, Scene, drawing_scale
 SIZE = (1280, 800)  # pixels
 LINK_PIXELS = {LinkUse.KNOWN: 1.0, LinkUse.LOST: 1.0, LinkUse.ROUTE: 3.0}
 PATH_PIXELS = 2.0
-LARGEST = 5.0  # our choice: how much drones are enlarged where there is room
+LARGEST = 5.0  # how much drones are enlarged where there is room
 ID_ABOVE = 1.6  # heights of a drone, above its underside
 TEXT_SIZE = 1.2  # in units of pybullet
 INK = rgb(LIGHT.ink)

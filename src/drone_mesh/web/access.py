@@ -17,9 +17,9 @@ from drone_mesh.errors import ConfigurationError, MeshError
 from drone_mesh.web import LOOPBACK
 from drone_mesh.web.allowance import Allowance, client_of, numeric_address
 
-SHORTEST_TOKEN = 16  # characters; our choice: too long to be guessed over a network
-FREE_GUESSES = 10  # our choice: an old cookie or a typing error costs no time
-GUESS_PERIOD_S = 1.0  # our choice: of further wrong tokens of one address
+SHORTEST_TOKEN = 16  # characters; too long to be guessed over a network
+FREE_GUESSES = 10  # an old cookie or a typing error costs no time
+GUESS_PERIOD_S = 1.0  # of further wrong tokens of one address
 
 
 class AccessDenied(MeshError):

@@ -8,7 +8,7 @@ import socket
 from drone_mesh.errors import ConfigurationError
 
 MAX_PORT = 65535
-BACKLOG = 64  # our choice
+BACKLOG = 64
 
 _HINTS = {
     errno.EADDRINUSE: "another program uses it; choose another port",

@@ -7,8 +7,8 @@ from typing import Any
 
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-HEAD_WITHIN_S = 5.0  # our choice: from connecting, or the first byte, to the end of the headers
-MOST_SILENT = 32  # our choice: connections without a request; the oldest makes room for a new one
+HEAD_WITHIN_S = 5.0  # from connecting, or the first byte, to the end of the headers
+MOST_SILENT = 32  # connections without a request; the oldest makes room for a new one
 
 
 class PromptProtocol(H11Protocol):

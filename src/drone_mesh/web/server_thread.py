@@ -16,8 +16,8 @@ from drone_mesh.web.tls import Certificate
 if TYPE_CHECKING:
     from starlette.types import ASGIApp
 
-MAX_HEAD_BYTES = 8192  # our choice: all headers of a request together
-LAST_ANSWERS_WITHIN_S = 1  # our choice: for requests that are in progress when the server stops
+MAX_HEAD_BYTES = 8192  # all headers of a request together
+LAST_ANSWERS_WITHIN_S = 1  # for requests that are in progress when the server stops
 
 
 class ServerThread:

@@ -12,7 +12,7 @@ GRAVITY_M_S2 = 9.81
 
 @dataclass(frozen=True)
 class BodyLimits:
-    """The limits of the body. Our choices, for a drone of 1 kg with a 5 inch frame."""
+    """The limits of the body, chosen for a drone of 1 kg with a 5 inch frame."""
 
     mass_kg: float = 1.0
     drag_n_per_m_s: float = 0.25  # linear: 0.5 N at 2 m/s

@@ -16,9 +16,9 @@ from drone_mesh.world.engine import DroneEngine
 
 ARRIVED_M = 0.15
 STANDS_M_S = 0.1
-PILOT_LEAD_M = 1.0  # our choice: greatest distance of the place that a pilot wants it to hold
+PILOT_LEAD_M = 1.0  # greatest distance of the place that a pilot wants it to hold
 ON_GROUND_M = 0.02  # of its underside
-LAND_AT_PERCENT = 20.0  # our choice: it lands while it still can
+LAND_AT_PERCENT = 20.0  # it lands while it still can
 MOVED_M = 1e-4  # a smaller movement is not reported
 SETTLED_S = 0.1  # time after the last movement until its position is reported once more
 

@@ -18,7 +18,7 @@ from drone_mesh.mobility.pilot import TrackPilot
 from drone_mesh.world.interfaces import World
 
 ARRIVED_M = 0.01  # on each axis
-PILOT_STEP_S = 0.1  # our choice: a pilot moves its drone ten times a second
+PILOT_STEP_S = 0.1  # a pilot moves its drone ten times a second
 
 _log = logging.getLogger(__name__)
 

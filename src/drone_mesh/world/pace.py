@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-CATCH_UP_S = 0.5  # our choice: a delay up to this is caught up; the rest of a longer one is lost
+CATCH_UP_S = 0.5  # a delay up to this is caught up; the rest of a longer one is lost
 
 
 class Pace:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import logging
 
-PATIENCE_S = 1.0  # our choice, wall; a packet on a busy machine is under way for a fraction of it
-_HASTE = 0.5  # our choice: factor on the patience after each loss
+PATIENCE_S = 1.0  # wall; a packet on a busy machine is under way for a fraction of it
+_HASTE = 0.5  # factor on the patience after each loss
 _SHORTEST_S = 0.01  # wall
 
 _log = logging.getLogger(__name__)

@@ -16,7 +16,7 @@ from typing import Callable, Iterable
 from drone_mesh.communication.data.inbox import Inbox
 from drone_mesh.communication.medium import FAST_HOP_S, Medium
 
-# Our choice, at 250 kbit/s and per check period of patience: up to 1 s, a first timeout (RFC 6298).
+# At 250 kbit/s and per check period of patience: up to 1 s, a first timeout (RFC 6298).
 TURN_S = 0.4
 
 

@@ -10,9 +10,9 @@ from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.ticket import TO_ALL
 from drone_mesh.communication.parts import NodeParts
 
-REMEMBERED_S = 5.0  # our choice: longer than a fragment takes through the mesh
+REMEMBERED_S = 5.0  # longer than a fragment takes through the mesh
 MOST_REMEMBERED = 1024  # numbers of all senders together
-MOST_HEADS = 4  # our choice: messages under one number within REMEMBERED_S
+MOST_HEADS = 4  # messages under one number within REMEMBERED_S
 
 
 class _Repeated(NamedTuple):

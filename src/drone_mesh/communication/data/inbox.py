@@ -12,12 +12,12 @@ from drone_mesh.communication.data.packets import COMPLETE, Ack, Poll
 from drone_mesh.communication.data.reassembly import Open, Reassembly, Whole
 from drone_mesh.communication.medium import Medium
 
-ACK_DELAY_S = 0.02  # our choice: complete messages are acknowledged after a pause of this time
-ACK_LATEST_S = 0.2  # our choice: or after this time without a pause
-ACK_AT = 96  # our choice: after this many fragments of complete messages an ACK leaves at once
-REPEAT_S = 0.3  # our choice: least time between unsolicited repetitions of an ACK
+ACK_DELAY_S = 0.02  # complete messages are acknowledged after a pause of this time
+ACK_LATEST_S = 0.2  # or after this time without a pause
+ACK_AT = 96  # after this many fragments of complete messages an ACK leaves at once
+REPEAT_S = 0.3  # least time between unsolicited repetitions of an ACK
 MOST_PORTS = 64  # per sender: the order is kept for the ports used last
-FORMER_SESSION_S = 30.0  # our choice: longer than a packet can take to arrive
+FORMER_SESSION_S = 30.0  # longer than a packet can take to arrive
 
 
 class Inbox:

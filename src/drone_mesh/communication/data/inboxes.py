@@ -17,7 +17,7 @@ from drone_mesh.communication.data.ticket import TO_ALL
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.communication.parts import NodeParts
 
-TIDY_PERIOD_S = 5.0  # our choice: how often old fragments are dropped
+TIDY_PERIOD_S = 5.0  # how often old fragments are dropped
 MOST_INBOXES = 2 * MAX_NODE_ID  # every other node, with its messages to this one and to all
 
 OnArrived = Callable[[int, bool, Whole], None]

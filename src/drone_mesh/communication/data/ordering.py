@@ -7,7 +7,7 @@ from collections import deque
 from drone_mesh.communication.data.packets import MOST_BEHIND
 from drone_mesh.communication.data.reassembly import Whole
 
-HOLD_S = 300.0  # our choice: longer than a sender retries (LIFETIME_S of outgoing.py)
+HOLD_S = 300.0  # longer than a sender retries (LIFETIME_S of outgoing.py)
 _HALF = 1 << 15
 
 

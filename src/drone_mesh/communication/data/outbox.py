@@ -22,7 +22,7 @@ from drone_mesh.communication.data.packets import COMPLETE, NO_ANSWER, Ack, Poll
 from drone_mesh.communication.data.ticket import TicketState, destination_in_words
 from drone_mesh.communication.data.train import Train
 
-MOST_DOUBLED = 6  # our choice: with a search of half a second, to about half a minute
+MOST_DOUBLED = 6  # with a search of half a second, to about half a minute
 
 
 class Outbox:

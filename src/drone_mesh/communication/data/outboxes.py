@@ -25,9 +25,9 @@ from drone_mesh.communication.data.ticket import (
 from drone_mesh.communication.interfaces import NO_ROUTE, IMeshDebugInfo
 from drone_mesh.communication.parts import NodeParts
 
-BURST = 8  # our choice: packets sent before others get their turn
-FOUND_WITHIN_S = 0.5  # our choice: a gateway's search passes through 100 nodes
-ROUTE_PERIOD_S = 0.5  # our choice: how often an outbox without a route looks for one
+BURST = 8  # packets sent before others get their turn
+FOUND_WITHIN_S = 0.5  # a gateway's search passes through 100 nodes
+ROUTE_PERIOD_S = 0.5  # how often an outbox without a route looks for one
 
 
 class Outboxes:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from drone_mesh.communication.data.packets import Head
 from drone_mesh.communication.data.ticket import Ticket
 
-LIFETIME_S = 240.0  # our choice: a repair takes up to two minutes and a flight
+LIFETIME_S = 240.0  # a repair takes up to two minutes and a flight
 
 
 class DataPacket(NamedTuple):

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-FIRST_SIZE = 32  # our choice: less than a message of 1,024 bytes
+FIRST_SIZE = 32  # less than a message of 1,024 bytes
 LEAST_SIZE = 4
-MOST_SIZE = 256  # our choice: six messages of 1,024 bytes
+MOST_SIZE = 256  # six messages of 1,024 bytes
 FIRST_TIMEOUT_S = 1.0  # RFC 6298, 2.1
-LEAST_TIMEOUT_S = 0.3  # our choice: above the half second of circulation after one doubling
-MOST_TIMEOUT_S = 30.0  # our choice: three check periods; with less, POLLs alone fill a channel
+LEAST_TIMEOUT_S = 0.3  # above the half second of circulation after one doubling
+MOST_TIMEOUT_S = 30.0  # three check periods; with less, POLLs alone fill a channel
 
 
 class CongestionWindow:

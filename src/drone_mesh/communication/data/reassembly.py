@@ -9,11 +9,11 @@ from typing import Callable, NamedTuple, Optional
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.packets import COMPLETE, Head
 
-EXPIRES_S = 60.0  # our choice: an incomplete message is dropped after this time without fragments
+EXPIRES_S = 60.0  # an incomplete message is dropped after this time without fragments
 MOST_PARTIAL = 24  # incomplete messages of one sender, which has at most 16 under way
 _LIVE = 64  # numbers: older messages are no longer under way
-DONE_S = 300.0  # our choice: longer than a sender retries (LIFETIME_S of outgoing.py)
-SILENCE_S = 5.0  # our choice: in less, a sender does not use 192 numbers that all get lost
+DONE_S = 300.0  # longer than a sender retries (LIFETIME_S of outgoing.py)
+SILENCE_S = 5.0  # in less, a sender does not use 192 numbers that all get lost
 
 
 Open = Callable[[bytes, bytes], Optional[bytes]]

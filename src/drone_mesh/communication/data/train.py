@@ -8,10 +8,10 @@ from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.fragmentation import MOST_OPEN
 from drone_mesh.communication.data.pacing import FIRST_TIMEOUT_S, RoundTrip
 
-FIRST_LENGTH = 32  # our choice, in fragments
-LEAST_LENGTH = 8  # our choice
-MOST_LENGTH = 80  # our choice: two messages of 1,024 bytes; a relay forwards it in one piece
-MOST_IN_TURN = 6  # our choice: with 12, turns are long and few
+FIRST_LENGTH = 32  # in fragments
+LEAST_LENGTH = 8
+MOST_LENGTH = 80  # two messages of 1,024 bytes; a relay forwards it in one piece
+MOST_IN_TURN = 6  # with 12, turns are long and few
 
 
 class Train:

@@ -24,7 +24,7 @@ from drone_mesh.communication.interfaces import MAX_NODE_ID, IMeshDebugInfo
 from drone_mesh.communication.parts import NodeParts
 from drone_mesh.errors import MessageRefused, PacketError, QueueFull
 
-MOST_QUEUED = 64  # our choice: messages waiting or under way, in total
+MOST_QUEUED = 64  # messages waiting or under way, in total
 
 
 class ReceivedMessage(NamedTuple):

@@ -17,9 +17,9 @@ from drone_mesh.communication.observer import MeshEventKind, in_hops
 from drone_mesh.communication.place_requests import ask_for_place
 from drone_mesh.communication.router_states import ConnectionState, RouterEvent, RouterStates
 
-_HOPS_UNTIL_KNOWN = 10  # our choice: the number of hops for which to wait for the first answer
-RESIGNED_PERIODS = 2.5  # our choice: a gateway without internet that is silent for longer is lost
-NONCE_PERIODS = 5.0  # our choice: a gateway's nonce is valid for two minutes after it was told
+_HOPS_UNTIL_KNOWN = 10  # the number of hops for which to wait for the first answer
+RESIGNED_PERIODS = 2.5  # a gateway without internet that is silent for longer is lost
+NONCE_PERIODS = 5.0  # a gateway's nonce is valid for two minutes after it was told
 MAX_AGE_PERIODS = 3  # docs/protocol.md, "Places to step back to": of the gateway's place
 
 

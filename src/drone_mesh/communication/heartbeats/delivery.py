@@ -19,8 +19,8 @@ from drone_mesh.communication.parts import NodeBasics
 from drone_mesh.communication.routing.interfaces import IRoutingTechnique
 from drone_mesh.communication.ways import IDelivery
 
-DATA_PERSISTENCE = 3  # our choice: users' packets are many, so a chain of losses is more likely
-SENT_KEPT_S = 30.0  # our choice: on a busy channel a packet is under way for seconds
+DATA_PERSISTENCE = 3  # users' packets are many, so a chain of losses is more likely
+SENT_KEPT_S = 30.0  # on a busy channel a packet is under way for seconds
 
 
 class Delivery(IDelivery):

@@ -7,8 +7,8 @@ import math
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.neighbours import Neighbours
 
-AVOIDED_S = 60.0  # our choice: for a neighbour through which no answer came
-SWALLOWER_AVOIDED_S = 600.0  # our choice: for a neighbour that seems to swallow packets
+AVOIDED_S = 60.0  # for a neighbour through which no answer came
+SWALLOWER_AVOIDED_S = 600.0  # for a neighbour that seems to swallow packets
 
 
 class Detours:

@@ -16,7 +16,7 @@ from drone_mesh.communication.routing.interfaces import IRoutingTechnique
 from drone_mesh.communication.timing import CIRCULATION_S
 
 _HEARTBEAT = int(MessageType.HEARTBEAT)
-CREATORS_TOLD = 8  # our choice: MISSING to one creator of users' data, per limits.LIMIT_PERIOD_S
+CREATORS_TOLD = 8  # MISSING to one creator of users' data, per limits.LIMIT_PERIOD_S
 
 
 class Forwarding:

@@ -11,8 +11,8 @@ from drone_mesh.communication.deadlines import Due
 from drone_mesh.communication.heartbeats.parts import HeartbeatParts
 from drone_mesh.communication.packet_types import MessageType
 
-AFTER_POWER_S = 0.2  # our choice: the medium must register the antenna first
-SPREAD_S = 1.0  # our choice: spreads the nodes' packets after an outage
+AFTER_POWER_S = 0.2  # the medium must register the antenna first
+SPREAD_S = 1.0  # spreads the nodes' packets after an outage
 
 _PRESENT = int(MessageType.PRESENT)
 

@@ -18,11 +18,11 @@ from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.parts import NodeParts
 
 BODY = MessageType.NODE_SEARCH.about.layout
-SEARCH_EVERY_S = 0.3  # our choice: each search is one broadcast by every node
-SAME_SEARCH_S = 10.0  # our choice: far longer than a search takes to pass through a mesh
-FIRST_PAUSE_S = 1.0  # our choice: a search passes through 100 nodes within half a second
-LONGEST_PAUSE_S = 60.0  # our choice: a search in vain doubles the pause, up to this
-NUMBERS_PER_S = 16  # our choice, for orders too: a restarted gateway starts at another number
+SEARCH_EVERY_S = 0.3  # each search is one broadcast by every node
+SAME_SEARCH_S = 10.0  # far longer than a search takes to pass through a mesh
+FIRST_PAUSE_S = 1.0  # a search passes through 100 nodes within half a second
+LONGEST_PAUSE_S = 60.0  # a search in vain doubles the pause, up to this
+NUMBERS_PER_S = 16  # for orders too: a restarted gateway starts at another number
 
 
 class NodeSearch:

@@ -16,9 +16,9 @@ from drone_mesh.communication.heartbeats.parts import HeartbeatParts
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.place_requests import ask_for_place
 
-ASK_PERIODS = 3.0  # our choice, in check periods: one packet and its answer in half a minute
-WAIT_PERIODS = 0.9  # our choice, in check periods: a question that is younger may be answered yet
-LEAST_UNANSWERED = 2  # our choice: for a next hop chosen because another one swallowed packets
+ASK_PERIODS = 3.0  # in check periods: one packet and its answer in half a minute
+WAIT_PERIODS = 0.9  # in check periods: a question that is younger may be answered yet
+LEAST_UNANSWERED = 2  # for a next hop chosen because another one swallowed packets
 
 _log = logging.getLogger(__name__)
 

@@ -21,7 +21,7 @@ from drone_mesh.communication.router_states import (
 from drone_mesh.communication.routing.interfaces import IRoutingTechnique
 
 _HEARTBEAT = int(MessageType.HEARTBEAT)
-CHANGE_PERIODS = 0.3  # our choice: until the check after a neighbour was lost, on average
+CHANGE_PERIODS = 0.3  # until the check after a neighbour was lost, on average
 
 
 class RouterHeartbeats(HeartbeatPlane):

@@ -26,7 +26,7 @@ from drone_mesh.communication.router_states import RepairState, RouterEvent, Rou
 from drone_mesh.drone.location import Location
 
 RADIO_FAILED = "its radio does not work"
-TRIED_SPOTS = 4  # our choice: more take all spots around a place, so that the drone drifts away
+TRIED_SPOTS = 4  # more take all spots around a place, so that the drone drifts away
 
 
 class Step(NamedTuple):

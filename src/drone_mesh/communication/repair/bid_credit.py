@@ -11,7 +11,7 @@ from collections import Counter
 from drone_mesh.communication.interfaces import MAX_NODE_ID, NO_ROUTE
 from drone_mesh.drone.location import Location
 
-WINNERS_WITHOUT_FLIGHT = 3  # our choice: a winner may also fail to fly for honest reasons
+WINNERS_WITHOUT_FLIGHT = 3  # a winner may also fail to fly for honest reasons
 
 
 class BidCredit:

@@ -24,7 +24,7 @@ from drone_mesh.communication.repair.taken_places import TakenPlaces
 from drone_mesh.communication.router_states import RepairState, RouterEvent, RouterStates
 from drone_mesh.drone.location import Location
 
-MOVING_PATIENCE = 3.0  # our choice: while drones move by themselves, a lost link may come back
+MOVING_PATIENCE = 3.0  # while drones move by themselves, a lost link may come back
 ROUNDING_S = 1e-6  # sums of periods are not exact
 
 

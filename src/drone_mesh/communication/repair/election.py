@@ -8,7 +8,7 @@ from typing import AbstractSet, NamedTuple
 from drone_mesh.communication.messages import MovementNegotiationMessage
 
 NO_BID = -1.0  # the score of a node that does not fly
-MAX_SCORE_M = 1e9  # our choice: beyond every possible place, and it fits a float32
+MAX_SCORE_M = 1e9  # beyond every possible place, and it fits a float32
 TOOK_OFF = 2e9  # sent in place of a score: the winner takes off
 TOOK_OFF_HOME = 3e9  # the same, and it flies to the gateway's place
 HOME_FAILED = 4e9  # sent in place of NO_BID: no gateway answered at the gateway's place

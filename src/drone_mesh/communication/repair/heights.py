@@ -6,7 +6,7 @@ from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused
 
-LOWEST_M = -10.0  # our choice: a place further below the origin is a mistake
+LOWEST_M = -10.0  # a place further below the origin is a mistake
 
 
 def above_ground(place: Location) -> Location:

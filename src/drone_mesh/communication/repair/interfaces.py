@@ -15,7 +15,7 @@ from drone_mesh.communication.repair.actions import RepairActions
 from drone_mesh.communication.repair.election import NO_BID
 from drone_mesh.drone.location import Location
 
-SILENCE_PATIENCE = 5.0  # our choice: the factor on a node's patience if its medium may be down
+SILENCE_PATIENCE = 5.0  # the factor on a node's patience if its medium may be down
 
 
 class IRepairStrategy(abc.ABC):

@@ -16,11 +16,11 @@ from drone_mesh.communication.repair.interfaces import SILENCE_PATIENCE, IRepair
 from drone_mesh.communication.router_states import RepairState
 from drone_mesh.drone.location import Location
 
-LISTENS_S = 1.0  # our choice: an answer takes some milliseconds
-SETTLES_S = 5.0  # our choice: by then the others are back, too, if the medium was down
-SAMPLES = 8  # our choice: of the power in the channel, before each decision to fly
-SAMPLE_S = 0.15  # our choice: longer than an antenna needs for a new sample, 0.1 s
-JAMMED_SHARE = 0.5  # our choice: a jammer may pulse; frames of strangers take less of the time
+LISTENS_S = 1.0  # an answer takes some milliseconds
+SETTLES_S = 5.0  # by then the others are back, too, if the medium was down
+SAMPLES = 8  # of the power in the channel, before each decision to fly
+SAMPLE_S = 0.15  # longer than an antenna needs for a new sample, 0.1 s
+JAMMED_SHARE = 0.5  # a jammer may pulse; frames of strangers take less of the time
 
 
 class LoneRepair(IRepairStrategy):

@@ -10,7 +10,7 @@ from drone_mesh.errors import ConfigurationError
 
 DEFAULT_REPAIR = "thesis"
 RANGE_M = 9.0  # docs/ros.md, "Wireless signal simulator": a node nearer than this is in range
-CLEARANCE_M = 1.0  # our choice: two drones of 0.5 m with a position error of 0.25 m each
+CLEARANCE_M = 1.0  # two drones of 0.5 m with a position error of 0.25 m each
 
 
 class LostPlace(enum.Enum):

@@ -12,10 +12,10 @@ from drone_mesh.drone.location import Location
 BLOCK = 8  # spots along each side of a block
 BLOCKS = (2, 4, BLOCK)  # each divides the next one
 FLOORS = 4  # BLOCK * BLOCK * FLOORS spots: one for each of the 256 ids
-WITHIN_REACH = 0.9  # our choice, of the range: how far behind a node that moved a drone stays
+WITHIN_REACH = 0.9  # of the range: how far behind a node that moved a drone stays
 PITCH = 1.1  # distance of spots in clearances, with a margin for rounding
 NEAR = 1.5  # in clearances: a drone so near to a place has taken it
-DIRECTIONS = 24  # our choice: of the spots that are compared for the links that they keep
+DIRECTIONS = 24  # of the spots that are compared for the links that they keep
 
 
 class Landing(NamedTuple):

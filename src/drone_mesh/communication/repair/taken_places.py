@@ -13,7 +13,7 @@ from drone_mesh.communication.repair.options import LostPlace, RepairOptions
 from drone_mesh.communication.repair.spots import Landing, free_spot
 from drone_mesh.drone.location import Location
 
-FRESH_S = 5.0  # our choice: with EXACT, a drone that was silent for longer takes no place
+FRESH_S = 5.0  # with EXACT, a drone that was silent for longer takes no place
 
 
 class TakenPlaces:

@@ -19,7 +19,7 @@ from drone_mesh.communication.reports.node_report import (
 )
 from drone_mesh.communication.text_parts import TextAssembly
 
-WORDS_AGAIN_REPORTS = 10  # our choice: unchanged words are repeated for a new gateway
+WORDS_AGAIN_REPORTS = 10  # unchanged words are repeated for a new gateway
 
 
 class NodeReporter:

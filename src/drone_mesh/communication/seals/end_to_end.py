@@ -29,12 +29,12 @@ from drone_mesh.communication.seals.replay import ReplayWindow
 from drone_mesh.communication.seals.seal import SEAL_AT, SEAL_BYTES
 from drone_mesh.errors import PacketError
 
-NEW_NONCE_AFTER_S = 5.0  # our choice: with the next heartbeat to a gateway
-# Our choice, of a gateway: a restarted router cannot know which sequence numbers it has used, and
-# some hear a gateway's nonce once a minute only.
+NEW_NONCE_AFTER_S = 5.0  # with the next heartbeat to a gateway
+# Of a gateway: a restarted router cannot know which sequence numbers it has used, and some hear a
+# gateway's nonce once a minute only.
 NEW_GATEWAY_NONCE_AFTER_S = 60.0
-NONCES = 3  # our choice: two heartbeats may be lost
-SAME_PACKET_S = 0.1  # our choice: retransmissions and copies follow at once
+NONCES = 3  # two heartbeats may be lost
+SAME_PACKET_S = 0.1  # retransmissions and copies follow at once
 ORDER_TAG_BYTES = 6
 TAG_BYTES = 4
 

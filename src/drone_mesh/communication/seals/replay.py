@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-WIDTH = 512  # our choice: packets of a busy sender that may overtake each other in its queue
-LATELY_S = 10.0  # our choice: on a busy channel a packet and its copies are under way for seconds
+WIDTH = 512  # packets of a busy sender that may overtake each other in its queue
+LATELY_S = 10.0  # on a busy channel a packet and its copies are under way for seconds
 
 
 class ReplayWindow:

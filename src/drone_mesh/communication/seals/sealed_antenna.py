@@ -29,10 +29,10 @@ from drone_mesh.communication.seals.message_seal import MessageSeal
 from drone_mesh.communication.seals.seal import SEAL_AT, SEAL_BYTES, HopSeal, NotOpened
 from drone_mesh.communication.timing import MeshTiming
 
-FRESH_PERIODS = 3.0  # our choice: a neighbour sends something once per check period
-FOREIGN_AFTER_S = 20.0  # our choice: two check periods; a restarted neighbour answers by then
-FORGOTTEN_S = 60.0  # our choice: then the counts start again
-LEAST_PACKETS = 3  # our choice: damage that a checksum does not show is rarer
+FRESH_PERIODS = 3.0  # a neighbour sends something once per check period
+FOREIGN_AFTER_S = 20.0  # two check periods; a restarted neighbour answers by then
+FORGOTTEN_S = 60.0  # then the counts start again
+LEAST_PACKETS = 3  # damage that a checksum does not show is rarer
 
 _CHALLENGE, _ANSWER = int(MessageType.SEAL_CHALLENGE), int(MessageType.SEAL_ANSWER)
 _INTRODUCTIONS = (int(MessageType.PRESENT), int(MessageType.BEACON))

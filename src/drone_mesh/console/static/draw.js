@@ -15,7 +15,7 @@ const MOTORS = [
 const MOTOR_AT = 1.2; // in radii of a drone, as the next two
 const ROTOR = 0.45;
 const HULL = 0.85;
-const ROTOR_RAD_PER_S = 9; // our choice: a real one is a blur
+const ROTOR_RAD_PER_S = 9; // a real one is a blur
 const MOST_LINKS = 4000; // known links; with more, which would be a grey blot, only those of the selected node are drawn
 
 const MOST_LOST = 1500; // lost links drawn: the shortest ones, as in rviz

@@ -4,7 +4,7 @@ import { arrowKeys } from "./arrows.js";
 import { idLinks } from "./panel.js";
 
 const ROWS_SHOWN = 300;
-const SAME_WITHIN_S = 5; // simulated; our choice: events so close may share a sentence
+const SAME_WITHIN_S = 5; // simulated; events so close may share a sentence
 const LOOKED_BACK = 8; // sentences, for one that an event can share
 const NEIGHBOUR_KINDS = new Set(["neighbour found", "neighbour lost", "node missing"]);
 

@@ -3,7 +3,7 @@
 
 import { onScreen } from "./draw.js";
 
-const RUN_MS = 700; // our choice: a packet takes 2 ms, which cannot be seen
+const RUN_MS = 700; // a packet takes 2 ms, which cannot be seen
 const START_MS = 300; // from a packet's arrival to the start of its dot: each sample has reached the page by then
 const MOST_DOTS = 600;
 const FRAME_MS = 33;

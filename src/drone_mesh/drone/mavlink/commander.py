@@ -12,8 +12,8 @@ from drone_mesh.drone.geodesy import EarthPlace
 from drone_mesh.drone.mavlink.telemetry import ESTIMATE_HZ, STREAMS_HZ, Message, Telemetry
 
 HEARTBEAT_PERIOD_S = 1.0  # required by MAVLink
-ASK_STREAMS_PERIOD_S = 5.0  # our choice
-CARRIED_OUT_WITHIN_S = 8.0  # our choice: reports come every second, and some get lost
+ASK_STREAMS_PERIOD_S = 5.0
+CARRIED_OUT_WITHIN_S = 8.0  # reports come every second, and some get lost
 MOST_SERIOUS = mavlink.MAV_SEVERITY_WARNING  # of texts that are reasons; greater is less serious
 
 POSITION_ONLY = (
@@ -28,8 +28,8 @@ POSITION_ONLY = (
 )
 
 
-PERIOD_S = 1.0  # our choice: an autopilot acknowledges within tens of milliseconds
-REFUSED_AFTER_S = 1.5  # our choice: the words, or the effect of a try before, may come later
+PERIOD_S = 1.0  # an autopilot acknowledges within tens of milliseconds
+REFUSED_AFTER_S = 1.5  # the words, or the effect of a try before, may come later
 MOST_WORDS = 50  # of a STATUSTEXT
 
 TAKEN = (mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_IN_PROGRESS)

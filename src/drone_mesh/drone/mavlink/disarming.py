@@ -10,10 +10,10 @@ import math
 
 from drone_mesh.drone.mavlink.telemetry import Telemetry
 
-FELL_M = 1.5  # our choice: above the noise of a height at rest
-FELL_WITHIN_S = 5.0  # our choice: a fall from 50 m takes 3.2 s
-ORDER_WITHIN_S = 5.0  # our choice: an order of this program has changed the mode by then
-ARMED_WITHIN_S = 0.5  # our choice: a heartbeat just after the acknowledgement may be older
+FELL_M = 1.5  # above the noise of a height at rest
+FELL_WITHIN_S = 5.0  # a fall from 50 m takes 3.2 s
+ORDER_WITHIN_S = 5.0  # an order of this program has changed the mode by then
+ARMED_WITHIN_S = 0.5  # a heartbeat just after the acknowledgement may be older
 
 
 class Disarming:

@@ -16,11 +16,11 @@ from drone_mesh.drone.mavlink.pilot import MavlinkPilot
 from drone_mesh.drone.mavlink.pilot_status import PilotStatus
 from drone_mesh.errors import GoalRefused, LocationUnknown
 
-TICK_S = 0.05  # our choice: four ticks per target
+TICK_S = 0.05  # four ticks per target
 STALE_S = 2.0  # an older status is no longer valid
-LONGEST_STEP_S = 0.2  # our choice: four ticks of the engine; what is longer was not listening
-ASLEEP_S = 1.0  # our choice: after so long the pilot may have chosen another mode unseen
-CATCH_UP_S = 0.5  # our choice: for its thread, when the whole program was given no time
+LONGEST_STEP_S = 0.2  # four ticks of the engine; what is longer was not listening
+ASLEEP_S = 1.0  # after so long the pilot may have chosen another mode unseen
+CATCH_UP_S = 0.5  # for its thread, when the whole program was given no time
 
 _log = logging.getLogger(__name__)
 

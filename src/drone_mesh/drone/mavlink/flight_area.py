@@ -10,7 +10,7 @@ from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.limits import FlightLimits
 from drone_mesh.drone.mavlink.telemetry import Telemetry
 
-HOME_OFF_M = 10.0  # our choice: more than a GPS is wrong by, on a field without hills
+HOME_OFF_M = 10.0  # more than a GPS is wrong by, on a field without hills
 
 
 class FlightArea:

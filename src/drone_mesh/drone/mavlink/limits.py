@@ -9,7 +9,7 @@ from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError, GoalRefused
 
-MAX_SPEED_M_S = 20.0  # our choice: more than drones of this kind can fly
+MAX_SPEED_M_S = 20.0  # more than drones of this kind can fly
 
 
 @dataclass(frozen=True)

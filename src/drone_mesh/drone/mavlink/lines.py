@@ -15,8 +15,8 @@ from drone_mesh.errors import ConfigurationError
 DEFAULT_BAUD = 57600  # of telemetry ports, of both autopilots
 MOST_BYTES = 4096  # of one reading
 HIGHEST_BAUD = 4_000_000  # of termios
-SENT_WITHIN_S = 0.5  # our choice: a telemetry port sends a message within 50 ms
-CONNECTED_WITHIN_S = 5.0  # our choice; also the time for sending
+SENT_WITHIN_S = 0.5  # a telemetry port sends a message within 50 ms
+CONNECTED_WITHIN_S = 5.0  # also the time for sending
 
 
 class Line(Protocol):

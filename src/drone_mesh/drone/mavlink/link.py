@@ -12,9 +12,9 @@ from drone_mesh.drone.mavlink.lines import Line, open_line
 from drone_mesh.drone.mavlink.telemetry import Message
 from drone_mesh.errors import ConfigurationError
 
-MOST_READINGS = 500  # our choice: of datagrams that waited; more than ten seconds of all reports
-SILENT_S = 10.0  # our choice: after this silence a peer on another port is accepted
-OPEN_AGAIN_S = 2.0  # our choice: period of attempts to open a broken line
+MOST_READINGS = 500  # of datagrams that waited; more than ten seconds of all reports
+SILENT_S = 10.0  # after this silence a peer on another port is accepted
+OPEN_AGAIN_S = 2.0  # period of attempts to open a broken line
 _BAD_DATA = "BAD_DATA"
 
 _log = logging.getLogger(__name__)

@@ -10,8 +10,8 @@ from drone_mesh.drone.mavlink.autopilots import Requirement
 from drone_mesh.drone.mavlink.commander import Commander
 from drone_mesh.drone.mavlink.telemetry import Message, Telemetry
 
-PERIOD_S = 0.5  # our choice
-TRIES = 6  # our choice, for all names of a requirement together
+PERIOD_S = 0.5
+TRIES = 6  # for all names of a requirement together
 
 _log = logging.getLogger(__name__)
 

@@ -26,13 +26,13 @@ from drone_mesh.errors import GoalRefused
 
 TARGET_PERIOD_S = 0.2  # 5 Hz: PX4 needs at least 2 Hz
 TARGETS_BEFORE_MODE_S = 1.0  # PX4 needs targets for a second before it enters OFFBOARD
-HOLD_TARGETS_S = 3.0  # our choice: 15 targets at the end of a flight, of which a line may lose some
-TAKE_OFF_M = 3.0  # our choice: above home, before the route begins
-TAKEN_OFF_WITHIN_M = 1.0  # our choice
-TAKE_OFF_WITHIN_S = 40.0  # our choice: the motors spool up first, and a climb may be slow
+HOLD_TARGETS_S = 3.0  # 15 targets at the end of a flight, of which a line may lose some
+TAKE_OFF_M = 3.0  # above home, before the route begins
+TAKEN_OFF_WITHIN_M = 1.0
+TAKE_OFF_WITHIN_S = 40.0  # the motors spool up first, and a climb may be slow
 NO_PROGRESS = "the last flight made no progress"
-STALLED_S = 20.0  # our choice: a flight that moves less than STALLED_M in this time has ended
-STALLED_M = 1.0  # our choice: more than the noise of a position
+STALLED_S = 20.0  # a flight that moves less than STALLED_M in this time has ended
+STALLED_M = 1.0  # more than the noise of a position
 _MODE_CHANGED = (mavlink.MAV_CMD_DO_SET_MODE, mavlink.MAV_RESULT_ACCEPTED)
 _ARMED = (mavlink.MAV_CMD_COMPONENT_ARM_DISARM, mavlink.MAV_RESULT_ACCEPTED)
 

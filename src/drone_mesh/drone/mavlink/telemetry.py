@@ -14,9 +14,9 @@ Message = Any  # one of pymavlink's generated classes
 
 HEARTBEAT_LOST_S = 3.0  # of the autopilot, at 1 Hz: three are missing
 FRESH_S = 2.0  # a position, and the reports of its quality
-STATUS_FRESH_S = 10.0  # our choice: battery, landed state, fence
-STICKS_MOVED_US = 100  # our choice: a fifth of the travel; trim and noise are below a tenth of this
-STICKS_REST_S = 5.0  # our choice: time after its last movement until a stick counts as released
+STATUS_FRESH_S = 10.0  # battery, landed state, fence
+STICKS_MOVED_US = 100  # a fifth of the travel; trim and noise are below a tenth of this
+STICKS_REST_S = 5.0  # time after its last movement until a stick counts as released
 
 FIX_3D = mavlink.GPS_FIX_TYPE_3D_FIX
 GOOD_ESTIMATE = (
@@ -41,7 +41,7 @@ MULTIROTORS = frozenset(
     )
 )  # mode numbers of other vehicles have other meanings
 
-HEARTBEAT_HZ = 2.0  # our choice: on a line that loses one in twenty, 3 s without any are rare
+HEARTBEAT_HZ = 2.0  # on a line that loses one in twenty, 3 s without any are rare
 
 STREAMS_HZ = {
     mavlink.MAVLINK_MSG_ID_HEARTBEAT: HEARTBEAT_HZ,

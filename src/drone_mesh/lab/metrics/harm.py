@@ -12,7 +12,7 @@ from drone_mesh.lab.metrics.registry import NAN, metric, metrics
 from drone_mesh.lab.record import RunRecord
 
 ROUNDING_M = 1e-6
-PROMPT_S = 120.0  # our choice: a node that is cut off should be connected again by then
+PROMPT_S = 120.0  # a node that is cut off should be connected again by then
 
 
 @metric(

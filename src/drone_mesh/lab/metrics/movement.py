@@ -10,7 +10,7 @@ from drone_mesh.air.graph import Graph
 from drone_mesh.lab.metrics.registry import NAN, metric, metrics
 from drone_mesh.lab.record import RunRecord, Topology
 
-DISPLACED_M = 1.0  # our choice: the clearance
+DISPLACED_M = 1.0  # the clearance
 STACKED_M = 0.3  # two drones closer than this are stacked
 
 

@@ -19,7 +19,7 @@ from drone_mesh.state.model import MeshStatus, footprint, position_is_known
 from drone_mesh.view.fan import fan_offset, fan_out
 from drone_mesh.view.palette import LIGHT
 
-MOST_LINKS = 2000  # our choice, per use: a picture of a crowd has no room for more
+MOST_LINKS = 2000  # per use: a picture of a crowd has no room for more
 LINK_WIDTH = {LinkUse.KNOWN: 0.8, LinkUse.ROUTE: 2.2, LinkUse.LOST: 0.8}  # points
 MOST_WITH_LARGE_DOTS, MOST_WITH_IDS = 40, 100
 POINTS_PER_INCH = 72

@@ -12,8 +12,8 @@ from drone_mesh.state.links import Link, LinkForecast, known_links
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
 from drone_mesh.state.outages import MeshSample, Outage, find_outages, take_sample
 
-BLIP_S = 1.0  # our choice: a shorter outage was just the wait for an answer
-MOST_RECENT = 16  # our choice: states from which the motion at the end is measured
+BLIP_S = 1.0  # a shorter outage was just the wait for an answer
+MOST_RECENT = 16  # states from which the motion at the end is measured
 
 
 class NothingRecorded(MeshError):

@@ -23,8 +23,8 @@ from drone_mesh.nrf24.emulator.air_protocol import (
 )
 from drone_mesh.nrf24.emulator.chip import EmulatedChip
 
-MOST_CHIPS = 64  # our choice: more than one machine can emulate
-LONGEST_WAIT_S = 1.0  # our choice: how often a thread that waits for an IRQ checks whether to end
+MOST_CHIPS = 64  # more than one machine can emulate
+LONGEST_WAIT_S = 1.0  # how often a thread that waits for an IRQ checks whether to end
 
 _log = logging.getLogger(__name__)
 

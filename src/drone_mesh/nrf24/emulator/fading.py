@@ -18,9 +18,9 @@ from drone_mesh.nrf24.airtime import NS_PER_S
 KINDS = ("rayleigh", "rician")
 SPEED_OF_LIGHT_M_S = 299_792_458.0
 COHERENCE = 0.423
-STIRRING_M_S = 0.5  # our choice: leaves, people and propellers move where drones stand
+STIRRING_M_S = 0.5  # leaves, people and propellers move where drones stand
 _SPEED_OVER_NS = NS_PER_S // 10  # a speed is that of the last tenth of a second, or longer
-_DEEPEST_DB = -60.0  # our choice: a finite number for a sum that is nearly zero
+_DEEPEST_DB = -60.0  # a finite number for a sum that is nearly zero
 
 Position = Tuple[float, float, float]  # metres
 

@@ -16,7 +16,7 @@ from drone_mesh.nrf24.airtime import NS_PER_S
 SENSITIVITY_DBM = {250_000: -94.0, 1_000_000: -85.0, 2_000_000: -82.0}  # at 0.1 % BER [DS 5.7]
 _FSPL_CONSTANT_DB = -27.55  # free space, metres and MHz (ITU-R P.525)
 _NEAREST_M = 0.1  # antennas may share a point; log10(0) may not
-_ADDRESS_LOST_BER = 0.1  # our choice: with more wrong bits not even the address is recognised
+_ADDRESS_LOST_BER = 0.1  # with more wrong bits not even the address is recognised
 _SAME_POINT_DBM = 0.0  # the strongest specified input [DS 5.7]
 
 
@@ -161,7 +161,7 @@ class LossCurve(LinkModel):
     the first, its shares apply.
     """
 
-    BURST_S = 0.05  # our choice: just longer than 16 frames at 250 kbit/s
+    BURST_S = 0.05  # just longer than 16 frames at 250 kbit/s
 
     def __init__(
         self,

@@ -22,8 +22,8 @@ from drone_mesh.nrf24.emulator.air_protocol import (
 )
 from drone_mesh.nrf24.emulator.fading import Position
 
-ANSWER_WITHIN_S = 5.0  # our choice: far above what a busy machine takes
-CONNECT_AGAIN_S = 1.0  # our choice
+ANSWER_WITHIN_S = 5.0  # far above what a busy machine takes
+CONNECT_AGAIN_S = 1.0
 
 
 class _Connection:

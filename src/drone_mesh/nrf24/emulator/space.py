@@ -16,7 +16,7 @@ from drone_mesh.nrf24.emulator.fading import Fading, Position
 from drone_mesh.nrf24.emulator.links import LinkModel
 
 CHANNEL_MHZ = 1.0  # what a receiver takes in at 250 kbit/s and 1 Mbit/s; 2 at 2 Mbit/s [DS 5.4]
-BURST_S = 1.5e-3  # our choice: a full Wi-Fi frame at 8 Mbit/s
+BURST_S = 1.5e-3  # a full Wi-Fi frame at 8 Mbit/s
 _KEPT_NS = NS_PER_S // 10  # bursts that ended earlier than this are forgotten
 
 

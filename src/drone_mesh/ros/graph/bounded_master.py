@@ -11,7 +11,7 @@ import rospy
 
 from drone_mesh.errors import MeshError
 
-ANSWER_TIMEOUT_S = 5.0  # wall; our choice: what is silent for longer is dead
+ANSWER_TIMEOUT_S = 5.0  # wall; what is silent for longer is dead
 NO_ANSWER = (OSError, http.client.HTTPException, xmlrpc.client.Error, rospy.ROSException)
 
 

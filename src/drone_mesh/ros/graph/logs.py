@@ -8,7 +8,7 @@ import time
 
 from drone_mesh.communication.throttle import Throttle
 
-COMPLAINT_PERIOD_S = 10.0  # our choice: one line per reason in this (wall) time
+COMPLAINT_PERIOD_S = 10.0  # one line per reason in this (wall) time
 
 
 def show_library_logs_on_rosout() -> None:

@@ -17,7 +17,7 @@ from rospy.impl.registration import (
 from drone_mesh.ros.graph.bounded_master import NO_ANSWER
 from drone_mesh.ros.graph.periodic import Periodic
 
-PERIOD_S = 2.0  # wall; our choice
+PERIOD_S = 2.0  # wall
 
 _log = logging.getLogger(__name__)
 

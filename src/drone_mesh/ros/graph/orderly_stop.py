@@ -14,8 +14,8 @@ import rospy
 from drone_mesh.ros.graph.bounded_master import NO_ANSWER, bounded_master
 from drone_mesh.stopping import StopRequest
 
-MASTER_TIMEOUT_S = 2.0  # our choice, wall: asked twice, a master that is silent for so long hangs
-FINISH_TIMEOUT_S = 3.0  # our choice: `rosnode kill` waits this long (wall) for our threads
+MASTER_TIMEOUT_S = 2.0  # wall: asked twice, a master that is silent for so long hangs
+FINISH_TIMEOUT_S = 3.0  # `rosnode kill` waits this long (wall) for our threads
 
 
 _log = logging.getLogger(__name__)

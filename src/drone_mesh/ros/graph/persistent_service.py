@@ -21,7 +21,7 @@ from rospy.impl.validators import ParameterInvalid
 from drone_mesh.errors import MeshError
 from drone_mesh.ros.graph.bounded_master import NO_ANSWER, bounded_master
 
-CALL_TIMEOUT_S = 2  # our choice: wall seconds without an answer until a service is gone
+CALL_TIMEOUT_S = 2  # wall seconds without an answer until a service is gone
 SINGLE_CALL_TIMEOUT_S = 10  # the same for `call_once`: the DroneManager may wait for a gateway
 _READ_BYTES = 4096  # more than any answer here
 # TCPROS (wiki.ros.org/ROS/TCPROS): a request is its length and its fields. An answer has a status

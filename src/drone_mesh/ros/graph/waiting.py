@@ -7,7 +7,7 @@ from typing import Callable
 
 import rospy
 
-_POLL_PERIOD_S = 0.05  # wall; our choice
+_POLL_PERIOD_S = 0.05  # wall
 
 
 def comes_true(

@@ -17,7 +17,7 @@ from drone_mesh.ros.graph.persistent_service import PersistentService, ServiceGo
 from drone_mesh.srv import PowerSwitch, PowerSwitchRequest, PowerSwitchResponse
 
 DEBUG_PERIOD_S = 1.0  # docs/ros.md, "Topics"
-SWITCH_TIMEOUT_S = 2.0  # our choice: the power switch answers within this wall time
+SWITCH_TIMEOUT_S = 2.0  # the power switch answers within this wall time
 _ALL_DEBUG_QUEUE = 512  # messages of all nodes that may wait for a slow subscriber
 _MAX_UINT16 = 0xFFFF
 

@@ -17,8 +17,8 @@ from drone_mesh.ros.graph.run import Run, run_headers
 from drone_mesh.ros.host.node_snapshots import NodeSnapshots, Worker
 from drone_mesh.state.events import EventBatcher
 
-REPORT_PERIOD_S = 0.5  # wall time; our choice: an event is seen soon
-REPORT_PERIOD_PER_NODE_S = 0.004  # our choice: 254 nodes with 200 neighbours each, once a second
+REPORT_PERIOD_S = 0.5  # wall time; an event is seen soon
+REPORT_PERIOD_PER_NODE_S = 0.004  # 254 nodes with 200 neighbours each, once a second
 REPORTS_QUEUE = 4  # reports that may wait for a slow subscriber; each one is complete in itself
 
 

@@ -20,8 +20,8 @@ from drone_mesh.web.allowance import Allowance
 
 _QUEUE = 512  # answers that may wait for a slow DroneManager: two whole fleets
 
-MOST_ORDERS_AT_ONCE = 512  # our choice: two whole fleets
-ORDER_PERIOD_S = 0.05  # our choice, wall: of further orders
+MOST_ORDERS_AT_ONCE = 512  # two whole fleets
+ORDER_PERIOD_S = 0.05  # wall: of further orders
 
 _log = logging.getLogger(__name__)
 

@@ -22,7 +22,7 @@ from drone_mesh.ros.host.virtual_nrf24 import VirtualRadios
 from drone_mesh.ros.host.virtual_raspberry_pi import VIRTUAL_RASPBERRY_PIS, VirtualRaspberryPi
 from drone_mesh.state.figures import LOST_IN_RANGE, WORST_LAG
 
-RADIOS_TIMEOUT_S = 10.0  # our choice: wall seconds to wait for a simulator before starting nodes
+RADIOS_TIMEOUT_S = 10.0  # wall seconds to wait for a simulator before starting nodes
 
 _log = logging.getLogger(__name__)
 

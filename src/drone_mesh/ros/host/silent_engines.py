@@ -15,7 +15,7 @@ from drone_mesh.ros.graph.persistent_service import (
 )
 from drone_mesh.srv import RequestGPSRequest
 
-ASK_AGAIN_AFTER_S = 1.0  # our choice: wall seconds
+ASK_AGAIN_AFTER_S = 1.0  # wall seconds
 
 _log = logging.getLogger(__name__)
 

@@ -19,9 +19,9 @@ from drone_mesh.ros.host.announcements import Announcements, PlaceOf, probe_of
 from drone_mesh.ros.host.radios import Radios
 from drone_mesh.ros.host.simulator_connection import SimulatorConnection
 
-POLL_PERIOD_S = 0.1  # our choice: wall seconds between two attempts to reach a simulator
-ANNOUNCE_AGAIN_AFTER = 20  # polls; our choice: an unregistered antenna is announced again
-POLLS_PER_ROUND = 50  # our choice: each antenna is announced at least once in so many polls
+POLL_PERIOD_S = 0.1  # wall seconds between two attempts to reach a simulator
+ANNOUNCE_AGAIN_AFTER = 20  # polls; an unregistered antenna is announced again
+POLLS_PER_ROUND = 50  # each antenna is announced at least once in so many polls
 
 _log = logging.getLogger(__name__)
 

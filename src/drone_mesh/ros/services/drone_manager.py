@@ -32,7 +32,7 @@ from drone_mesh.ros.services.standing_layouts import Given, StandingLayouts, fli
 from drone_mesh.state.standing_orders import PartState
 
 WAIT_FOR_GATEWAY_S = 3.0  # of wall time (docs/ros.md, "Drone manager")
-ANSWERS_TIMEOUT_S = 1.0  # our choice, wall: a gateway answers in milliseconds, if it answers
+ANSWERS_TIMEOUT_S = 1.0  # wall: a gateway answers in milliseconds, if it answers
 NO_GATEWAY = "no gateway is running to take the order"
 ORDERS_IN_QUEUE = 512  # two whole fleets
 

@@ -38,8 +38,8 @@ from drone_mesh.ros.services.flight_request import (
 )
 from drone_mesh.state.orders import CLOCKS_DIFFER_S, OrderProgress
 
-POLL_PERIOD_S = 1.0  # wall; our choice: how often the drones are compared with the actions
-SENT_WITHIN_S = 30.0  # wall; our choice: a gateway reports an order within a second
+POLL_PERIOD_S = 1.0  # wall; how often the drones are compared with the actions
+SENT_WITHIN_S = 30.0  # wall; a gateway reports an order within a second
 
 _log = logging.getLogger(__name__)
 

@@ -27,7 +27,7 @@ from drone_mesh.ros.graph.packet_samples import PacketSamples
 from drone_mesh.ros.graph.parameters import configured_obstacles, factory_configuration, or_exit
 from drone_mesh.state.figures import DELIVERED, LOST_IN_RANGE
 
-STUCK_RECEIVER_S = 0.2  # our choice: a receiver that does not read for this long is disconnected
+STUCK_RECEIVER_S = 0.2  # a receiver that does not read for this long is disconnected
 
 _log = logging.getLogger(__name__)
 

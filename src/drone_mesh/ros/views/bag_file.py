@@ -16,7 +16,7 @@ from drone_mesh.errors import MeshError
 from drone_mesh.ros.graph import names
 
 RECORDER = "'roslaunch drone_mesh record.launch'"
-MOST_IN_CHUNK = 100_000  # our choice: a larger count is damaged, too
+MOST_IN_CHUNK = 100_000  # a larger count is damaged, too
 T = TypeVar("T")
 
 

@@ -22,7 +22,7 @@ from drone_mesh.ros.graph.conversions import event_record
 from drone_mesh.ros.services.flight_request import request_flight
 from drone_mesh.state.orders import CLOCKS_DIFFER_S, OrderProgress
 
-SHOW_EVERY_S = 2.0  # simulated; our choice
+SHOW_EVERY_S = 2.0  # simulated
 
 
 def main() -> None:

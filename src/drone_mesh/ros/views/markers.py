@@ -34,7 +34,7 @@ from drone_mesh.view.quadrocopter import (
 )
 from drone_mesh.view.scene import Shape, shape_named
 
-MOST_LINKS = 1500  # our choice, per use: 254 drones 1 m apart have 18,000 links
+MOST_LINKS = 1500  # per use: 254 drones 1 m apart have 18,000 links
 TIMES_LARGER = 4.0  # how much larger than life drones are drawn
 MESHES = "package://drone_mesh/meshes/"  # written by scripts/meshes
 FRAME_COLOUR = DARK.muted

@@ -16,7 +16,7 @@ from drone_mesh.ros.views.bag import read_events, read_packets, read_states, rea
 from drone_mesh.ros.views.bag_file import BagDamaged, BagUnusable
 from drone_mesh.state.model import MeshStatus
 
-STATES_AT_ONCE = 10  # our choice: 254 nodes keep the server's loop busy for some 50 ms
+STATES_AT_ONCE = 10  # 254 nodes keep the server's loop busy for some 50 ms
 LOOP_LIMIT_S = 10.0  # wall time in which the loop must accept them
 
 _log = logging.getLogger(__name__)

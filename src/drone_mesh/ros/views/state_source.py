@@ -18,7 +18,7 @@ from drone_mesh.ros.views.bag_file import BagDamaged, BagUnusable
 from drone_mesh.state.model import MeshStatus
 
 WAIT_S = 5.0  # wall time for a live state: it is latched, so it arrives at once or not at all
-SPARE_S = 2.0  # our choice: so far behind the last state of a bag --at means that one
+SPARE_S = 2.0  # so far behind the last state of a bag --at means that one
 OLD_STATE_S = 3.0  # wall time without a state after which the tools and the page show a warning
 
 

@@ -25,7 +25,7 @@ from drone_mesh.ros.world.mesh_state import MeshStatePublisher
 from drone_mesh.ros.world.world_runner import WorldRunner
 from drone_mesh.world.factory import DroneFactory, VirtualDrone
 
-NODE_TIMEOUT_S = 5.0  # our choice, wall: how long a node may take to start or to end
+NODE_TIMEOUT_S = 5.0  # wall: how long a node may take to start or to end
 
 _log = logging.getLogger(__name__)
 

@@ -16,8 +16,8 @@ from drone_mesh.ros.graph.run import Run, is_left_behind
 from drone_mesh.ros.host.mesh_host import MeshHost
 from drone_mesh.world.under_way import UnderWay
 
-# Our choice, simulated: a timer is late by at most this plus one step of the world, and so is the
-# last consequence of an event. The mesh waits more than ten times as long for an answer.
+# Simulated: a timer is late by at most this plus one step of the world, and so is the last
+# consequence of an event. The mesh waits more than ten times as long for an answer.
 MAX_LAG_S = 0.03
 HOST_TIMEOUT_S = 2.0  # wall seconds; the world continues without a host that is silent for longer
 ASK_AGAIN_AFTER_S = 1.0  # wall seconds; between two checks whether a stranger is a host

@@ -13,8 +13,8 @@ from drone_mesh.mobility import Area, Mobility, tracks_of
 from drone_mesh.mobility.pilot import TrackPilot
 from drone_mesh.world.factory import VirtualDrone
 
-MEAN_DEGREE = 10.0  # our choice: neighbours on average, if drones were uniform in the area
-HEIGHT_M = 2.0  # our choice: of the models' flights
+MEAN_DEGREE = 10.0  # neighbours on average, if drones were uniform in the area
+HEIGHT_M = 2.0  # of the models' flights
 
 _log = logging.getLogger(__name__)
 

@@ -25,7 +25,7 @@ from drone_mesh.srv import SetSpeed, SetSpeedRequest, SetSpeedResponse
 from drone_mesh.world.interfaces import World
 from drone_mesh.world.pace import Pace
 
-# Wall; our choice. The kernel buffers minutes of /clock for a subscriber before a send blocks.
+# Wall: the kernel buffers minutes of /clock for a subscriber before a send blocks.
 STUCK_SUBSCRIBER_S = 0.02
 _MEASURE_PERIOD_S = 1.0  # wall
 _LOG_PERIOD_S = 10.0  # wall

@@ -13,8 +13,8 @@ from drone_mesh.communication.repair.interfaces import IRepairStrategy
 from drone_mesh.drone.location import Location
 
 TO_NEIGHBOURS = 0.1  # weight of the neighbours against the gateway, as in MDSG-APF
-LEG = 0.5  # of the range: distance between two requests for places; our choice
-PAUSE_S = 2.0  # our choice: time to hear a gateway between two legs
+LEG = 0.5  # of the range: distance between two requests for places
+PAUSE_S = 2.0  # time to hear a gateway between two legs
 
 
 class Field(IRepairStrategy):

@@ -14,7 +14,7 @@ from drone_mesh.communication.router_states import RepairState
 from drone_mesh.drone.location import Location
 
 MOVES = 2  # towards one lost next hop
-WAITS = 6  # our choice: checks; the drones beside the dead node have moved twice by then
+WAITS = 6  # checks; the drones beside the dead node have moved twice by then
 
 
 class Inward(Home):

@@ -21,8 +21,8 @@ from drone_mesh.communication.routing.techniques.gateway_routes import (
 UPDATE = struct.Struct("<BHH")  # gateway + 1 (0: no update), sequence number, metric
 REQUEST = struct.Struct("<BHB")  # gateway, the sequence number that is needed, hops left
 REQUEST_TYPE = 8
-REQUEST_HOPS = 32  # our choice; RFC 8966, 3.8.1.2 wants a limit
-SOON_S = 0.2  # our choice: urgent updates within this time share one packet
+REQUEST_HOPS = 32  # RFC 8966, 3.8.1.2 wants a limit
+SOON_S = 0.2  # urgent updates within this time share one packet
 COST_PER_ETX = 256  # RFC 8966, appendix A.2.2
 INFINITE = 0xFFFF
 

@@ -21,8 +21,8 @@ MAX_QUALITY = 255
 HOP_PENALTY = 15  # of 255, as in the Linux implementation
 WINDOW = 5  # number of sequence numbers in the mean of a neighbour's quality
 HOPS = 50
-ORIGINATE_EVERY_S = 5.0  # our choice: a check period holds two
-SPREAD_S = 0.005  # our choice: neighbours repeat a message one after another
+ORIGINATE_EVERY_S = 5.0  # a check period holds two
+SPREAD_S = 0.005  # neighbours repeat a message one after another
 SLOTS = 16
 
 

@@ -16,7 +16,7 @@ from drone_mesh.communication.routing.techniques.gateway_routes import GatewayRo
 
 ENTRY = struct.Struct("<BHB")  # gateway + 1 (0: no entry), sequence number, hops
 INFINITE_HOPS = 255  # with an odd sequence number: the route is broken
-SETTLING_S = 0.2  # our choice: changes within this time share one advertisement
+SETTLING_S = 0.2  # changes within this time share one advertisement
 
 
 class Entry(NamedTuple):

@@ -16,7 +16,7 @@ SWITCH_BELOW = 192  # RFC 6719, PARENT_SWITCH_THRESHOLD: 1.5 transmissions
 MAX_RANK = 2**16 - 1
 ADVERTISEMENT = struct.Struct("<BH")  # gateway, rank
 SOLICITATION_TYPE = 10  # RFC 6550 calls it DIS
-SOON_S = 0.2  # our choice: one advertisement answers all solicitations within this time
+SOON_S = 0.2  # one advertisement answers all solicitations within this time
 
 
 class Advertisement(NamedTuple):

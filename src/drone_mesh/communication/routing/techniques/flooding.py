@@ -13,8 +13,8 @@ from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.routing.child_table_tree import ChildTableTree
 from drone_mesh.communication.timing import CIRCULATION_S
 
-REMEMBERED = 512  # our choice: packets that a node recognises; heartbeats live for a second
-REACHABLE_S = 20.0  # our choice: two check periods
+REMEMBERED = 512  # packets that a node recognises; heartbeats live for a second
+REACHABLE_S = 20.0  # two check periods
 SEQUENCE = struct.Struct("<H")
 
 

@@ -8,7 +8,7 @@ from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.routing.child_table_tree import ChildTableTree
 
 ETX_GAIN = 0.1  # weight of a new sample; CTP (TEP 123) uses the same exponential average
-WORST_ETX = 16.0  # our choice: worse links count as this value
+WORST_ETX = 16.0  # worse links count as this value
 
 
 class LinkCosts:
