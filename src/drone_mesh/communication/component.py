@@ -197,7 +197,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
         """Start this kind of node, before routing starts."""
 
     def _antenna_is_off(self) -> None:
-        """The antenna was switched off, or a check finds it off; a gateway remains one."""
+        """Called when the antenna is off: it was switched off, or a check finds it so."""
 
     def _on_passing_location(self, creator: int, payload: bytes) -> None:
         """A LOCATION for another node is about to be forwarded."""
@@ -245,13 +245,13 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
             self._on_last_place(last)
 
     def receive_gateway_place(self, payload: bytes, _creator: int, _from: int) -> None:
-        """Where a gateway was: for those who may fly there."""
+        """Ignored here: only a router may fly to where a gateway was."""
 
     def receive_movement_negotiation(self, payload: bytes, creator: int, from_: int) -> None:
-        """A neighbour bids for the flight: for those who may fly for the mesh."""
+        """Ignored here: only a router takes part in the election of a drone."""
 
     def receive_seal_challenge(self, payload: bytes, creator: int, _from: int) -> None:
-        """A neighbour has a key; with one, the antenna would have answered."""
+        """Log that a neighbour has a key and this node has none."""
         reason = f"a neighbour, node {creator}, has a mesh key and this node has none"
         self.complaints.foreign(creator, reason, payload, self._deadlines.now_s)
 
@@ -262,7 +262,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
         self.complaints.dropped(reason, payload, self._deadlines.now_s)
 
     def _on_place_taken(self, place: Location) -> None:
-        """A node that asks for places is there, or flies there."""
+        """Called when a node that asks for places is at `place` or flies there."""
 
     def _on_last_place(self, last: LastPlace) -> None:
         """A node reports where another one was last heard."""

@@ -72,11 +72,11 @@ class Neighbours:
         return True
 
     def forget(self, node: int) -> None:
-        """`node` is no neighbour, and perhaps never was: its silence says nothing."""
+        """Remove `node` from the neighbours, without counting it as fallen silent."""
         self._heard_s.pop(node, None)
 
     def is_deaf(self, node: int) -> bool:
-        """`node` does not hear this one, until `hears`; it is not silent for that.
+        """Mark `node` as deaf to this node until `hears` is called; it does not count as silent.
 
         Returns whether it was a neighbour.
         """
@@ -92,7 +92,7 @@ class Neighbours:
         return frozenset(self._deaf)
 
     def takes_off(self, by_order: bool) -> None:
-        """This node flies: if it no longer hears its neighbours, its medium still works.
+        """This node flies away, so that neighbours it stops hearing do not count as silent.
 
         A repair flight does not end a silence that was before.
         """
@@ -167,7 +167,7 @@ class Neighbours:
                 self.motion.reported(node, place, heard_s)
 
     def passes(self, node: int, place: Location, heard_s: float) -> None:
-        """`node` was at `place`, perhaps on its way: then the goal that it told counts."""
+        """Note that `node` was at `place`; while it flies, its announced goal counts instead."""
         if heard_s - self._goals_s.get(node, -math.inf) > FLIGHT_S:
             self.set_place(node, place, heard_s)
 

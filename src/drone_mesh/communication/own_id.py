@@ -21,7 +21,7 @@ class OwnId:
     """Another radio with the id of one node. Belongs to the component's thread."""
 
     def __init__(self, rng: random.Random) -> None:
-        """`rng`: two that give way to a third must not come back together."""
+        """`rng` spreads the time off, so that two nodes that gave way do not return together."""
         self._rng = rng
         self.connected_s = math.inf  # when the node was first connected, since it last gave way
         self._heard_s = -math.inf
@@ -33,12 +33,12 @@ class OwnId:
         return self._heard_s > -math.inf
 
     def heard(self, now_s: float) -> bool:
-        """A packet of the other radio. Returns whether to introduce this node to it."""
+        """Record a packet of the other radio. Returns whether to introduce this node to it."""
         self._heard_s = now_s
         return self._introductions.count(0, now_s)
 
     def give_way(self, now_s: float) -> float:
-        """The other one is connected. Returns until when to be off."""
+        """Give way to the other radio, which is connected. Returns when to switch on again."""
         self._heard_s = now_s
         self.connected_s = math.inf
         return now_s + OFF_S * (1.0 + self._rng.random())

@@ -59,7 +59,7 @@ class KnownPlaces:
             self.gateway_disputed = False
 
     def hear_of_gateway(self, place: Location, seen_s: float, connected: bool) -> None:
-        """Another node says where the gateway was; `connected`: the gateway can be asked."""
+        """Note where another node says the gateway was; if `connected`, only as a doubt."""
         if self.gateway is not None and seen_s < self.gateway_seen_s:
             return
         if self.gateway is not None and place.distance_m(self.gateway) < SAME_PLACE_M:

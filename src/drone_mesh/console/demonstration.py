@@ -257,7 +257,7 @@ def _free_places(gateway: NodeStatus, range_m: float, others: Sequence[NodeStatu
 
 
 def _rounded(place: Sequence[float]) -> Place:
-    """As an order gives it: heights are whole metres."""
+    """The place as an order transmits it, with the height in whole metres."""
     x, y, z = place
     return round(x, 2), round(y, 2), max(0.0, float(round(z)))
 
@@ -308,7 +308,7 @@ def _speed(factor: float) -> Order:
 
 
 def _attempt(order: Order) -> Order:
-    """This order, whose refusal changes nothing: it is repeated, or cannot be helped."""
+    """Carry out an order and ignore its refusal: it is repeated later, or cannot be helped."""
 
     def carry_out(controls: MeshControls) -> None:
         with contextlib.suppress(OrderRefused):

@@ -88,7 +88,7 @@ class ShortestPath(ChildTableTree):
 
 
 class Oracle(IRepairStrategy):
-    """Flies into the range of the nearest connected node, wherever it is: no drone knows that."""
+    """A bound: flies into the range of the nearest connected node, which no real drone knows."""
 
     def __init__(self, connected: Callable[[], Mapping[int, Location]]) -> None:
         """`connected` returns the positions of all connected nodes."""

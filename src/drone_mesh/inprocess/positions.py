@@ -58,7 +58,7 @@ class PositionReceiver(IDroneEngine):
         return Location(place.latitude + y_m, place.longitude + x_m, place.height)
 
     def _drifted(self) -> tuple[float, float]:
-        """The error now: normal at any time, and similar at times near each other."""
+        """The error now: normally distributed, and correlated over CORRELATED_S."""
         now_s = self._clock.now_s
         kept = math.exp(-(now_s - self._drawn_s) / CORRELATED_S)
         fresh = math.sqrt(1.0 - kept**2)

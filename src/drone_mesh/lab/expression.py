@@ -81,7 +81,7 @@ class _OverAxes(ast.NodeTransformer):
 
 
 def _times(left: Any, right: Any) -> Any:
-    """The product of numbers: that of a text or a list and a number may fill the memory."""
+    """The product of two numbers; repeated texts and lists could fill the memory."""
     if not (isinstance(left, (int, float)) and isinstance(right, (int, float))):
         raise TypeError("only numbers can be multiplied")
     return left * right

@@ -102,7 +102,7 @@ class Inbox:
         self._acknowledge(self._ack(asked.number, asked.nonce, asked.session))
 
     def on_time(self, now_s: float) -> list[Whole]:
-        """Returns messages that have waited for earlier ones for too long."""
+        """Return the messages that have waited too long for missing earlier ones."""
         self._reassembly.expire(now_s)
         overdue = []
         for order in self._ports.values():

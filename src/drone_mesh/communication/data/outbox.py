@@ -244,7 +244,7 @@ class Outbox:
         self.waits_because(reason)
 
     def waits_because(self, reason: str) -> None:
-        """Nothing is sent for now."""
+        """Store the reason why nothing is sent now, for the tickets of the messages."""
         self._interrupted()
         for message in self:
             message.ticket.reason = reason
@@ -255,7 +255,7 @@ class Outbox:
         return any(message.ticket.reliable for message in self)
 
     def ask_anew(self, now_s: float) -> None:
-        """There is a connection again: late answers are no reason to wait for long."""
+        """After a reconnection, ask for missing ACKs with the shortest time-out again."""
         for message in self._open.values():
             if message.asks:
                 message.asked_s, message.asks = now_s, 1
@@ -299,12 +299,12 @@ class Outbox:
         return self._asking(self._latest)._replace(ends_train=True)
 
     def _interrupted(self) -> None:
-        """Nothing follows for now, so relays need not wait."""
+        """Close the current train, so that relays need not wait for more of it."""
         if self._train is not None:
             self._train.is_open = False
 
     def _mark_of_end(self, train: Train) -> DataPacket | None:
-        """For the relays, after a train that is not full."""
+        """The packet that tells relays that a train ended before it was full, if it did."""
         if not train.is_open:
             return None
         assert self._latest is not None

@@ -38,7 +38,7 @@ class OutgoingMessage:
         self.begin()
 
     def begin(self) -> None:
-        """Nothing of it was sent, or that no longer counts."""
+        """Reset the message, as if nothing of it had been sent."""
         self.head: Head | None = None  # once it is under way
         self.to_send: deque[int] = deque()  # indices of fragments
         self.whole = False  # whether each fragment has left at least once

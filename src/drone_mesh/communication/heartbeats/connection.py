@@ -331,7 +331,7 @@ class GatewayConnection:
             self._relay_check.swallowing.give_up()  # this one may not know its own place
 
     def _show(self) -> None:
-        """Report a change of the connection; cancel the wait for an answer that is not expected."""
+        """Report a change of the connection, and stop waiting for an answer that will not come."""
         if self._states.connection in (ConnectionState.SEARCHING, ConnectionState.CONNECTED):
             self._parts.deadlines.set(Due.ANSWER, math.inf)
         connected = self._states.connected

@@ -107,7 +107,7 @@ class Forwarding:
         return NO_ROUTE if up == from_ else up
 
     def _own_came_back(self, payload: bytes, now_s: float) -> None:
-        """Drop it. Only one that was just sent says something about a route; see `SENT_KEPT_S`."""
+        """Drop a packet of this node that came back; one sent just now shows a loop."""
         sent = self._delivery.own_passage(payload)
         if sent is not None:
             _from, went_to, sent_s, _hops = sent

@@ -25,12 +25,12 @@ class GatewayHeartbeats(RouterHeartbeats):
 
     @property
     def gateway(self) -> int:
-        """Itself; without internet the one that it prefers."""
+        """This gateway's own id; without internet, the other gateway that it uses."""
         return self._parts.node_id if self._has_internet else super().gateway
 
     @property
     def hops(self) -> int:
-        """To that gateway."""
+        """Hops to that gateway; 0 for itself."""
         if self._has_internet:
             return 0
         return super().hops if self._states.connected else NO_ROUTE

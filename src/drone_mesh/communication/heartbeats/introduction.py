@@ -80,7 +80,7 @@ class Introduction:
         self._plan(AFTER_POWER_S + self._rng.random() * SPREAD_S)
 
     def answer_search(self, neighbour: int) -> None:
-        """A neighbour needs a gateway. On a shared channel one PRESENT answers all such nodes."""
+        """Answer a neighbour that needs a gateway: on a shared channel one PRESENT for all."""
         spread_s = self._medium.answer_spread_s
         if not spread_s:
             self._send_heartbeat(neighbour)

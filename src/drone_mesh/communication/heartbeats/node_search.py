@@ -58,7 +58,7 @@ class NodeSearch:
             self._pauses_s[node] = until_s, min(2.0 * pause_s, LONGEST_PAUSE_S)
 
     def found(self, node: int) -> None:
-        """It answered, or sent a heartbeat for another reason."""
+        """End the search for a node that was heard again."""
         self._pauses_s.pop(node, None)
 
     def on_packet(self, creator: int, payload: bytes) -> None:

@@ -50,7 +50,7 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         self.forward = self._forwarding.forward
 
     def _learn(self, creator: int, from_: int, kind: int, payload: bytes) -> bool:
-        """Where a technique adds bytes, a neighbour with a key has a part of its seal."""
+        """Learn from a packet, without a foreign neighbour's extension, which is part of a seal."""
         room = messages.EXTENSION_ROOM.get(kind)
         if room and self._parts.complaints.is_foreign(from_, self._deadlines.now_s):
             payload = messages.extended(payload, bytes(room))
@@ -85,14 +85,14 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         self._introduction.broadcast()
 
     def neighbour_leaves(self, neighbour: int) -> None:
-        """On a shared medium, look for other routes; otherwise the next packet shows it."""
+        """Look for other routes on a shared medium; elsewhere the next failed packet does so."""
         if self._antenna.medium.shared:
             self._delivery.neighbour_lost(neighbour)
 
     # Packets ---------------------------------------------------------------------------------
 
     def own_came_back(self, from_: int) -> None:
-        """It teaches no route except that `from_` is in reach."""
+        """Learn only that `from_` is in reach: an own packet shows no route."""
         self._technique.can_communicate_with_node(from_)
 
     def says_connected(self, kind: int, payload: bytes) -> bool:

@@ -42,7 +42,7 @@ class Swallowing:
         return now_s - self._asked_s >= wait_s
 
     def is_over(self, now_s: float, heartbeat_s: float) -> bool:
-        """Whether the latest question had its time, and the gateway answered a heartbeat since."""
+        """Whether the time for an answer is over and the gateway has answered a heartbeat since."""
         return now_s - self._asked_s >= self._wait_s and heartbeat_s >= self._asked_s
 
     def asked(self, now_s: float) -> None:
@@ -51,7 +51,7 @@ class Swallowing:
         self._unanswered += 1
 
     def answered(self) -> None:
-        """It answered."""
+        """The gateway answered a request for its place."""
         self._answers = True
         self._unanswered = 0
 
@@ -64,7 +64,7 @@ class Swallowing:
         return self._answers and self._unanswered >= max(LEAST_UNANSWERED, hops)
 
     def another_next_hop(self, hops: int) -> None:
-        """The route has changed, and must soon prove that it works."""
+        """The next hop has changed: suspect it after fewer unanswered requests than usual."""
         self._unanswered = max(0, hops - LEAST_UNANSWERED)
 
     def give_up(self) -> None:

@@ -168,7 +168,7 @@ class RouterHeartbeats(HeartbeatPlane):
         self._host.on_node_missing(missing)
 
     def _check_soon(self) -> None:
-        """Its surroundings change, so the next check comes sooner; at rest, once a period."""
+        """Let the next check come sooner, because the surroundings of this node have changed."""
         if self._antenna.medium.shared and self._states.connected:
             share = CHANGE_PERIODS * (0.5 + self._parts.rng.random())
             soon_s = self._deadlines.now_s + share * self._parts.timing.check_period_s

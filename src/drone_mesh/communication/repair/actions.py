@@ -105,7 +105,7 @@ class RepairActions(abc.ABC):
         return {node: self._view(node) for node in self._parts.routing.get_set_of_children()}
 
     def is_unheard(self) -> bool:
-        """Whether it hears nodes, and none of them hears it."""
+        """Whether this node hears others but none of them hears it."""
         return bool(self._parts.neighbours.deaf()) and not self.neighbours()
 
     def reachable(self) -> Mapping[int, NeighbourView]:
@@ -163,7 +163,7 @@ class RepairActions(abc.ABC):
         """Where a flight for this step would end, clear of other drones, silent ones included."""
 
     def was_at(self, step: Step) -> bool:
-        """Whether the drone flew there since it was last connected, or since `try_again`."""
+        """Whether this drone is at the step's place, or flew there since its last connection."""
         radius_m = self.clearance_m * (2 * PITCH if step.home else NEAR)
         here = self._parts.pilot.place() if step.owner == NO_ROUTE else None
         places = [*self._tried_goals, *filter(None, [here])]
@@ -172,7 +172,7 @@ class RepairActions(abc.ABC):
     # Actions ---------------------------------------------------------------------------------
 
     def try_again(self) -> None:
-        """Let it fly once more to where it was in vain; it lands at another side of each place."""
+        """Allow flights to places that were tried in vain; each ends at another side."""
         self._tried_goals.clear()
 
     @abc.abstractmethod

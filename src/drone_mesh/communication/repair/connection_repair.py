@@ -178,7 +178,7 @@ class ConnectionRepair(RepairActions):
     # Actions of the strategy -----------------------------------------------------------------
 
     def fly(self, step: Step, until_connected: bool = False) -> None:
-        """See RepairActions; also for the functions below."""
+        """See RepairActions, which describes the functions below as well."""
         if self.why_not_fly():
             return
         self._parts.report(MeshEventKind.FLIGHT_DECIDED, step.owner)
@@ -288,7 +288,7 @@ class ConnectionRepair(RepairActions):
         return self._taken.at_or_beside(place, landing, self._tried_spots)
 
     def _rivals(self, step: Step) -> list[int]:
-        """Drones that this one cannot hear, and that may fly there, too: it is in their range."""
+        """Drones out of reach that may fly to the same place, because it is within their range."""
         neighbours = self._parts.neighbours
         others = neighbours.out_of_reach() - {step.owner}
         places = {node: neighbours.place_of(node) for node in others}
@@ -352,7 +352,7 @@ class ConnectionRepair(RepairActions):
         self._parts.neighbours.motion.forget(self.node_id)
 
     def _clear(self) -> None:
-        """Forget what was under way; not the end of a flight, which is due whatever happens."""
+        """Forget what was under way, except the end of a flight, which is always processed."""
         self._checked_s = None
         if self._flight is None:
             self.wait_until(math.inf)

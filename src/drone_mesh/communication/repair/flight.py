@@ -66,7 +66,7 @@ class RepairFlight:
         return self._step.owner == self._parts.node_id
 
     def each_second(self) -> None:
-        """It is still in flight."""
+        """Called once a second in flight."""
         ask_all_for_places(self._parts)
         if self.stops_when_connected:
             self._introduce()
@@ -108,7 +108,7 @@ class RepairFlight:
         return near and not self._taken.is_free(spot)
 
     def arrived(self) -> bool:
-        """It is on the ground: ask for places. Returns False after one leg of several."""
+        """Ask for the places of others after landing. Returns False if another leg follows."""
         here = self._parts.pilot.location()
         if self._leg_is_short(here):
             self.fly_on()
@@ -122,7 +122,7 @@ class RepairFlight:
         ask_all_for_places(self._parts, may_fly_on=True)
 
     def ask_again(self) -> bool:
-        """The time for answers is over. Returns False if it is clear and the flight is over."""
+        """Ask once more who is near. Returns False after the last time: the flight is over."""
         self.asks_left -= 1
         if self.on_ground:
             ask_all_for_places(self._parts, may_fly_on=True)

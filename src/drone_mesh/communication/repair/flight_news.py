@@ -35,7 +35,7 @@ class FlightNews:
             self._tries[place] = max(until_s, self._tries.get(place, until_s))
 
     def failed(self, node: int, place: Location | None, now_s: float, keep_s: float) -> None:
-        """`node` found no gateway at `place`; it says so in each round, and the first counts."""
+        """Note that `node` found no gateway at `place`. Repetitions in later rounds are ignored."""
         if (node, place) not in self._failures:
             self._failures.add((node, place))
             self.tries(place, now_s, keep_s)

@@ -75,7 +75,7 @@ class GroupRepair(LoneRepair):
             self.on_emergency_alone()
 
     def fly_alone(self) -> None:
-        """One step; it comes back if it hears no node there. After the last one it starts over.
+        """Fly one step, and come back if no node is heard there. After the last step, begin again.
 
         A drone that flies to the gateway, as after an order, looks for it on the way: it need not.
         """
@@ -111,13 +111,13 @@ class GroupRepair(LoneRepair):
         self._election.clear()
 
     def on_neighbour_lost(self, node: int) -> None:
-        """Do not wait for its place or bid."""
+        """Stop waiting for the place or the bid of a lost neighbour."""
         super().on_neighbour_lost(node)
         if self.mesh.state in (RepairState.ASKING, RepairState.NEGOTIATING):
             self.mesh.wait_until(self.mesh.now_s)
 
     def on_place(self, node: int, place: Location) -> None:
-        """Possibly the last missing answer."""
+        """End the wait for places if this was the last missing answer."""
         if self.mesh.state is RepairState.ASKING and self._all_answered():
             self._negotiate()
 

@@ -24,7 +24,7 @@ JAMMED_SHARE = 0.5  # a jammer may pulse; frames of strangers take less of the t
 
 
 class LoneRepair(IRepairStrategy):
-    """What the strategies do that elect a drone, if there is no other node to elect."""
+    """What an electing strategy does when the drone is alone."""
 
     _stood_at: Location | None = None  # during a look around: its start
     _looked = False  # since the connection was lost
@@ -40,7 +40,7 @@ class LoneRepair(IRepairStrategy):
         self._samples: list[bool] | None = None  # of the power in the channel, while it measures
 
     def patience(self, silent: bool) -> float:
-        """In silence, look around after the usual time, and then rarely; after all steps, too."""
+        """In silence, the first look around comes after the usual time, and further ones rarely."""
         patience = SILENCE_PATIENCE if silent and self._looked else 1.0
         is_lone = self._was_everywhere and not self.mesh.neighbours()
         return SILENCE_PATIENCE * patience if is_lone else patience
@@ -53,12 +53,12 @@ class LoneRepair(IRepairStrategy):
         self.listens = False
 
     def on_stopped(self) -> None:
-        """The drone flies, perhaps by an order, or its antenna is off: forget the look around."""
+        """Forget the look around: the drone flies for another reason, or its antenna is off."""
         self._stood_at, self._samples = None, None
         self.listens = False
 
     def on_neighbour_lost(self, node: int) -> None:
-        """Remember it: it may have died, or the medium is down."""
+        """Remember the lost neighbour: if it is heard again, the medium was down."""
         self._lost.add(node)
 
     def on_neighbour_found(self, node: int) -> None:
@@ -69,7 +69,7 @@ class LoneRepair(IRepairStrategy):
                 self._back()
 
     def on_landed(self) -> None:
-        """If this is where it looks around, listen; if its medium may be down, do not connect yet.
+        """Listen at the place of a look around; do not connect while the medium may be down.
 
         A drone that lost a single neighbour may connect at once: that one has probably died.
         """
@@ -111,7 +111,7 @@ class LoneRepair(IRepairStrategy):
 
     @abc.abstractmethod
     def fly_alone(self) -> None:
-        """Its channel is not jammed: take the next step."""
+        """Take the next step, after the channel was found not to be jammed."""
 
     def _measure(self) -> None:
         mesh, samples = self.mesh, self._samples

@@ -71,7 +71,7 @@ class Authority:
         return ""
 
     def why_not(self, now_s: float, phase: Phase, for_repair: bool = False) -> str:
-        """Why a goal would be refused now; empty if it would not.
+        """Why a goal would be refused now; empty if it would be accepted.
 
         `for_repair`: the goal of a repair, not of an order.
         """
@@ -99,7 +99,7 @@ class Authority:
     def _why_not_leave(
         self, now_s: float, autopilot: Autopilot, on_ground: bool, for_repair: bool
     ) -> str:
-        """Why this program must not change the mode for a flight; empty if it may, or need not."""
+        """What forbids a change of the mode for a flight; empty if nothing does."""
         mode, choice, may = self._telemetry.mode, self.choice, self._permissions
         if mode == autopilot.own_mode:
             return ""

@@ -70,7 +70,7 @@ class PendingCommand:
         return bool(self.result == LATER)
 
     def sent_at(self, now_s: float) -> None:
-        """It is being sent."""
+        """Record that the command is being sent now."""
         self.tries += 1
         self.sent_s = now_s
 
@@ -83,7 +83,7 @@ class PendingCommand:
             self.refused_s = now_s + REFUSED_AFTER_S
 
     def refusal(self, now_s: float) -> str:
-        """Why it is not carried out, if its time is over or it was refused; otherwise empty."""
+        """Why the command failed: refused, or its time is over. Empty while it may succeed."""
         if now_s < min(self._until_s, self.refused_s):
             return ""
         if self.words:

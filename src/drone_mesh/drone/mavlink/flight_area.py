@@ -38,7 +38,7 @@ class FlightArea:
         return reach_m <= MAX_COORDINATE_M and abs(location.height) <= MAX_HEIGHT_M
 
     def doubts(self) -> str:
-        """Why --origin may have a wrong altitude; empty: nothing says so."""
+        """Why --origin may have a wrong altitude; empty without a sign of that."""
         home = self.home()
         if home is None or abs(home.height) <= HOME_OFF_M:
             return ""

@@ -68,7 +68,7 @@ class MavlinkLink:
             self._line = None
 
     def _read_all(self, line: Line, timeout_s: float) -> bytes:
-        """Everything that waits: of an old report and its successor only the latter counts."""
+        """Read all messages that wait; a newer report replaces an older one of its kind."""
         data = b""
         try:
             for _ in range(MOST_READINGS):

@@ -39,7 +39,7 @@ class ModeChoice:
         self._commanded = mode
 
     def withdraw(self) -> None:
-        """What this program ordered and has not seen yet is no longer expected."""
+        """Stop expecting the mode that this program ordered and the autopilot has not reported."""
         if self._commanded != self._mode:
             self._commanded = None
 

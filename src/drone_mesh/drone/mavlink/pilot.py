@@ -324,7 +324,7 @@ class MavlinkPilot:
             _log.info("node %d: the drone has arrived and hovers", self._node_id)
 
     def _hold_on(self, now_s: float) -> None:
-        """PX4 needs targets to stay in OFFBOARD; in GUIDED its pilot may send one of his own."""
+        """Keep sending targets after a flight: PX4 leaves OFFBOARD without them."""
         autopilot = self._telemetry.autopilot
         assert autopilot is not None  # otherwise it has let go
         is_new = now_s - self._phase_since_s < HOLD_TARGETS_S
@@ -334,7 +334,7 @@ class MavlinkPilot:
             self._hold = self._goal = None  # it may be flown elsewhere, and be ordered back
 
     def _watch_progress(self, here: Location, now_s: float) -> None:
-        """An autopilot drops targets beyond its fence without a word, and one may have crashed."""
+        """End a flight without progress: its targets are beyond the fence, or the drone crashed."""
         if self._moved is None or here.distance_m(self._moved[0]) > STALLED_M:
             self._moved = (here, now_s)
         elif now_s - self._moved[1] > STALLED_S:

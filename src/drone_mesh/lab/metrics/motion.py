@@ -115,6 +115,6 @@ def control_frame_rate(run: RunRecord) -> float:
 
 
 def _percentiles(values: Sequence[float], *shares: float) -> list[float]:
-    """The least value that each share of the values does not exceed; NaN: no values."""
+    """The percentiles of the values at these shares; NaN without values."""
     ordered = sorted(values) or [NAN]
     return [ordered[max(0, math.ceil(share * len(ordered)) - 1)] for share in shares]
