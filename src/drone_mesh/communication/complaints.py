@@ -44,7 +44,7 @@ class Complaints:
         return now_s - self._foreign_s.get(neighbour, -math.inf) <= CHALLENGED_FOR_S
 
     def foreign_neighbour(self, now_s: float) -> str:
-        """The latest such reason; empty if it is older than FOREIGN_FOR_S."""
+        """The latest reason given to `foreign`; empty if it is older than FOREIGN_FOR_S."""
         reason, at_s = self._foreign
         return reason if now_s - at_s <= FOREIGN_FOR_S else ""
 

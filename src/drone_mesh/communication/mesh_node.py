@@ -158,7 +158,7 @@ class MeshNode(IControlHost):
         return self.places.good_id
 
     def get_last_good_known_location_seen_s(self) -> float:
-        """When that node was there, on the clock of the component; meaningless with NO_ROUTE."""
+        """When the node was at that place (seconds of the core's clock)."""
         return self.places.good_seen_s
 
     def get_router_tech_table_size(self) -> int:

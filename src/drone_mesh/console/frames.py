@@ -177,7 +177,7 @@ class FrameStore:
             self._update_node(node.id, self._order_of(node))
 
     def _order_of(self, node: NodeStatus) -> dict[str, str]:
-        """Its latest order, and what it did since."""
+        """The latest order of a node, and its progress since."""
         return {"order": self._orders.words(node.id, node), "since": self._orders.since(node)}
 
     @property

@@ -14,7 +14,7 @@ _EVERYWHERE = ("0.0.0.0", "::")  # addresses that mean all addresses of this mac
 
 @dataclass(frozen=True)
 class PageToken:
-    """A token, empty for none, and where the user put it; without a place it is a random one."""
+    """A token (empty: none), and the option in which the user gave it (empty: it is random)."""
 
     token: str
     given_in: str = ""

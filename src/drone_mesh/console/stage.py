@@ -41,7 +41,7 @@ class Stage:
         return "the demonstration begins"
 
     def end(self) -> str:
-        """End the demonstration, which puts everything back; called again: without flights.
+        """End the demonstration, which restores the fleet; a second call ends it without flights.
 
         After its end: close its story.
         """

@@ -66,7 +66,7 @@ class Tiles:
     """The map of a console."""
 
     def __init__(self, offer: MapOffer, read: ReadTile | None) -> None:
-        """`read`: of a file; None: the page asks another server."""
+        """`read` reads a tile from a file; None: the page asks another server."""
         self._read = read
         self.offer = offer
 
@@ -76,7 +76,7 @@ class Tiles:
 
     @property
     def image_sources(self) -> str:
-        """For the page's content security policy: Leaflet clears pictures with a data URL."""
+        """The sources of pictures that the page's content security policy allows."""
         if self._read is not None:
             return "'self' data:"
         parts = urlsplit(self.offer.url.replace("{s}", "*"))

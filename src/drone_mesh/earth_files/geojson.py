@@ -106,7 +106,7 @@ def _drone(properties: Mapping[str, Any]) -> int | None:
 
 
 def _shapes(geometry: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """Its points and lines, with those in collections."""
+    """The points and lines of a geometry, those in collections included."""
     waiting = [geometry] if geometry else []
     while waiting:
         shape = waiting.pop()

@@ -93,7 +93,7 @@ def _text(element: Element, tag: str) -> str:
 def _places(
     shape: Element, origin: Origin, positions: Iterable[str] | None = None
 ) -> list[Location]:
-    """Its places, whose `positions` are by default its coordinates."""
+    """The places of a shape; `positions` replaces its coordinates."""
     mode = _text(shape, "altitudeMode")
     places = []
     for position in _text(shape, "coordinates").split() if positions is None else positions:

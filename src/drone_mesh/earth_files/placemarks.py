@@ -122,7 +122,7 @@ def _metre(place: Location) -> tuple[int, int]:
 
 
 def _metres_around(place: Location) -> Iterable[tuple[int, int]]:
-    """Where something within 1 m of it may be: programs round points and lines differently."""
+    """The cells of 1 m that may hold this place, which programs round differently."""
     x, y = _metre(place)
     return ((x + dx, y + dy) for dx in (-1, 0, 1) for dy in (-1, 0, 1))
 

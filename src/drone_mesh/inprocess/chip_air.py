@@ -101,7 +101,7 @@ class ChipAir(IInProcessAir):
 
     @property
     def airtime_s(self) -> float:
-        """Of all frames together."""
+        """The airtime of all frames together, in seconds."""
         return self.air.airtime_s
 
     def antenna(self, host: Host, rng: random.Random) -> ChipAntenna:

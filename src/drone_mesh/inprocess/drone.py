@@ -67,7 +67,7 @@ class InProcessDrone(IDroneEngine):
         self._observers.append(observer)
 
     def put(self, place: Location) -> None:
-        """A pilot has flown it there; it is not on a flight."""
+        """Move the drone to a place where its pilot has flown it."""
         self._place = place
 
     def why_not_fly(self) -> str:

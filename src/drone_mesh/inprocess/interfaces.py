@@ -76,7 +76,7 @@ class IInProcessAir(abc.ABC):
         """Pilots have flown these drones to other places."""
 
     def run(self, function: Callable[[], None]) -> None:
-        """Run what starts or stops antennas: at once, or as soon as that may take time."""
+        """Run a function that starts or stops antennas, at once or where it may wait."""
         function()
 
     def stop(self) -> None:  # noqa: B027 - most airs hold nothing

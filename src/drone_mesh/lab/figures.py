@@ -46,7 +46,7 @@ def panels(count: int, row_in: float) -> tuple[Figure, list[Axes]]:
 
 
 def add_legend(figure: Figure, panel: Axes, title: str | None) -> None:
-    """One legend above all panels, with what this one shows."""
+    """Add one legend above all panels, with the entries of these axes."""
     handles, labels = panel.get_legend_handles_labels()
     figure.legend(
         handles, labels, loc="outside upper center", ncols=min(6, len(labels)), frameon=False,

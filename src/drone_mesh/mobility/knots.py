@@ -20,5 +20,5 @@ def number_in(text: str, line: int, name: str = "") -> float:
 
 
 def follows(knot: Knot, before: Knot) -> bool:
-    """Whether a drone can be there next: later, or at the same time at the same place."""
+    """Whether this place can follow: its time is later, or equal at an equal place."""
     return knot[0] > before[0] or knot == before

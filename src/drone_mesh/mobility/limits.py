@@ -30,7 +30,7 @@ def check(mobility: Mobility) -> None:
 
 
 def _rules(mobility: Mobility) -> Iterator[tuple[str, bool, str]]:
-    """Of each number its name, whether it is right, and what it must be."""
+    """For each number: its name, whether it is valid, and what it has to be."""
     speeds = mobility.speed_m_s
     are_right = _is_tuple(speeds, 2) and 0 < speeds[0] <= speeds[1]
     yield "speed_m_s", are_right, "two speeds above 0, the lower first, such as (0.3, 0.3)"
@@ -53,7 +53,7 @@ def _rules(mobility: Mobility) -> Iterator[tuple[str, bool, str]]:
 
 
 def _is_in(low: float, value: object, high: float = MOST) -> bool:
-    """Whether it is a number in this range; by default of none whose distances overflow."""
+    """Whether `value` is a number in this range."""
     return isinstance(value, numbers.Real) and low <= cast(float, value) <= high
 
 

@@ -6,4 +6,4 @@ from drone_mesh.channel.antenna import PacketAntenna
 
 
 class NRF24HighLevelInterface(PacketAntenna):
-    """The antenna on a NRF24LowLevelInterface; the radio's part of the work is all there."""
+    """The antenna of the mesh on a NRF24LowLevelInterface, which drives the radio."""

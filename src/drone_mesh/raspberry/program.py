@@ -222,7 +222,7 @@ def _internet(options: Options, node: RadioNode) -> IInternetConnection:
 
 
 def without_internet(_node: RadioNode) -> IInternetConnection:
-    """For a gateway that receives no orders."""
+    """The internet connection of a gateway that receives no orders: none."""
     return SeveralInternets()
 
 

@@ -123,7 +123,7 @@ class UsersDesk:
     """
 
     def __init__(self, node_id: int, submit: Submit) -> None:
-        """It serves nothing until `open` is called with the node's transport."""
+        """A desk that is closed until `open` is called with the node's transport."""
         self.node_id = node_id
         self._submit = submit
         self._transport: Transport | None = None

@@ -31,7 +31,7 @@ class CongestionWindow:
         self.size = max(float(LEAST_SIZE), self.size / 2)
 
     def on_silence(self) -> None:
-        """There is no answer."""
+        """Shrink the window, as no answer came."""
         self.size, self._slow_start = float(LEAST_SIZE), True
 
 

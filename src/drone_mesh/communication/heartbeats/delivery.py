@@ -177,7 +177,7 @@ class Delivery(IDelivery):
         return self._way_up(NO_ROUTE)
 
     def seek(self, node: int) -> bool:
-        """A gateway without another one searches for it."""
+        """Search for `node` at a gateway with no next hop to another one; returns whether."""
         return self._seek(node)
 
     def send_to_each(self, payload: bytes, next_hops: Sequence[int]) -> bool:

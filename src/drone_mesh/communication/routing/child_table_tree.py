@@ -68,7 +68,7 @@ class ChildTableTree(IRoutingTechnique):
         return int(node not in self._children_with and node not in self._children)
 
     def learn(self, creator: int, from_: int, kind: int, payload: bytes) -> bool:
-        """As always; each packet comes here, so what is known costs no call."""
+        """See the interface. What is known already costs no call, as every packet passes here."""
         if from_ not in self._children:
             self.can_communicate_with_node(from_)
         if creator != from_:

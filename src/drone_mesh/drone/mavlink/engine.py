@@ -34,7 +34,7 @@ class ListeningClock:
     """
 
     def __init__(self, machine_s: float) -> None:
-        """It begins with the machine's time."""
+        """Start at the machine's time."""
         self.now_s = machine_s
         self.slept_s = 0.0  # the latest step, if it was as long as ASLEEP_S; otherwise 0
         self._machine_s = machine_s

@@ -227,7 +227,7 @@ class Air:
         return noise_dbm > dbm
 
     def _pair(self, one: Antenna, other: Antenna) -> tuple[float, float]:
-        """The distance in metres, and what obstacles cost in dB."""
+        """Distance of two antennas (m), and attenuation by obstacles between them (dB)."""
         pair = self._pairs.get((one, other))
         if pair is None:
             here, there = one.position, other.position

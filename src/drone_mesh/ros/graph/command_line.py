@@ -99,7 +99,7 @@ def _shut_down_beside(number: int, _frame: object) -> None:
 
 
 def start_node(about: str | None, name: str, *, disable_signals: bool = False) -> None:
-    """Register as a node; answer --help instead, which `about` is for.
+    """Register as a node. With --help, print `about` and exit instead.
 
     SIGINT and SIGTERM end it, unless `disable_signals`.
     Exits with one line on unknown arguments, without a master, and if a node of this name runs.
@@ -129,7 +129,7 @@ def start_node(about: str | None, name: str, *, disable_signals: bool = False) -
 
 
 def end_launch() -> None:
-    """End the roslaunch that started this node, which can never start, or it repeats that."""
+    """End the roslaunch that started this node, so that it does not start it again in vain."""
     parent = os.getppid()
     command = Path(f"/proc/{parent}/cmdline").read_bytes()
     if LAUNCHING.encode() in command:

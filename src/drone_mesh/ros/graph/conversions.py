@@ -151,5 +151,5 @@ def mesh_status(message: MeshState) -> MeshStatus:
 
 
 def _values(source: object, names: Sequence[str]) -> dict[str, Any]:
-    """Its fields of these names, as far as it has them."""
+    """The fields of these names that the message has."""
     return {name: getattr(source, name) for name in names if hasattr(source, name)}

@@ -75,7 +75,7 @@ def check_namespace(namespace: str) -> None:
 
 
 def host_param(host: str) -> str:
-    """The parameter by which a ROS node declares that it runs nodes of the mesh: their ids."""
+    """The parameter in which a ROS node declares the ids of the mesh nodes that it runs."""
     return f"drone_mesh/hosts/{host.strip('/')}"
 
 

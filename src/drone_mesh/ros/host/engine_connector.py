@@ -119,7 +119,7 @@ class RosDroneEngineConnector(IDroneEngine):
             raise
 
     def _connect(self) -> None:
-        """Raises ServiceGone. While others do not answer, this one may not either: do not wait."""
+        """Connect, without waiting while other engines are silent. Raises ServiceGone."""
         try:
             if self._silent:
                 raise ServiceGone(f"{self._gps.name}: other engines do not answer")

@@ -72,7 +72,7 @@ class FollowedClock:
             self._on_other_run()
 
     def _idle(self) -> None:
-        """The worker has no work left, and the world may be waiting for that."""
+        """Called when the worker has no work left, for which the world may be waiting."""
         assert self._host is not None
         if self._host.under_way != self._reported:
             self._publish(ros_time(self.now_s))

@@ -62,7 +62,7 @@ class NodeSnapshots(Generic[S]):
         self._latest.pop(node_id, None)
 
     def take(self) -> list[S]:
-        """A state of each node, of now; of a node whose worker is busy, the one before."""
+        """The present state of each node; of a node whose worker is busy, its last one."""
         done: queue.SimpleQueue[int] = queue.SimpleQueue()
         fills = list(self._fills.values())
         for worker, fill in fills:
