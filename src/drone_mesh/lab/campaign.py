@@ -12,7 +12,7 @@ from drone_mesh.lab.experiment import LoadedExperiment
 from drone_mesh.lab.plan import Plan, PlannedRun
 from drone_mesh.lab.progress import Progress
 from drone_mesh.lab.provenance import describe_session
-from drone_mesh.lab.store import Store, read_rows
+from drone_mesh.lab.store import Store, read_runs
 
 
 class Campaign:
@@ -45,7 +45,7 @@ class Campaign:
             if retry_failed:
                 store.forget_failures()
             name = cluster or ("in this process" if workers == 0 else f"{workers} local")
-            store.describe(describe_session(self._command, self.loaded, name))
+            store.describe([describe_session(self._command, self.loaded, name)])
             while True:
                 self._run_plan(plan, store, workers, cluster, shard)
                 more = self._more_seeds(plan, store)
@@ -54,8 +54,10 @@ class Campaign:
                 plan = Plan(self.loaded, more)
                 store.use(plan)
         finally:
-            store.put_in_order()
-            store.close()
+            try:
+                store.export()
+            finally:
+                store.close()
 
     def _run_plan(
         self,
@@ -68,7 +70,7 @@ class Campaign:
         missing: dict[str, PlannedRun] = {
             planned.spec.run: planned
             for place, planned in enumerate(plan)
-            if planned.spec.run not in store.done and planned.spec.run not in store.failed
+            if planned.spec.run not in store.codes and planned.spec.run not in store.failed
             if shard is None or place % shard[1] == shard[0]
         }
         if not missing:
@@ -100,9 +102,9 @@ class Campaign:
         cell_of = {planned.spec.run: planned.cell for planned in plan}
         values: dict[int, list[float]] = {cell: [] for cell in range(len(plan.cells))}
         column = stop.metric.rpartition(":")[2]
-        for row in read_rows(store.runs.path):
-            if row["run"] in cell_of and row[column]:
-                values[cell_of[row["run"]]].append(float(row[column]))
+        for run, row in read_runs(self.folder).items():
+            if run in cell_of and row[column]:
+                values[cell_of[run]].append(float(row[column]))
         for found in values.values():
             if not _is_narrow(found, stop.half_width, stop.relative_half_width):
                 return min(stop.max_seeds, plan.seeds + self.loaded.experiment.seeds)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Sequence
 
@@ -20,7 +19,7 @@ from drone_mesh.lab.store import (
 def merge(into: Path, shards: Sequence[Path]) -> int:
     """Add all new rows of the shards; returns the number of runs added.
 
-    Raises StoreError for shards of different experiments.
+    Raises StoreError for shards of different experiments, or one run of different code.
     """
     sessions = [read_provenance(shard) for shard in shards]
     for shard, found in zip(shards, sessions):
@@ -33,14 +32,10 @@ def merge(into: Path, shards: Sequence[Path]) -> int:
     folder = Path(sessions[0][-1]["folder"])
     plan = Plan(load_experiment(shards[0] / EXPERIMENT, overrides, folder))
     store = Store(into, plan)
-    added = 0
     try:
-        store.describe(sessions[0][-1])
-        everything = [*read_provenance(into)[:-1], *(one for found in sessions for one in found)]
-        (into / PROVENANCE).write_text(json.dumps(everything, indent=2) + "\n", encoding="utf-8")
-        for shard in shards:
-            added += store.take_from(shard)
+        added = store.take_from(shards)
+        store.describe([one for found in sessions for one in found])
+        store.export()
     finally:
-        store.put_in_order()
         store.close()
     return added

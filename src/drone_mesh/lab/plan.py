@@ -58,6 +58,12 @@ class Plan:
                 )  # fmt: skip
                 yield PlannedRun(spec, cell)
 
+    def row(self, planned: PlannedRun) -> dict[str, str]:
+        """A run of the plan in plan.csv."""
+        names = {"run": planned.spec.run, "repetition": str(planned.spec.repetition)}
+        values = self.cells[planned.cell].values
+        return {**names, **{axis: as_text(value) for axis, value in values.items()}}
+
     @property
     def parameter_columns(self) -> list[str]:
         """All parameters of any cell, flattened, in order of first appearance."""

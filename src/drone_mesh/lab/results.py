@@ -13,11 +13,10 @@ from drone_mesh.lab.metrics import METRICS
 from drone_mesh.lab.plan import Plan, PlannedRun
 from drone_mesh.lab.store import (
     EXPERIMENT,
-    FAILURES,
-    RUNS,
     StoreError,
+    read_failures,
     read_provenance,
-    read_rows,
+    read_runs,
 )
 
 CELLS_SHOWN = 4  # in an error
@@ -146,15 +145,14 @@ def load_results(folder: Path) -> Results:
         raise StoreError(f"{folder}: not a results folder of lab run")
     last = sessions[-1]
     loaded = load_experiment(folder / EXPERIMENT, list(last["overrides"]), Path(last["folder"]))
-    rows = {row["run"]: row for row in read_rows(folder / RUNS)}
+    rows = read_runs(folder)
     seeds = _seeds(loaded, rows)
     plan = list(Plan(loaded, seeds))
     by_cell: dict[int, dict[int, Row]] = {}
     for planned in plan:
         if planned.spec.run in rows:
             by_cell.setdefault(planned.cell, {})[planned.spec.repetition] = rows[planned.spec.run]
-    failures = read_rows(folder / FAILURES)
-    return Results(folder, loaded, plan, rows, by_cell, failures, sessions)
+    return Results(folder, loaded, plan, rows, by_cell, read_failures(folder), sessions)
 
 
 def number(row: Row, column: str) -> float | None:

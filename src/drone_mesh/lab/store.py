@@ -1,18 +1,19 @@
-"""The results folder: its tables record what is done; no row is lost or repeated."""
+"""The results folder: a database records what is done; the CSV files are its exports."""
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import fcntl
-import io
+import itertools
 import json
 import os
 import shutil
+import sqlite3
 from pathlib import Path
-from typing import Any, Iterable, Mapping, Sequence
+from typing import Any, Iterator, Mapping, Sequence
 
 from drone_mesh.errors import MeshError
-from drone_mesh.lab.experiment import as_text
 from drone_mesh.lab.plan import Plan, flatten
 from drone_mesh.lab.worker import Outcome, as_cell, metric_columns
 
@@ -20,62 +21,24 @@ FIRST_COLUMNS = ("run", "seed", "repetition")
 LAST_COLUMNS = ("event_hash", "code", "wall_s")
 OUTAGE_COLUMNS = ("run", "repetition", "node", "lost_s", "restored_s")
 FAILURE_COLUMNS = ("run", "repetition", "cell", "kind", "message", "command", "traceback")
-RUNS, OUTAGES, FAILURES = "runs.csv", "outages.csv", "failures.csv"
-PLAN, PROVENANCE, EXPERIMENT, LOGS = "plan.csv", "provenance.json", "experiment.yaml", "logs"
+DATABASE = "runs.sqlite"
+RUNS, OUTAGES, FAILURES, PLAN = "runs.csv", "outages.csv", "failures.csv", "plan.csv"
+PROVENANCE, EXPERIMENT = "provenance.json", "experiment.yaml"
+
+# A row is a JSON object, and one statement writes a run with its outages.
+_TABLES = """
+BEGIN;
+CREATE TABLE IF NOT EXISTS plan (place INTEGER PRIMARY KEY, run TEXT UNIQUE, cell INTEGER);
+CREATE TABLE IF NOT EXISTS runs (run TEXT PRIMARY KEY, code TEXT, row TEXT, outages TEXT);
+CREATE TABLE IF NOT EXISTS failures (run TEXT PRIMARY KEY, row TEXT);
+COMMIT;
+"""
+_RUNS, _FAILURES = "SELECT runs.row FROM runs", "SELECT failures.row FROM failures"
+_IN_ORDER = "LEFT JOIN plan USING (run) ORDER BY place IS NULL, place, run"  # then earlier plans
 
 
 class StoreError(MeshError):
     """The results folder cannot be used. The message gives the reason and the remedy."""
-
-
-class CsvLog:
-    """An append-only CSV file whose rows are either complete or absent."""
-
-    def __init__(self, path: Path, columns: Sequence[str]) -> None:
-        """Repair the file of a killed writer: remove an incomplete last line."""
-        self.path = path
-        self.columns = list(columns)
-        self.rows = read_rows(path)
-        there = list(self.rows[0]) if self.rows else []
-        self.columns += [name for name in there if name not in self.columns]
-        self.rewrite(self.rows)
-
-    def append(self, rows: Iterable[Mapping[str, str]]) -> None:
-        """Write these rows, all or none. Raises StoreError if writing fails."""
-        text = io.StringIO()
-        writer = csv.DictWriter(text, self.columns, lineterminator="\n", restval="")
-        writer.writerows(rows)
-        data = text.getvalue().encode()
-        end = os.fstat(self._file).st_size
-        try:
-            view = memoryview(data)
-            while view:
-                view = view[os.write(self._file, view) :]
-        except OSError as error:
-            os.ftruncate(self._file, end)
-            raise _cannot("write", self.path, error) from error
-
-    def rewrite(self, rows: Iterable[Mapping[str, str]]) -> None:
-        """Replace the file by these rows atomically, and append after them from now on."""
-        new = self.path.with_suffix(".new")
-        try:
-            with new.open("w", encoding="utf-8", newline="") as file:
-                writer = csv.DictWriter(file, self.columns, lineterminator="\n", restval="")
-                writer.writeheader()
-                writer.writerows(rows)
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(new, self.path)
-            self.close()
-            self._file = os.open(self.path, os.O_WRONLY | os.O_APPEND)
-        except OSError as error:
-            raise _cannot("write", self.path, error) from error
-
-    def close(self) -> None:
-        """Close the file."""
-        if hasattr(self, "_file"):
-            os.close(self._file)
-            del self._file
 
 
 class Store:
@@ -85,20 +48,19 @@ class Store:
         """Raises StoreError if it is not writable, or another `lab run` is writing to it."""
         self.folder = folder
         self._plan = plan
-        try:
-            (folder / LOGS).mkdir(parents=True, exist_ok=True)
+        _refuse_csv_alone(folder)
+        with _explained("use", folder):
+            folder.mkdir(parents=True, exist_ok=True)
             self._lock = (folder / ".lock").open("a+", encoding="utf-8")
-        except OSError as error:
-            raise _cannot("use", folder, error) from error
         self._take_lock()
-        own = plan.own_metrics
-        columns = [*FIRST_COLUMNS, *plan.parameter_columns, *metric_columns(own), *LAST_COLUMNS]
-        self.runs = CsvLog(folder / RUNS, columns)
-        self.outages = CsvLog(folder / OUTAGES, OUTAGE_COLUMNS)
-        self.failures = CsvLog(folder / FAILURES, FAILURE_COLUMNS)
-        self.done = {row["run"] for row in self.runs.rows}
-        self.failed = {row["run"] for row in self.failures.rows}
-        self._drop_orphans()
+        with _explained("use", folder / DATABASE):
+            self._database = sqlite3.connect(str(folder / DATABASE), isolation_level=None)
+            self._database.executescript(_TABLES)
+            # With a log, a row costs no wait for the disk, and a killed writer loses none.
+            self._database.execute("PRAGMA journal_mode = WAL")
+            self._database.execute("PRAGMA synchronous = NORMAL")
+            self.codes = dict(self._database.execute("SELECT run, code FROM runs"))
+            self.failed = {run for (run,) in self._database.execute("SELECT run FROM failures")}
 
     def _take_lock(self) -> None:
         try:
@@ -114,147 +76,142 @@ class Store:
         self._lock.write(f"lab run, process {os.getpid()} on {os.uname().nodename},")
         self._lock.flush()
 
-    def _drop_orphans(self) -> None:
-        """Remove outages of runs that are not in runs.csv, left by a writer killed in between."""
-        kept = [row for row in self.outages.rows if row["run"] in self.done]
-        if len(kept) != len(self.outages.rows):
-            self.outages.rewrite(kept)
-
     def use(self, plan: Plan) -> None:
         """Continue with another plan of the same experiment, with more seeds."""
         self._plan = plan
-        self._write_plan()
+        rows = ((place, one.spec.run, one.cell) for place, one in enumerate(plan))
+        with self._at_once():
+            self._database.execute("DELETE FROM plan")
+            self._database.executemany("INSERT OR IGNORE INTO plan VALUES (?, ?, ?)", rows)
 
-    def describe(self, session: Mapping[str, Any]) -> None:
-        """Write down the session: the file as given, the plan, and this session."""
-        loaded = self._plan.loaded
-        sessions = read_provenance(self.folder)
-        try:
-            if loaded.path.resolve() != (self.folder / EXPERIMENT).resolve():
-                shutil.copyfile(loaded.path, self.folder / EXPERIMENT)
-            text = json.dumps([*sessions, dict(session)], indent=2) + "\n"
+    def describe(self, sessions: Sequence[Mapping[str, Any]]) -> None:
+        """Write down the file as given, the plan, and these sessions after the earlier ones."""
+        path = self._plan.loaded.path
+        earlier = read_provenance(self.folder)
+        with _explained("write", self.folder):
+            if path.resolve() != (self.folder / EXPERIMENT).resolve():
+                shutil.copyfile(path, self.folder / EXPERIMENT)
+            text = json.dumps([*earlier, *sessions], indent=2) + "\n"
             (self.folder / PROVENANCE).write_text(text, encoding="utf-8")
-        except OSError as error:
-            raise _cannot("write", self.folder, error) from error
-        self._write_plan()
-
-    def _write_plan(self) -> None:
-        path = self.folder / PLAN
-        try:
-            with path.open("w", encoding="utf-8", newline="") as file:
-                writer = csv.writer(file, lineterminator="\n")
-                writer.writerow(["run", "repetition", *self._plan.loaded.axes])
-                for planned in self._plan:
-                    values = self._plan.cells[planned.cell].values.values()
-                    cells = [planned.spec.run, planned.spec.repetition, *map(as_text, values)]
-                    writer.writerow(cells)
-        except OSError as error:
-            raise _cannot("write", path, error) from error
+        self.use(self._plan)
 
     def add(self, outcome: Outcome, cell: str, command: str) -> None:
         """Store the outcome of a run: its row and its outages, or its failure."""
         spec = outcome.spec
+        names = {"run": spec.run, "repetition": str(spec.repetition)}
         if outcome.failure:
-            self._add_failure(outcome, cell, command)
+            what = (cell, outcome.failure, outcome.message, command, outcome.traceback)
+            row = {**names, **dict(zip(FAILURE_COLUMNS[len(names) :], what))}
+            self._insert("failures", spec.run, json.dumps(row))
+            self.failed.add(spec.run)
             return
-        if spec.run in self.done:  # a worker presumed dead had finished it
+        if spec.run in self.codes:  # a worker presumed dead had finished it
             return
-        if self._plan.loaded.experiment.output == "runs_and_outages":
-            self.outages.append(
-                {
-                    "run": spec.run,
-                    "repetition": str(spec.repetition),
-                    "node": str(outage.node),
-                    "lost_s": as_cell(outage.lost_s),
-                    "restored_s": "" if outage.restored_s is None else as_cell(outage.restored_s),
-                }
-                for outage in outcome.outages
-            )
         row = {
-            "run": spec.run,
+            **names,
             "seed": str(spec.seed),
-            "repetition": str(spec.repetition),
             **flatten(json.loads(spec.scenario)),
             **{name: as_cell(value) for name, value in outcome.values.items()},
             "event_hash": outcome.event_hash,
             "code": outcome.code,
             "wall_s": f"{outcome.wall_s:.4f}",
         }
-        self.runs.append([row])
-        self.done.add(spec.run)
+        outages = [
+            {
+                **names,
+                "node": outage.node,
+                "lost_s": as_cell(outage.lost_s),
+                "restored_s": "" if outage.restored_s is None else as_cell(outage.restored_s),
+            }
+            for outage in outcome.outages
+            if self._plan.loaded.experiment.output == "runs_and_outages"
+        ]
+        self._insert("runs", spec.run, outcome.code, json.dumps(row), json.dumps(outages))
+        self.codes[spec.run] = outcome.code
 
-    def take_from(self, other: Path) -> int:
-        """Copy the rows of another results folder that this one lacks; returns how many runs."""
-        rows = [row for row in read_rows(other / RUNS) if row["run"] not in self.done]
-        new = {row["run"] for row in rows}
-        self.outages.append(row for row in read_rows(other / OUTAGES) if row["run"] in new)
-        self.runs.append(rows)
-        self.done |= new
-        failures = read_rows(other / FAILURES)
-        self.failures.append(row for row in failures if row["run"] not in self.failed | self.done)
-        return len(new)
+    def _insert(self, table: str, *values: str) -> None:
+        with _explained("write", self.folder / DATABASE):
+            places = ", ".join("?" * len(values))
+            self._database.execute(f"INSERT OR REPLACE INTO {table} VALUES ({places})", values)
 
-    def _add_failure(self, outcome: Outcome, cell: str, command: str) -> None:
-        spec = outcome.spec
-        row = {
-            "run": spec.run,
-            "repetition": str(spec.repetition),
-            "cell": cell,
-            "kind": outcome.failure,
-            "message": outcome.message,
-            "command": command,
-            "traceback": outcome.traceback,
-        }
-        self.failures.append([row])
-        self.failed.add(spec.run)
-        try:
-            (self.folder / LOGS / f"{spec.run}.txt").write_text(
-                f"{command}\n{outcome.message}\n\n{outcome.traceback}", encoding="utf-8"
-            )
-        except OSError as error:
-            raise _cannot("write", self.folder / LOGS, error) from error
+    def take_from(self, others: Sequence[Path]) -> int:
+        """Copy the runs of other results folders that this one lacks; returns how many.
+
+        Raises StoreError, and copies none, if two have one run from different code.
+        """
+        before = len(self.codes)
+        codes = dict(self.codes)
+        with self._at_once():
+            for other in others:
+                with _reading(other) as database:
+                    for row in database.execute("SELECT run, code, row, outages FROM runs"):
+                        if codes.setdefault(row[0], row[1]) != row[1]:
+                            raise StoreError(
+                                f"{other}: run {row[0]} is of code {row[1]}, and there is one of "
+                                f"code {codes[row[0]]}: merge shards of the same code"
+                            )
+                        self._insert("runs", *row)
+                    for row in database.execute("SELECT run, row FROM failures"):
+                        self._insert("failures", *row)
+            self._database.execute("DELETE FROM failures WHERE run IN (SELECT run FROM runs)")
+        self.codes = codes
+        return len(codes) - before
 
     def forget_failures(self) -> None:
         """Remove failed runs, so that they count as missing."""
-        self.failures.rewrite([])
+        with _explained("write", self.folder / DATABASE):
+            self._database.execute("DELETE FROM failures")
         self.failed = set()
 
-    def put_in_order(self) -> None:
-        """Sort all tables in the order of the plan: the same runs produce the same bytes."""
-        order = {planned.spec.run: place for place, planned in enumerate(self._plan)}
-        for table in (self.runs, self.outages, self.failures):
-            rows = read_rows(table.path)
-            table.rewrite(sorted(rows, key=lambda row: order.get(row["run"], len(order))))
+    @contextlib.contextmanager
+    def _at_once(self) -> Iterator[None]:
+        """All that is written inside, or nothing."""
+        with _explained("write", self.folder / DATABASE):
+            self._database.execute("BEGIN")
+            with self._database:
+                yield
+
+    def export(self) -> None:
+        """Write the CSV files in the order of the plan: the same runs give the same bytes."""
+        plan, database = self._plan, self._database
+        columns = [*FIRST_COLUMNS, *plan.parameter_columns, *metric_columns(plan.own_metrics)]
+        columns = list(dict.fromkeys([*columns, *LAST_COLUMNS, *_columns(database)]))
+        outages = _rows(database, "SELECT outages FROM runs")
+        for name, header, rows in (
+            (RUNS, columns, _rows(database, _RUNS)),
+            (OUTAGES, OUTAGE_COLUMNS, itertools.chain.from_iterable(outages)),
+            (FAILURES, FAILURE_COLUMNS, _rows(database, _FAILURES)),
+            (PLAN, ("run", "repetition", *plan.loaded.axes), map(plan.row, plan)),
+        ):
+            new = (self.folder / name).with_suffix(".new")
+            with _explained("write", self.folder / name):
+                with new.open("w", encoding="utf-8", newline="") as file:
+                    writer = csv.DictWriter(file, header, lineterminator="\n", restval="")
+                    writer.writeheader()
+                    writer.writerows(rows)
+                os.replace(new, self.folder / name)
 
     def close(self) -> None:
         """Release the folder for other writers."""
-        for table in (self.runs, self.outages, self.failures):
-            table.close()
+        with contextlib.suppress(sqlite3.Error):  # a reader in between; the next writer does it
+            self._database.execute("PRAGMA journal_mode = DELETE")  # one file, also read-only
+        self._database.close()
         self._lock.truncate(0)
         self._lock.close()
 
 
-def read_rows(path: Path) -> list[dict[str, str]]:
-    """The complete rows of a CSV file; none if it does not exist. Omits an incomplete last row.
+def read_runs(folder: Path) -> dict[str, dict[str, str]]:
+    """The rows of all finished runs by id, with the same columns each. Raises StoreError."""
+    with _reading(folder) as database:
+        rows = list(_rows(database, _RUNS))
+    empty = dict.fromkeys(itertools.chain.from_iterable(rows), "")
+    return {row["run"]: {**empty, **row} for row in rows}
 
-    Raises StoreError for a file that cannot be read.
-    """
-    try:
-        data = path.read_bytes()
-    except FileNotFoundError:
-        return []
-    except OSError as error:
-        raise _cannot("read", path, error) from error
-    text = data[: data.rfind(b"\n") + 1].decode("utf-8-sig", "replace")
-    try:
-        rows = list(csv.DictReader(io.StringIO(text, newline="")))
-    except csv.Error as error:
-        raise StoreError(f"{path}: {error}") from error
-    if rows and "run" not in rows[0]:
-        raise StoreError(f"{path}: has no column run")
-    while rows and None in rows[-1].values():
-        rows.pop()  # cut off inside a quoted traceback
-    return rows
+
+def read_failures(folder: Path) -> list[dict[str, str]]:
+    """The rows of all failed runs. Raises StoreError."""
+    with _reading(folder) as database:
+        return list(_rows(database, _FAILURES))
 
 
 def read_provenance(folder: Path) -> list[dict[str, Any]]:
@@ -268,19 +225,19 @@ def read_provenance(folder: Path) -> list[dict[str, Any]]:
 
 def describe_folder(folder: Path) -> str:
     """A few lines of text. Raises StoreError if the folder has no results."""
-    if not (folder / PLAN).exists():
-        raise StoreError(f"{folder}: no {PLAN} there, so it is not a results folder of lab run")
-    planned = [row["run"] for row in read_rows(folder / PLAN)]
-    rows = read_rows(folder / RUNS)
-    done = {row["run"] for row in rows}
-    failed = {row["run"] for row in read_rows(folder / FAILURES)} - done
-    in_plan = sum(run in done for run in planned)
-    lines = [f"{folder}: {in_plan} of {len(planned)} runs done"]
+    with _reading(folder) as database:
+
+        def count(what: str) -> int:
+            return int(database.execute(f"SELECT count(*) FROM {what}").fetchone()[0])
+
+        planned, done, failed = count("plan"), count("runs"), count("failures")
+        in_plan = count("plan JOIN runs USING (run)")
+        codes = sorted(code for (code,) in database.execute("SELECT DISTINCT code FROM runs"))
+    lines = [f"{folder}: {in_plan} of {planned} runs done"]
     if failed:
-        lines[0] += f", {len(failed)} failed"
-    if len(done) > in_plan:
-        lines.append(f"{len(done) - in_plan} more runs are of an earlier plan and are kept")
-    codes = sorted({row["code"] for row in rows})
+        lines[0] += f", {failed} failed"
+    if done > in_plan:
+        lines.append(f"{done - in_plan} more runs are of an earlier plan and are kept")
     if len(codes) > 1:
         lines.append(f"warning: rows of {len(codes)} versions of the code: {', '.join(codes)}")
     elif codes and codes[0].endswith("+dirty"):
@@ -292,7 +249,42 @@ def describe_folder(folder: Path) -> str:
     return "\n".join(lines)
 
 
-def _cannot(do: str, path: Path, error: OSError) -> StoreError:
-    return StoreError(
-        f"cannot {do} {path}: {error.strerror or error}; what was written before is kept"
-    )
+def _rows(database: sqlite3.Connection, query: str) -> Iterator[Any]:
+    return (json.loads(row) for (row,) in database.execute(f"{query} {_IN_ORDER}"))
+
+
+def _columns(database: sqlite3.Connection) -> list[str]:
+    """All columns of any run, in order of first appearance."""
+    return list(dict.fromkeys(itertools.chain.from_iterable(_rows(database, _RUNS))))
+
+
+@contextlib.contextmanager
+def _reading(folder: Path) -> Iterator[sqlite3.Connection]:
+    _refuse_csv_alone(folder)
+    path = folder / DATABASE
+    if not path.exists() or not path.stat().st_size:  # empty: another process is just making it
+        raise StoreError(f"{folder}: no {DATABASE} there, so it is not a results folder of lab run")
+    with _explained("read", path):
+        database = sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)
+        with contextlib.closing(database):
+            yield database
+
+
+def _refuse_csv_alone(folder: Path) -> None:
+    if (folder / RUNS).exists() and not (folder / DATABASE).exists():
+        raise StoreError(
+            f"{folder}: {RUNS} without {DATABASE}, of an earlier version of the lab: run the "
+            "experiment again into another folder"
+        )
+
+
+@contextlib.contextmanager
+def _explained(do: str, path: Path) -> Iterator[None]:
+    """Raise StoreError for what the system or the database says."""
+    try:
+        yield
+    except (OSError, sqlite3.Error) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise StoreError(
+            f"cannot {do} {path}: {reason}; what was written before is kept"
+        ) from error

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
+import json
 import math
 import os
 import resource
 import shutil
 import signal
+import sqlite3
 import subprocess
 import sys
 import time
@@ -21,7 +24,7 @@ from drone_mesh.lab.campaign import Campaign, _is_narrow
 from drone_mesh.lab.command import main
 from drone_mesh.lab.experiment import load_experiment
 from drone_mesh.lab.plan import Plan
-from drone_mesh.lab.store import Store, StoreError, read_rows
+from drone_mesh.lab.store import Store, StoreError, read_runs
 from drone_mesh.lab.worker import execute
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -87,6 +90,11 @@ def run(path: Path, out: Path, *words: object) -> int:
     return lab("run", path, "--out", out, "--workers", 0, *words)
 
 
+def read_rows(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
 def measured(folder: Path) -> bytes:
     """runs.csv without its last column, the wall time."""
     lines = (folder / "runs.csv").read_bytes().splitlines()
@@ -108,8 +116,8 @@ def test_a_run_gives_one_tidy_row_per_run_in_the_order_of_the_plan(
     assert rows[0]["victims"] == "1"
     assert (out / "experiment.yaml").read_text() == SMALL
     assert {path.name for path in out.iterdir()} == {
-        ".lock", "experiment.yaml", "failures.csv", "logs", "outages.csv", "plan.csv",
-        "provenance.json", "runs.csv",
+        ".lock", "experiment.yaml", "failures.csv", "outages.csv", "plan.csv",
+        "provenance.json", "runs.csv", "runs.sqlite",
     }  # fmt: skip
 
 
@@ -143,8 +151,7 @@ def test_rows_are_the_same_bytes_with_and_without_interruption(
     run(path, tmp_path / "whole")
     out = tmp_path / "parts"
     run(path, out, "seeds=1")
-    lines = (out / "runs.csv").read_bytes().splitlines(keepends=True)
-    (out / "runs.csv").write_bytes(lines[0] + lines[1] + lines[2][:40])  # killed while writing
+    (out / "runs.csv").write_text("an export is written anew")
     run(path, out)
     assert measured(out) == measured(tmp_path / "whole")
     assert (out / "outages.csv").read_bytes() == (tmp_path / "whole/outages.csv").read_bytes()
@@ -161,6 +168,47 @@ def test_shards_together_are_the_whole(experiment: Callable[..., Path], tmp_path
     assert sizes == [3, 3, 2]
     assert lab("merge", tmp_path / "all", *shards) == 0
     assert measured(tmp_path / "all") == measured(tmp_path / "whole")
+
+
+def test_a_merge_refuses_one_run_of_two_codes_and_takes_none(
+    experiment: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = experiment()
+    for name in ("a", "b"):
+        run(path, tmp_path / name, "seeds=1", "sweep.radio.loss=[0]")
+    database = sqlite3.connect(str(tmp_path / "b/runs.sqlite"))
+    with database:
+        database.execute("UPDATE runs SET code = 'older'")
+    database.close()
+    capsys.readouterr()
+    assert lab("merge", tmp_path / "all", tmp_path / "a", tmp_path / "b") == 1
+    assert "is of code older, and there is one of code" in capsys.readouterr().err
+    assert read_runs(tmp_path / "all") == {}
+
+
+def test_results_that_are_csv_alone_are_refused_in_one_line_with_the_remedy(
+    experiment: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run(experiment(), tmp_path / "out", "seeds=1")
+    (tmp_path / "out/runs.sqlite").unlink()
+    before = (tmp_path / "out/runs.csv").read_bytes()
+    capsys.readouterr()
+    for words in (["run", experiment(), "--out"], ["status"], ["report"]):
+        assert lab(*words, tmp_path / "out") == 1
+        error = capsys.readouterr().err
+        assert "runs.csv without runs.sqlite, of an earlier version of the lab: run the" in error
+    assert (tmp_path / "out/runs.csv").read_bytes() == before
+
+
+def test_a_store_that_is_damaged_is_refused_in_one_line(
+    experiment: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run(experiment(), tmp_path / "out", "seeds=1")
+    (tmp_path / "out/runs.sqlite").write_bytes(b"run,seed\n" * 999)
+    capsys.readouterr()
+    assert lab("status", tmp_path / "out") == 1
+    error = capsys.readouterr().err
+    assert "runs.sqlite: file is not a database; what was written before is kept" in error
 
 
 @pytest.mark.slow
@@ -185,7 +233,6 @@ def test_a_failing_run_is_a_failure_with_traceback_and_command_and_the_others_co
     assert (first["kind"], first["message"]) == ("exception", "ValueError: no good")
     assert 'raise ValueError("no good")' in first["traceback"]
     assert first["command"] == f"python3 -m drone_mesh.lab show {out} {first['run']}"
-    assert "ValueError" in (out / "logs" / f"{first['run']}.txt").read_text()
     assert "4 failed" in capsys.readouterr().out
     assert run(experiment(text=text), out) == 0  # failures are not missing
     assert run(experiment(text=text), out, "--retry-failed") == 1
@@ -249,11 +296,11 @@ def test_a_full_disk_ends_the_run_and_loses_nothing(
     """A limit on the size of files stands for the disk: a write fails in the same way."""
     path, out = experiment(), tmp_path / "out"
     run(path, tmp_path / "whole")
-    size = (tmp_path / "whole/runs.csv").stat().st_size
+    size = 80_000  # an empty database and its log take half of it
 
     def small_disk() -> None:
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (size // 2, size // 2))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
 
     command = [sys.executable, "-m", "drone_mesh.lab", "run", path, "--out", out, "--workers", "0"]
     done = subprocess.run(
@@ -261,10 +308,10 @@ def test_a_full_disk_ends_the_run_and_loses_nothing(
         env={**os.environ, "PYTHONPATH": str(ROOT / "src"), "PYTHONDONTWRITEBYTECODE": "1"},
     )  # fmt: skip
     assert done.returncode == 1
-    assert f"cannot write {out / 'runs.csv'}: File too large" in done.stderr
+    assert f"cannot write {out / 'runs.sqlite'}: " in done.stderr
     assert "continue with: lab run" in done.stderr
     assert "Traceback" not in done.stderr
-    kept = read_rows(out / "runs.csv")
+    kept = read_runs(out)
     assert 0 < len(kept) < 8
     run(path, out)
     assert measured(out) == measured(tmp_path / "whole")
@@ -289,8 +336,9 @@ def finish(process: subprocess.Popen[str]) -> str:
 def wait_for_rows(out: Path, number: int, process: subprocess.Popen[str]) -> None:
     deadline_s = time.monotonic() + 60
     while time.monotonic() < deadline_s:
-        if (out / "runs.csv").exists() and len(read_rows(out / "runs.csv")) >= number:
-            return
+        with contextlib.suppress(StoreError):  # there is none yet
+            if len(read_runs(out)) >= number:
+                return
         assert process.poll() is None, process.communicate()[0]
         time.sleep(0.05)
     raise AssertionError(f"fewer than {number} rows within 60 s")
@@ -341,7 +389,7 @@ def test_a_killed_client_loses_nothing(slow: Path, slow_rows: bytes, tmp_path: P
     wait_for_rows(out, 5, process)
     process.kill()
     process.wait()
-    kept = len(read_rows(out / "runs.csv"))
+    kept = len(read_runs(out))
     assert 5 <= kept < 48
     assert run(slow, out) == 0
     assert measured(out) == slow_rows
@@ -590,9 +638,12 @@ def test_show_says_why_the_run_differs(
     experiment: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     run(experiment(), tmp_path / "out", "seeds=1")
-    runs = tmp_path / "out/runs.csv"
-    row = read_rows(runs)[0]
-    runs.write_text(runs.read_text().replace(f"{row['event_hash']},{row['code']}", "0,older"))
+    row = read_rows(tmp_path / "out/runs.csv")[0]
+    other = json.dumps({**row, "event_hash": "0", "code": "older"})
+    database = sqlite3.connect(str(tmp_path / "out/runs.sqlite"))
+    with database:
+        database.execute("UPDATE runs SET row = ? WHERE run = ?", (other, row["run"]))
+    database.close()
     assert lab("show", tmp_path / "out", row["run"]) == 1
     assert "the row was computed by code older" in capsys.readouterr().out
 

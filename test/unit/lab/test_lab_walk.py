@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from drone_mesh.lab.command import main
-from drone_mesh.lab.store import read_rows
+from drone_mesh.lab.store import read_runs
 
 PAGE = Path(__file__).resolve().parents[3] / "docs/lab.md"
 WALK = PAGE.read_text(encoding="utf-8").partition("## The experiment file")[0]
@@ -49,8 +49,8 @@ def test_every_command_of_the_page_works_in_its_order(
         words = shlex.split(typed)
         commands.append(words[0])
         if words[0] == "show":  # the page shows a run of its own
-            rows = read_rows(tmp_path / "results/half_way/runs.csv")
-            words[2] = next(row["run"][:8] for row in rows if row["repair"] != "thesis")
+            rows = read_runs(tmp_path / "results/half_way")
+            words[2] = next(run[:8] for run, row in rows.items() if row["repair"] != "thesis")
         assert main(words) == 0, typed
         printed = capsys.readouterr().out
         if words[0] == "plan":
