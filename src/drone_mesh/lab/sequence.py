@@ -74,7 +74,7 @@ class SequenceRun(Simulation):
             before = now
 
     def is_able(self, node: int) -> bool:
-        """Also: links to nodes with a path to the gateway still work, wherever the drone flies."""
+        """Also requires a working link to a node with a path to the gateway."""
         air = self.network.air
         assert isinstance(air, InProcessAir)
         if node in self.impairments.one_way.mute | self.impairments.one_way.deaf:

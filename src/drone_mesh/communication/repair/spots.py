@@ -61,7 +61,7 @@ def spot_beside_rivals(
 
 
 def _class_of(node: int, block: int) -> tuple[int, ...]:
-    """Which spots of each block, as many along each side, are those of `node`."""
+    """The class of spots that belongs to `node`, of blocks with `block` spots along each side."""
     floor, on_floor = divmod(node, BLOCK * BLOCK)
     row, column = divmod(on_floor, BLOCK)
     return block, row % block, column % block, floor if block == BLOCK else 0

@@ -36,7 +36,7 @@ class TakenPlaces:
         ]
 
     def is_free(self, spot: Location, tried: Sequence[Location] = ()) -> bool:
-        """Whether no other drone is within the clearance, and no spot where it was in vain."""
+        """Whether the spot is clear of other drones, and of spots that were tried in vain."""
         clearance_m = self._options.clearance_m
         return all(spot.distance_m(other) >= clearance_m for other in [*self.all(), *tried])
 

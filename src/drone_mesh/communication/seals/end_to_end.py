@@ -123,7 +123,7 @@ class NotProven(PacketError):
 
 
 class Replayed(NotProven):
-    """It is, but it was received before: mostly a copy that took another way."""
+    """A proven packet that was received before: mostly a copy that took another way."""
 
 
 class EndToEnd:

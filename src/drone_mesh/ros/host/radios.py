@@ -42,7 +42,7 @@ class Radios(abc.ABC):
 
     @abc.abstractmethod
     def fall_silent(self) -> None:
-        """From now on sends fail at once, or stay quick."""
+        """From now on no send blocks: each fails at once, or stays quick."""
 
     def close(self) -> None:  # noqa: B027 - most have ended when they are silent
         """Stop all threads; returns when they have ended."""

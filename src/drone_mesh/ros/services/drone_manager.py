@@ -194,7 +194,7 @@ class DroneManager:
     def _order_first(
         self, given: Given, fleet: PresentDrones | None, missing: Sequence[int]
     ) -> OrderSummary:
-        """Give the first orders of a standing order; who they are for is free to fly."""
+        """Give the first orders of a standing order, to drones that may set out now."""
         drones, reasons = given.progress.drones, dict(given.progress.reasons)
         first = [order for order in given.orders if order.node_id not in missing]
         ordered = {order.node_id for order in first}
@@ -295,7 +295,7 @@ def _formation(request: srv.OrderFormationRequest) -> list[Order]:
 
 
 def _check_gateways(request: srv.OrderFormationRequest) -> None:
-    """Raises ServiceException: the mesh hangs on a gateway, which flies for no mere number."""
+    """Raises ServiceException for gateways that the request does not name as such."""
     fleet = drones_if_known()
     moved = set(request.drones) - set(request.gateways)
     unnamed = sorted(moved.intersection(fleet.gateways if fleet else ()))

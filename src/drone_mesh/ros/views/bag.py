@@ -73,7 +73,7 @@ def readable(items: Iterator[T], damage: list[BagDamaged]) -> Iterator[T]:
 
 
 def raise_any(damage: Sequence[BagDamaged]) -> None:
-    """For a tool that has shown what can be read: raises the first, if there is one."""
+    """Raise the first error, once a tool has shown what can be read."""
     if damage:
         raise damage[0]
 
@@ -105,7 +105,7 @@ def by_run(states: Iterable[MeshStatus]) -> Iterator[tuple[int, MeshStatus]]:
 
 
 def chosen_run(path: Path, runs: int, given: int | None) -> int:
-    """The run that was asked for, by default the last one, and then says so if there are several.
+    """The run that was asked for; by default the last of several, which a line then says.
 
     Raises BagUnusable if there are not so many.
     """

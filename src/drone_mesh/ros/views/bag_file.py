@@ -89,7 +89,7 @@ def raise_if_damaged(path: Path, losses: Sequence[float], where: str) -> None:
 
 
 def _indexed_again(bag: rosbag.Bag, path: Path) -> rosbag.Bag:
-    """The same with the index of each chunk that has one. Raises BagUnusable."""
+    """The bag, with the index of each chunk that has a readable one. Raises BagUnusable."""
     if not bag._chunks:
         bag.close()
         raise BagUnusable(

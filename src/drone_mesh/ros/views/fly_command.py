@@ -33,7 +33,7 @@ def main() -> None:
 
 
 def _with_negative_numbers(words: list[str]) -> list[str]:
-    """argparse takes -1e3 for an option; nothing here begins with a dash but -h and --help."""
+    """The arguments after "--", as argparse would take a number such as -1e3 for an option."""
     return words if {"-h", "--help"} & set(words) else ["--", *words]
 
 
