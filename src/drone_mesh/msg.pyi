@@ -207,6 +207,8 @@ class MeshEvent(Message):
     kind: str
     peers: bytes
     detail: str
+    order: int
+    place: list[Location]
     def __init__(
         self,
         stamp: rospy.Time = ...,
@@ -215,6 +217,8 @@ class MeshEvent(Message):
         kind: str = ...,
         peers: bytes | Sequence[int] = ...,
         detail: str = ...,
+        order: int = ...,
+        place: Sequence[Location] = ...,
     ) -> None: ...
 
 class MeshState(Message):

@@ -7,9 +7,10 @@ import unittest
 
 import rospy
 import rostest
-from rostest_support import WALL_LIMIT_S, LogWatch, MeshWatch
+from rostest_support import WALL_LIMIT_S, LogWatch, MeshWatch, call, wait_for
 
-from drone_mesh.msg import Location
+from drone_mesh.msg import LayoutProgress, Location
+from drone_mesh.srv import OrderLayout
 
 PLACES = {  # longitude, latitude: data of the project plan's field case
     1: (-13, 24), 2: (-11, 20), 3: (-12, 14), 4: (-7, 16), 5: (-12, 7), 6: (-7, 12),
@@ -35,6 +36,19 @@ class LayoutTest(unittest.TestCase):
         """The engine's connection may take a second more than the order."""
         goal = rospy.wait_for_message("/Drones/13/goal", Location, WALL_LIMIT_S)
         self.assertEqual((goal.longitude, goal.latitude, goal.height), (9.0, 7.0, 0))
+
+    def test_3_a_drone_is_not_replaced_by_its_own_order_whatever_its_decimals(self) -> None:
+        heard: list[LayoutProgress] = []
+        rospy.Subscriber("/DroneManager/layouts", LayoutProgress, heard.append)
+        number = call("/DroneManager/orderLayout", OrderLayout, 7000, False).id
+        progress: list[LayoutProgress] = []
+
+        def is_over() -> bool:
+            progress[:] = [p for p in list(heard) if p.id == number and p.over]
+            return bool(progress)
+
+        wait_for("the layout is over", 2 * WALL_LIMIT_S, is_over)
+        self.assertEqual(bytes(progress[-1].arrived), bytes([1, 17]), progress[-1].message)
 
 
 if __name__ == "__main__":

@@ -100,6 +100,10 @@ class MeshStateTest(unittest.TestCase):
         call("/DroneManager/requestDroneMovement", RequestDroneFlight, 3, 1.0, 12.0, 0)
         wait_for("3 arrived", WALL_LIMIT_S, lambda: self.has_event(0, "order arrived"))
         self.assertTrue(self.has_event(0, "order accepted"))
+        arrived = next(event for event in list(self.events) if event.code == event.ORDER_ARRIVED)
+        self.assertGreater(arrived.order, 0)
+        self.assertEqual([(p.longitude, p.latitude) for p in arrived.place], [(12.0, 1.0)])
+        self.assertEqual(arrived.detail, "")
         call("/DroneManager/requestDroneMovement", RequestDroneFlight, 3, 30.0, 12.0, 0)
         # Not any path: the state may still show the end of the first flight.
         goal = [12.0, 30.0, 0.0]

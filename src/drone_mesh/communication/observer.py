@@ -7,6 +7,7 @@ from typing import Callable, NamedTuple
 
 from drone_mesh.communication.deadlines import Deadlines
 from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.drone.location import Location
 
 
 class MeshEventKind(enum.Enum):
@@ -26,14 +27,14 @@ class MeshEventKind(enum.Enum):
     NEGOTIATION_STARTED = "negotiation started"  # detail: the node's score
     NEGOTIATION_ENDED = "negotiation ended"  # peer: the node that flies
     FLIGHT_DECIDED = "flight decided"  # peer: the node whose place it takes
-    FLIGHT_ORDERED = "flight ordered"  # peer: the creator of the order
+    FLIGHT_ORDERED = "flight ordered"  # peer: the gateway of the order; with its number and place
     LANDED = "landed"
     # Of the drone, reported by its world
     CRASHED = "crashed"
     BATTERY_LOW = "battery low"
     BATTERY_EMPTY = "battery empty"
     GOAL_REFUSED = "goal refused"  # detail: why
-    # What a gateway knows of an order; peer: its drone, detail: its number, its goal, and why
+    # What a gateway knows of an order; peer: its drone, with number and place; detail: why
     ORDER_SENT = "order sent"
     ORDER_ACCEPTED = "order accepted"
     ORDER_REFUSED = "order refused"
@@ -55,7 +56,20 @@ class MeshEvent(NamedTuple):
     node: int
     now_s: float
     peer: int = NO_ROUTE  # the other node concerned, or NO_ROUTE
-    detail: str = ""  # a short text for display
+    detail: str = ""  # why, as a short text for display
+    order: int = 0  # the number of the order that it is about; 0: none, or it is not known
+    place: Location | None = None  # where that order sends the drone
+
+    def explanation(self) -> str:
+        """See the function."""
+        return explanation(self.order, self.place, self.detail)
+
+
+def explanation(order: int, place: Location | None, detail: str = "") -> str:
+    """What views display behind the kind: order 7 to x 1.00 m, y 2.00 m, z 3 m: battery at 9 %."""
+    number = f"order {order}" if order else ""
+    goal = "" if place is None else f"to {place.in_words()}"
+    return ": ".join(filter(None, (" ".join(filter(None, (number, goal))), detail)))
 
 
 def in_hops(hops: int) -> str:
@@ -95,6 +109,14 @@ class Reporter:
         self._deadlines = deadlines
         self._observer = observer
 
-    def __call__(self, kind: MeshEventKind, peer: int = NO_ROUTE, detail: str = "") -> None:
-        """Report an event, the other node concerned, and a short text for display."""
-        self._observer(MeshEvent(kind, self._node_id, self._deadlines.now_s, peer, detail))
+    def __call__(
+        self,
+        kind: MeshEventKind,
+        peer: int = NO_ROUTE,
+        detail: str = "",
+        order: int = 0,
+        place: Location | None = None,
+    ) -> None:
+        """Report an event of this node, with the fields of a MeshEvent."""
+        now_s = self._deadlines.now_s
+        self._observer(MeshEvent(kind, self._node_id, now_s, peer, detail, order, place))

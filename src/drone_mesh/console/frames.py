@@ -148,7 +148,7 @@ class FrameStore:
                         "node": event.node,
                         "kind": event.kind,
                         "peers": list(event.peers),
-                        "detail": event.detail,
+                        "detail": event.explanation(),
                     },
                 )
             )

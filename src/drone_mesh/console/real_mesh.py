@@ -6,6 +6,7 @@ from typing import Any, Dict, Mapping
 
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.drone.geodesy import Origin
+from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
 from drone_mesh.state.model import UNKNOWN_POSITION, EventRecord, MeshStatus, NodeStatus
 from drone_mesh.state.routes import route_to_gateway
@@ -43,16 +44,20 @@ def origin_of(answer: Mapping[str, Any]) -> Origin | None:
 
 def events_of(answer: Mapping[str, Any]) -> list[EventRecord]:
     """The events in the answer, oldest first."""
-    return [
-        EventRecord(
-            float(event["t"]),
-            int(event["node"]),
-            event["kind"],
-            tuple(event["peers"]),
-            event["detail"],
-        )
-        for event in answer["events"]
-    ]
+    return [_event(entry) for entry in answer["events"]]
+
+
+def _event(entry: Mapping[str, Any]) -> EventRecord:
+    place = entry.get("place")  # an older gateway tells neither place nor order
+    return EventRecord(
+        float(entry["t"]),
+        int(entry["node"]),
+        entry["kind"],
+        tuple(entry["peers"]),
+        entry["detail"],
+        int(entry.get("order") or 0),
+        None if place is None else Location(*place),
+    )
 
 
 def _node(entry: Mapping[str, Any], gateway: int) -> NodeStatus:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-import re
+import struct
 from typing import NamedTuple, Sequence
 
 from drone_mesh.drone.flight_path import Vector
+
+_ON_THE_WIRE = struct.Struct("<ff")
 
 
 class Location(NamedTuple):
@@ -44,11 +46,7 @@ class Location(NamedTuple):
         """The position as text: x, y, z."""
         return f"x {self.longitude:.2f} m, y {self.latitude:.2f} m, z {self.height:.0f} m"
 
-    @classmethod
-    def from_words(cls, text: str) -> Location | None:
-        """The position in a text of `in_words`; None: there is none."""
-        found = re.search(r"x (\S+) m, y (\S+) m, z (\S+) m", text)
-        try:
-            return None if found is None else cls.from_vector([float(n) for n in found.groups()])
-        except ValueError:
-            return None
+    def as_ordered(self) -> Location:
+        """As an order carries it: float32, and whole metres of height. Compare orders by this."""
+        latitude, longitude = _ON_THE_WIRE.unpack(_ON_THE_WIRE.pack(self.latitude, self.longitude))
+        return Location(latitude, longitude, float(round(self.height)))

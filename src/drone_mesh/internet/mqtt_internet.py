@@ -162,7 +162,14 @@ class MqttInternet(IInternetConnection):
         """A MeshObserver: publishes an event of a node."""
         peer = event.peer if event.peer <= MAX_NODE_ID else None
         self._say(
-            str(event.node), {"event": event.kind.value, "peer": peer, "detail": event.detail}
+            str(event.node),
+            {
+                "event": event.kind.value,
+                "peer": peer,
+                "detail": event.detail,
+                "order": event.order or None,
+                "place": event.place,
+            },
         )
 
     def _received(self, message: ReceivedMessage) -> None:

@@ -99,7 +99,10 @@ def _print_story(shown: Replay) -> None:
         (item.at_s, f"fault: {item.action} {list(item.nodes)}") for item in shown.record.happened
     ]
     events = [
-        (event.stamp_s, f"node {event.node}: {event.kind} {list(event.peers) or ''} {event.detail}")
+        (
+            event.stamp_s,
+            f"node {event.node}: {event.kind} {list(event.peers) or ''} {event.explanation()}",
+        )
         for event in shown.record.events
     ]
     for at_s, text in sorted([*happened, *events], key=lambda line: line[0]):

@@ -168,7 +168,7 @@ class Simulation:
         """A hash of all events of the mesh software: equal for equal runs."""
         digest = hashlib.sha256()
         for event in self.network.events:
-            what = f"{event.kind.value} {event.peer} {event.detail}"
+            what = f"{event.kind.value} {event.peer} {event.explanation()}"
             digest.update(f"{event.now_s:.6f} {event.node} {what}\n".encode())
         return digest.hexdigest()[:16]
 

@@ -57,6 +57,8 @@ class EventHistory:
                 "kind": event.kind.value,
                 "peers": [event.peer] if event.peer <= MAX_NODE_ID else [],
                 "detail": event.detail,
+                "order": event.order or None,
+                "place": event.place,
             }
             for at, event in kept
             if at > number
@@ -71,7 +73,8 @@ def _log_event(event: MeshEvent) -> None:
     if event.peer <= MAX_NODE_ID:
         peer = "gateway" if event.kind in _ABOUT_GATEWAYS else "node"
         words += f": {peer} {event.peer}"
-    if event.detail:
-        words += f" ({event.detail})"
+    why = event.explanation()
+    if why:
+        words += f" ({why})"
     level = logging.WARNING if event.kind is MeshEventKind.EMERGENCY else logging.INFO
     _log.log(level, "node %d: %s", event.node, words)

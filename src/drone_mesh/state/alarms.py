@@ -60,10 +60,9 @@ class AlarmBook:
                 continue
             drone = event.peers[0]
             if event.kind in _ORDER_FAILURES:
-                _order, _, why = event.detail.partition(": ")
                 for key in self._of_orders(drone):
                     del self._alarms[key]
-                key = drone, f"{_ORDER_FAILURES[event.kind]}: {why}"
+                key = drone, f"{_ORDER_FAILURES[event.kind]}: {event.detail}"
                 self._alarms[key] = Alarm(*key, since_s=event.stamp_s)
             elif event.kind in _ORDER_ENDS:
                 for key in self._of_orders(drone):

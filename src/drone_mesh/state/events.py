@@ -45,6 +45,14 @@ class EventBatcher:
                 latest_of[event.node] = event, peers
                 batch.append((event, peers))
         return [
-            EventRecord(event.now_s, event.node, event.kind.value, tuple(peers), event.detail)
+            EventRecord(
+                event.now_s,
+                event.node,
+                event.kind.value,
+                tuple(peers),
+                event.detail,
+                event.order,
+                event.place,
+            )
             for event, peers in batch
         ]

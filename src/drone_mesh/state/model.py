@@ -11,8 +11,10 @@ from typing import Iterable, Iterator, Sequence
 
 from drone_mesh.air.reach import MAX_DISTANCE_M
 from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.observer import explanation
 from drone_mesh.communication.repair.election import NO_BID
 from drone_mesh.communication.router_states import RepairState
+from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
 
 UNKNOWN_POSITION = (math.nan, math.nan, math.nan)
@@ -92,6 +94,12 @@ class EventRecord:
     kind: str
     peers: tuple[int, ...] = ()
     detail: str = ""
+    order: int = 0
+    place: Location | None = None
+
+    def explanation(self) -> str:
+        """What views display behind the kind."""
+        return explanation(self.order, self.place, self.detail)
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass
 from typing import Iterable
 
-from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.communication.observer import MeshEventKind, explanation
 from drone_mesh.communication.order_record import OrderState
 from drone_mesh.communication.orders.book import EVENT_OF
 from drone_mesh.communication.orders.intake import ARRIVED_WITHIN_M
@@ -38,21 +38,21 @@ class FollowedOrder:
     """One order of one gateway."""
 
     gateway: int
-    name: str  # such as: order 7 to x 1.00 m, y 2.00 m, z 3 m
+    number: int
+    goal: Location  # where the drone was ordered to
     state: OrderState
     reason: str = ""
     deeds: tuple[str, ...] = ()  # of its drone, since the state changed
 
     @property
-    def goal(self) -> Location | None:
-        """Where the drone was ordered to."""
-        return Location.from_words(self.name)
+    def name(self) -> str:
+        """Such as: order 7 to x 1.00 m, y 2.00 m, z 3 m."""
+        return explanation(self.number, self.goal)
 
     def in_words(self, node: NodeStatus | None) -> str:
         """The state, with the way that is left; `node`: its drone now, None: unknown."""
-        goal = self.goal
-        if self.state is OrderState.ACCEPTED and node is not None and goal is not None:
-            left = way_left(node, goal)
+        if self.state is OrderState.ACCEPTED and node is not None:
+            left = way_left(node, self.goal)
             if left is not None:
                 return f"under way, {left[0]:.0f} m and {left[1]:.0f} s left"
         return self.state.in_words(self.reason)
@@ -60,7 +60,7 @@ class FollowedOrder:
     def since(self, node: NodeStatus) -> str:
         """What the drone did since the state changed, as far as the state does not say it."""
         goal, parts = self.goal, list(self.deeds)
-        if goal is None or not position_is_known(node):
+        if not position_is_known(node):
             return ", ".join(parts)
         if len(node.path):
             end = Location.from_vector(node.path[-3:])
@@ -98,10 +98,10 @@ class OrderProgress:
     def __init__(self, drone: int, goal: Location, since_s: float) -> None:
         """Ignores events before `since_s` (simulated seconds), which belong to earlier orders."""
         self._drone = drone
-        self._to = f" to {goal.in_words()}"
+        self._goal = goal.as_ordered()
         self._since_s = since_s
-        self._orders: dict[tuple[int, str], FollowedOrder] = {}  # by gateway and its order
-        self._latest = FollowedOrder(0, self._to, OrderState.SENT)
+        self._orders: dict[tuple[int, int], FollowedOrder] = {}  # by gateway and its number
+        self._latest = FollowedOrder(0, 0, goal, OrderState.SENT)
 
     @property
     def state(self) -> OrderState:
@@ -127,9 +127,9 @@ class OrderProgress:
         order = _order_in(event)
         if order is None or event.peers != (self._drone,) or self.is_over:
             return
-        key = order.gateway, order.name
-        is_sent = order.state is OrderState.SENT
-        if is_sent and order.name.endswith(self._to) and event.stamp_s >= self._since_s:
+        key = order.gateway, order.number
+        is_sent = order.state is OrderState.SENT and order.goal.as_ordered() == self._goal
+        if is_sent and event.stamp_s >= self._since_s:
             self._orders.setdefault(key, order)
         elif key in self._orders:
             self._orders[key] = order
@@ -175,7 +175,7 @@ class OrderWatch:
         latest = self._latest.get(drone, order)
         is_new = order.state in (OrderState.SENT, OrderState.NO_ROUTE)
         if latest.gateway == order.gateway:
-            counts = order.name == latest.name or is_new
+            counts = order.number == latest.number or is_new
         else:  # another gateway may have no route
             counts = order.state is not OrderState.NO_ROUTE
         if is_new:
@@ -204,7 +204,6 @@ class OrderWatch:
 def _order_in(event: EventRecord) -> FollowedOrder | None:
     """The order that a gateway's event is about; None: it is about something else."""
     state = _STATE_OF.get(event.kind)
-    name, _, reason = event.detail.partition(": ")
-    if state is None or len(event.peers) != 1 or not name:
+    if state is None or len(event.peers) != 1 or event.place is None:
         return None
-    return FollowedOrder(event.node, name, state, reason)
+    return FollowedOrder(event.node, event.order, event.place, state, event.detail)

@@ -62,6 +62,11 @@ class _Part:
         """Whether it may still have to be ordered."""
         return not self.settled if self.state is PartState.ARRIVED else self.state.is_open
 
+    def is_ordered(self, place: Location | None) -> bool:
+        """Whether this order sends its drone to this place."""
+        own = (self.goal.as_ordered(), (self.sent_to or self.goal).as_ordered())
+        return place is not None and place.as_ordered() in own
+
     def replace(self) -> None:
         """The drone has been ordered elsewhere."""
         if self.state is PartState.ARRIVED:
@@ -184,19 +189,16 @@ class StandingOrders:
         if len(event.peers) != 1:
             return
         drone = event.peers[0]
-        what, _, words = event.detail.partition(": ")
         for order in self._orders.values():
             part = order.parts.get(drone)
             is_older = event.stamp_s < order.given_s - CLOCKS_DIFFER_S
             if part is None or not part.is_followed or is_older:
                 continue
             if event.kind == MeshEventKind.ORDER_REFUSED.value:
-                part.stay(PartState.REFUSED, words)
+                part.stay(PartState.REFUSED, event.detail)
             elif event.kind == MeshEventKind.NO_ROUTE.value:
                 part.sent_to = None
-            elif event.kind == MeshEventKind.ORDER_SENT.value and not what.endswith(
-                (_to(part.goal), _to(part.sent_to or part.goal))
-            ):
+            elif event.kind == MeshEventKind.ORDER_SENT.value and not part.is_ordered(event.place):
                 part.replace()
 
     def update(
@@ -241,7 +243,7 @@ class StandingOrders:
 
     def _departures(self, mesh: MeshStatus, rules: FlightRules) -> Departures:
         sent = {
-            drone: _as_ordered(part.sent_to)
+            drone: part.sent_to.as_ordered()
             for order in self._orders.values()
             for drone, part in order.parts.items()
             if part.state.is_open and part.sent_to is not None
@@ -258,7 +260,7 @@ class StandingOrders:
         goals: dict[int, Location] = {}
         for order in self._orders.values():
             for drone, part in order.parts.items():
-                goal = _as_ordered(part.goal)
+                goal = part.goal.as_ordered()
                 stands = drone in at and at[drone].distance_m(goal) <= AT_PLACE_M
                 if part.state.is_open or (part.state is PartState.ARRIVED and stands):
                     goals[drone] = goal
@@ -273,7 +275,7 @@ class StandingOrders:
         has_route = node.connected or node.role == Role.GATEWAY
         if flies or position_is_known(node):
             end = Location.from_vector(node.path[-3:] if flies else node.position)
-            is_there = end.distance_m(_as_ordered(part.goal)) <= AT_PLACE_M
+            is_there = end.distance_m(part.goal.as_ordered()) <= AT_PLACE_M
             if is_there and not flies and self._may_leave(node.id, part.goal, now_s):
                 part.stay(PartState.LATER if has_route else PartState.WAITING)
                 part.sent_to = part.goal if has_route else None  # replaces the order that it has
@@ -337,13 +339,3 @@ class StandingOrders:
                 number, str(entry["name"]), parts, -math.inf, bool(entry["at_once"])
             )
             self._last_number = max(self._last_number, number)
-
-
-def _to(goal: Location) -> str:
-    """How a gateway names an order to this place."""
-    return f" to {_as_ordered(goal).in_words()}"
-
-
-def _as_ordered(goal: Location) -> Location:
-    """Orders carry whole metres of height."""
-    return goal._replace(height=float(round(goal.height)))

@@ -7,9 +7,12 @@ import math
 from dataclasses import replace
 
 from drone_mesh.console.frames import EVENTS_PER_FRAME, FrameStore
+from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
 from drone_mesh.state.links import JUST_LOST_S
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus, ObstacleStatus
+
+A, B = Location(3.0, 2.0, 0.0), Location(0.0, 0.0, 0.0)
 
 
 def mesh(stamp_s: float = 1.0, **router: object) -> MeshStatus:
@@ -123,6 +126,13 @@ def test_each_event_is_sent_once():
     assert [event["kind"] for event in frame(store, known)["events"]] == ["disconnected"]
 
 
+def test_an_event_about_an_order_is_told_with_its_number_and_place():
+    store = FrameStore()
+    store.add_events([EventRecord(1.0, 0, "order refused", (1,), "battery at 9 %", 7, A)])
+    [event] = frame(store, 0)["events"]
+    assert event["detail"] == "order 7 to x 2.00 m, y 3.00 m, z 0 m: battery at 9 %"
+
+
 def test_of_a_burst_of_events_the_newest_are_sent():
     store = FrameStore()
     store.add_events([EventRecord(float(n), 1, "landed") for n in range(EVENTS_PER_FRAME + 50)])
@@ -215,37 +225,37 @@ def test_nodes_at_one_position_come_with_their_slots():
 
 def test_the_latest_order_of_a_drone_is_shown_with_it():
     store = FrameStore()
-    store.add_events([EventRecord(1.0, 0, "order accepted", (1,), "order 7 to A")])
+    store.add_events([EventRecord(1.0, 0, "order accepted", (1,), "", 7, A)])
     store.update_mesh(mesh(), wall_s=0.0)
-    assert frame(store, 0)["nodes"]["1"]["order"] == "order 7 to A: accepted"
+    assert frame(store, 0)["nodes"]["1"]["order"] == f"order 7 to {A.in_words()}: accepted"
     assert frame(store, 0)["nodes"]["0"]["order"] == ""
 
 
 def test_the_end_of_an_earlier_order_is_not_shown_once_a_new_one_is_given():
     store = FrameStore()
-    store.add_events([EventRecord(1.0, 0, "order accepted", (1,), "order 7 to A")])
+    store.add_events([EventRecord(1.0, 0, "order accepted", (1,), "", 7, A)])
     store.update_mesh(mesh(), wall_s=0.0)
     before = store.version
     ticket = store.expect_orders([1])
     assert frame(store, before)["nodes"] == {"1": {"order": "being sent"}}
-    store.add_events([EventRecord(2.0, 0, "order arrived", (1,), "order 7 to A")])
+    store.add_events([EventRecord(2.0, 0, "order arrived", (1,), "", 7, A)])
     store.update_mesh(mesh(), wall_s=1.0)
     assert frame(store, 0)["nodes"]["1"]["order"] == "being sent"
-    store.add_events([EventRecord(3.0, 0, "order sent", (1,), "order 8 to B")])
+    store.add_events([EventRecord(3.0, 0, "order sent", (1,), "", 8, B)])
     store.update_mesh(mesh(), wall_s=2.0)
     store.forget_expected(ticket)
-    assert frame(store, 0)["nodes"]["1"]["order"] == "order 8 to B: sent"
+    assert frame(store, 0)["nodes"]["1"]["order"] == f"order 8 to {B.in_words()}: sent"
 
 
 def test_an_order_that_was_refused_leaves_the_earlier_one_as_it_was():
     store = FrameStore()
-    store.add_events([EventRecord(1.0, 0, "order arrived", (1,), "order 7 to A")])
+    store.add_events([EventRecord(1.0, 0, "order arrived", (1,), "", 7, A)])
     store.update_mesh(mesh(), wall_s=0.0)
     refused, newer = store.expect_orders([1]), store.expect_orders([1])
     store.forget_expected(refused)
     assert frame(store, 0)["nodes"]["1"]["order"] == "being sent"
     store.forget_expected(newer)
-    assert frame(store, 0)["nodes"]["1"]["order"] == "order 7 to A: arrived"
+    assert frame(store, 0)["nodes"]["1"]["order"] == f"order 7 to {A.in_words()}: arrived"
 
 
 def test_a_node_says_which_messages_of_users_it_sent_and_received():

@@ -14,12 +14,14 @@ from drone_mesh.console.dots import Dot
 from drone_mesh.console.frames import FrameStore
 from drone_mesh.console.orders import LayoutOffer
 from drone_mesh.console.server import MOST_PAGES, ConsoleServer
+from drone_mesh.drone.location import Location
 from drone_mesh.state.formation_preview import FormationPreview
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
 from drone_mesh.web import access
 from drone_mesh.web.access import Access
 
 LIMIT_S = 5.0
+A, B = Location(2.0, 1.0, 3.0), Location(0.0, 0.0, 0.0)
 OFFER = LayoutOffer(0, "0: field case", [(1, 2.0, 3.0, 0.0)])
 
 
@@ -242,21 +244,21 @@ def test_a_new_order_of_a_page_hides_the_progress_of_the_one_before():
         def order() -> str:
             return json.loads(store.frame_since(0))["nodes"]["1"]["order"]
 
-        store.add_events([EventRecord(1.0, 0, "order arrived", (1,), "order 7 to A")])
+        store.add_events([EventRecord(1.0, 0, "order arrived", (1,), "", 7, A)])
         store.update_mesh(MeshStatus(1.0, [NodeStatus(1)]), 0.0)
         page = FakePage(server).open()
         page.say(do="power", number=1, node=1, on=False)
         await until("an answer", lambda: page.of_type("answer"))
-        assert order() == "order 7 to A: arrived"
+        assert order() == f"order 7 to {A.in_words()}: arrived"
         for number, request in enumerate(
             ({"do": "fly", "node": 1, "x": 2.0, "y": 3.0, "z": 0.0}, {"do": "layout", "case": 0}), 2
         ):
             page.say(number=number, **request)
             await until("an answer", lambda number=number: len(page.of_type("answer")) == number)
             assert order() == "being sent"
-            store.add_events([EventRecord(2.0, 0, "order sent", (1,), f"order {number + 6} to B")])
+            store.add_events([EventRecord(2.0, 0, "order sent", (1,), "", number + 6, B)])
             store.update_mesh(MeshStatus(2.0, [NodeStatus(1)]), 0.0)
-            assert order() == f"order {number + 6} to B: sent"
+            assert order() == f"order {number + 6} to {B.in_words()}: sent"
 
     run(scenario)
 

@@ -18,6 +18,7 @@ from paho.mqtt.enums import CallbackAPIVersion
 
 from drone_mesh.communication.gateway import MeshnetworkGateway
 from drone_mesh.communication.observer import MeshEvent, MeshEventKind
+from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.execution import MeshExecutor
 from drone_mesh.inprocess import Network
@@ -371,7 +372,26 @@ def test_what_happens_to_a_node_is_published(gateway, client):
     lost = MeshEvent(MeshEventKind.NEIGHBOUR_LOST, 0, 1.0, peer=1)
     gateway.submit(lambda _now_s: gateway.internet.observe(lost))
     event = json.loads(client.next(is_topic("0/event")).payload)
-    assert event == {"event": "neighbour lost", "peer": 1, "detail": ""}
+    assert event == {
+        "event": "neighbour lost",
+        "peer": 1,
+        "detail": "",
+        "order": None,
+        "place": None,
+    }
+
+
+def test_an_event_about_an_order_has_its_number_and_place(gateway, client):
+    refused = MeshEvent(
+        MeshEventKind.ORDER_REFUSED, 0, 1.0, 1, "battery at 9 %", 7, Location(2.0, 1.0, 3.0)
+    )
+    gateway.submit(lambda _now_s: gateway.internet.observe(refused))
+    event = json.loads(client.next(is_topic("0/event")).payload)
+    assert (event["detail"], event["order"], event["place"]) == (
+        "battery at 9 %",
+        7,
+        [2.0, 1.0, 3.0],
+    )
 
 
 @pytest.mark.parametrize(

@@ -6,9 +6,11 @@ import json
 
 import pytest
 
+from drone_mesh.communication.observer import MeshEvent, MeshEventKind
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.console.real_mesh import events_of, real_mesh
 from drone_mesh.drone.geodesy import Origin
+from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
 from drone_mesh.inprocess import Network
 from drone_mesh.raspberry.event_history import EventHistory
@@ -90,3 +92,22 @@ def test_events_are_kept_with_numbers_and_times_since_the_start(network):
     assert [event["number"] for event in history.since(1, 0.0)] == [2, 3]
     first = events_of({"events": history.since(0, 0.0)})[0]
     assert (first.kind, first.node) == ("started", network.events[0].node)
+
+
+def test_an_event_about_an_order_keeps_its_number_place_and_reason(caplog):
+    caplog.set_level("INFO")
+    place = Location(2.675, 1.125, 3.0)
+    history = EventHistory()
+    history.observe(MeshEvent(MeshEventKind.ORDER_REPLACED, 0, 1.0, 4, "by order 8", 7, place))
+    kept = json.loads(json.dumps(history.since(0, 0.0)))
+    [event] = events_of({"events": kept})
+    assert (event.order, event.place, event.detail) == (7, place, "by order 8")
+    said = "order 7 to x 1.12 m, y 2.67 m, z 3 m: by order 8"
+    assert f"order replaced: node 4 ({said})" in caplog.text
+
+
+def test_an_event_in_a_record_of_an_older_gateway_is_about_no_known_order():
+    text = "order 7 to x 1.00 m, y 2.00 m, z 3 m"
+    old = {"t": 1.0, "node": 0, "kind": "order sent", "peers": [4], "detail": text}
+    [event] = events_of({"events": [old]})
+    assert (event.order, event.place, event.explanation()) == (0, None, text)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from drone_mesh.drone.location import Location
 from drone_mesh.state.alarms import AlarmBook
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
+
+PLACE = Location(2.0, 1.0, 3.0)
 
 
 def state(now_s, *nodes):
@@ -61,19 +64,18 @@ def test_an_acknowledged_alarm_stays_until_it_is_over_and_comes_back_as_new():
 
 def test_a_failed_order_is_an_alarm_until_a_later_order_is_accepted():
     book = AlarmBook()
-    order = "order 7 to x 1.00 m, y 2.00 m, z 3 m"
-    book.take([EventRecord(1.0, 0, "order refused", (4,), f"{order}: battery at 9 %")])
+    book.take([EventRecord(1.0, 0, "order refused", (4,), "battery at 9 %", 7, PLACE)])
     book.update(state(2.0, well(4)))
     assert said(book) == [("refused an order: battery at 9 %", [4], False, False)]
-    book.take([EventRecord(3.0, 0, "order accepted", (4,), "order 8 to x 0.00 m")])
+    book.take([EventRecord(3.0, 0, "order accepted", (4,), "", 8, PLACE)])
     assert said(book) == [("refused an order: battery at 9 %", [4], True, False)]
 
 
 def test_of_the_failed_orders_of_a_drone_the_last_one_is_an_alarm():
     book = AlarmBook()
     for second in range(100):
-        reason = f"order {second} to x 0.00 m: battery at {100 - second} %"
-        book.take([EventRecord(float(second), 0, "order refused", (4,), reason)])
+        reason = f"battery at {100 - second} %"
+        book.take([EventRecord(float(second), 0, "order refused", (4,), reason, second, PLACE)])
     assert said(book) == [("refused an order: battery at 1 %", [4], False, False)]
 
 

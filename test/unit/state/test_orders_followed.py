@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import struct
+
 from drone_mesh.communication.order_record import OrderState
 from drone_mesh.drone.flight_path import FlightPath
 from drone_mesh.drone.location import Location
@@ -12,15 +14,22 @@ from drone_mesh.state.orders import OrderProgress, OrderWatch, way_left
 HERE = Location(latitude=2.0, longitude=1.0, height=3.0)
 SEVEN = "order 7 to x 1.00 m, y 2.00 m, z 3 m"
 EIGHT = "order 8 to x 0.00 m, y 0.00 m, z 0 m"
-SENT = (0, "order sent", SEVEN)
-ACCEPTED = (0, "order accepted", SEVEN)
-ARRIVED = (0, "order arrived", SEVEN)
+THERE = Location(0.0, 0.0, 0.0)
+SENT = (0, "order sent", 7, HERE)
+ACCEPTED = (0, "order accepted", 7, HERE)
+ARRIVED = (0, "order arrived", 7, HERE)
+SENT_EIGHT = (0, "order sent", 8, THERE)
+
+
+def event(stamp_s, gateway, kind, number, goal, reason=""):
+    """An event of that gateway about an order to drone 5."""
+    return EventRecord(stamp_s, gateway, kind, (5,), reason, number, goal)
 
 
 def watch(*events):
-    """(gateway, kind, detail) of drone 5."""
+    """(gateway, kind, number, goal, reason) of drone 5."""
     watch = OrderWatch()
-    watch.take(EventRecord(1.0, node, kind, (5,), detail) for node, kind, detail in events)
+    watch.take(event(1.0, *given) for given in events)
     return watch
 
 
@@ -51,36 +60,36 @@ def test_the_seconds_left_are_those_of_a_flight():
 
 
 def test_every_end_keeps_its_reason():
-    refused = words(SENT, (0, "order refused", f"{SEVEN}: battery at 9 %: land"))
+    refused = words(SENT, (0, "order refused", 7, HERE, "battery at 9 %: land"))
     assert refused == f"{SEVEN}: refused: battery at 9 %: land"
-    given_up = words(SENT, (0, "order given up", f"{SEVEN}: landed early"))
+    given_up = words(SENT, (0, "order given up", 7, HERE, "landed early"))
     assert given_up == f"{SEVEN}: given up: landed early"
-    replaced = words(SENT, (0, "order replaced", f"{SEVEN}: by order 8"))
+    replaced = words(SENT, (0, "order replaced", 7, HERE, "by order 8"))
     assert replaced == f"{SEVEN}: replaced by order 8"
-    lost = words(SENT, (0, "order lost contact", f"{SEVEN}: at 4 s: it did not reply"))
+    lost = words(SENT, (0, "order lost contact", 7, HERE, "at 4 s: it did not reply"))
     assert lost == f"{SEVEN}: lost contact at 4 s: it did not reply"
 
 
 def test_the_end_of_an_older_order_does_not_hide_the_latest_one():
-    ended = (0, "order replaced", f"{SEVEN}: by order 8")
-    assert words(SENT, (0, "order sent", EIGHT), ended) == f"{EIGHT}: sent"
+    ended = (0, "order replaced", 7, HERE, "by order 8")
+    assert words(SENT, SENT_EIGHT, ended) == f"{EIGHT}: sent"
 
 
 def test_a_second_gateway_without_a_route_does_not_hide_the_first_ones_success():
-    elsewhere = (1, "no route", "order 3 to x 1.00 m, y 2.00 m, z 3 m")
+    elsewhere = (1, "no route", 3, HERE)
     assert words(SENT, elsewhere) == f"{SEVEN}: sent"
     assert words(elsewhere, SENT) == f"{SEVEN}: sent"
-    assert words((0, "no route", SEVEN)) == f"{SEVEN}: no route"
+    assert words((0, "no route", 7, HERE)) == f"{SEVEN}: no route"
 
 
 def test_other_drones_and_relays_that_have_no_route_say_nothing_of_an_order():
     assert watch(SENT).words(6, None) == ""
-    assert words((3, "no route", "")) == ""
+    assert words((3, "no route", 0, None)) == ""
 
 
 def test_a_drone_that_flies_on_to_its_old_place_is_not_said_to_stay():
     flies_on = NodeStatus(5, position=(9.0, 0.0, 0.0), path=(1.0, 2.0, 3.0))
-    followed = watch(SENT, ACCEPTED, (0, "no route", EIGHT))
+    followed = watch(SENT, ACCEPTED, (0, "no route", 8, THERE))
     assert followed.words(5, flies_on) == f"{EIGHT}: no route"
     assert followed.since(flies_on) == "flies to x 1.00 m, y 2.00 m, z 3 m"
 
@@ -91,15 +100,15 @@ def test_what_a_drone_did_after_its_arrival_is_told():
     followed.take([EventRecord(9.0, 5, "flight decided", (2,))])
     away = NodeStatus(5, position=(1.0, 190.0, 3.0))
     assert followed.since(away) == "flew to repair the mesh, is 188 m from there"
-    followed.take([EventRecord(10.0, 0, "order sent", (5,), EIGHT)])
+    followed.take([event(10.0, *SENT_EIGHT)])
     assert followed.since(away) == ""
 
 
 def progress(*events):
-    """(seconds, gateway, kind, detail) of drone 5, whose order was given after 10 s."""
+    """(seconds, gateway, kind, number, goal, reason) of drone 5, ordered after 10 s."""
     progress = OrderProgress(5, HERE, since_s=10.0)
-    for stamp_s, node, kind, detail in events:
-        progress.take(EventRecord(stamp_s, node, kind, (5,), detail))
+    for given in events:
+        progress.take(event(*given))
     return progress
 
 
@@ -110,24 +119,30 @@ def test_one_order_is_followed_to_its_end():
     assert progress(sent, (12.0, *ACCEPTED)).state is OrderState.ACCEPTED
     arrived = progress(sent, (19.0, *ARRIVED))
     assert (arrived.is_over, arrived.in_words()) == (True, "arrived")
-    refused = progress(sent, (12.0, 0, "order refused", f"{SEVEN}: battery at 9 %"))
+    refused = progress(sent, (12.0, 0, "order refused", 7, HERE, "battery at 9 %"))
     assert (refused.is_over, refused.in_words()) == (True, "refused: battery at 9 %")
 
 
 def test_older_orders_and_those_to_other_places_are_not_this_one():
     assert not progress((9.0, *SENT)).was_sent
-    assert not progress((11.0, 0, "order sent", EIGHT)).was_sent
-    six = SEVEN.replace("order 7", "order 6")
-    other = progress((11.0, *SENT), (12.0, 0, "order refused", f"{six}: crashed"))
+    assert not progress((11.0, *SENT_EIGHT)).was_sent
+    other = progress((11.0, *SENT), (12.0, 0, "order refused", 6, HERE, "crashed"))
     assert not other.is_over
 
 
+def test_an_order_is_known_by_its_place_as_the_wire_carries_it():
+    goal = Location(2.005, 1.125, 3.4)
+    carried = Location(*struct.unpack("<ffh", struct.pack("<ffh", *goal[:2], 3)))
+    progress = OrderProgress(5, goal, since_s=10.0)
+    progress.take(event(11.0, 0, "order sent", 7, carried))
+    assert progress.was_sent
+
+
 def test_the_order_of_one_gateway_may_fail_while_that_of_another_is_open():
-    three = SEVEN.replace("order 7", "order 3")
-    first, second = (11.0, *SENT), (11.0, 1, "order sent", three)
-    lost = (12.0, 0, "no route", SEVEN)
+    first, second = (11.0, *SENT), (11.0, 1, "order sent", 3, HERE)
+    lost = (12.0, 0, "no route", 7, HERE)
     assert not progress(first, second, lost).is_over
-    given_up = (13.0, 1, "order given up", f"{three}: landed early")
+    given_up = (13.0, 1, "order given up", 3, HERE, "landed early")
     assert progress(first, second, lost, given_up).is_over
-    arrived = progress(first, second, (19.0, 1, "order arrived", three))
+    arrived = progress(first, second, (19.0, 1, "order arrived", 3, HERE))
     assert (arrived.is_over, arrived.state) == (True, OrderState.ARRIVED)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import struct
+
 import pytest
 
 from drone_mesh.drone.fleet import ids_in_words
@@ -162,23 +164,31 @@ def test_a_later_layout_replaces_the_goals_of_its_drones_and_no_others():
 def test_a_flight_ordered_at_a_gateway_replaces_the_drones_goal():
     orders = StandingOrders()
     orders.give("layout 7", {4: NORTH}, now_s=10.0)
-    sent = "order 3 to x 0.00 m, y 6.00 m, z 1 m"
-    elsewhere = "order 4 to x 9.00 m, y 0.00 m, z 0 m"
-    orders.take(EventRecord(5.0, 0, "order sent", (4,), elsewhere))  # an older one
-    orders.take(EventRecord(10.0, 0, "order sent", (4,), sent))
+    elsewhere = Location.from_vector((9.0, 0.0, 0.0))
+    orders.take(EventRecord(5.0, 0, "order sent", (4,), "", 2, elsewhere))  # an older one
+    orders.take(EventRecord(10.0, 0, "order sent", (4,), "", 3, NORTH))
     assert words(orders) == ["0 of 1 at their place, 1 without a route: 4"]
-    orders.take(EventRecord(11.0, 0, "order sent", (4,), elsewhere))
+    orders.take(EventRecord(11.0, 0, "order sent", (4,), "", 4, elsewhere))
     assert words(orders) == ["0 of 1 at their place, 1 replaced by a later order: 4"]
+
+
+@pytest.mark.parametrize("x", [1.125, 2.675, 0.005, -3.315, 2.005])
+def test_a_drone_is_never_replaced_by_its_own_order_whatever_its_decimals(x):
+    orders = StandingOrders()
+    goal = Location.from_vector((x, 2.045, 2.4))
+    orders.give("my.csv", {4: goal}, now_s=0.0)
+    assert len(orders.update(state(1.0, drone(4)))) == 1
+    carried = Location(*struct.unpack("<ffh", struct.pack("<ffh", 2.045, x, 2)))
+    for kind in ("order sent", "order accepted", "order arrived"):
+        orders.take(EventRecord(1.5, 0, kind, (4,), "", 3, carried))
+    orders.update(state(9.0, drone(4, at=carried)))
+    assert words(orders) == ["1 of 1 at their place"]
 
 
 def test_a_refusal_is_shown_with_its_reason_and_tried_again():
     orders = StandingOrders()
     orders.give("layout 7", {4: EAST}, now_s=0.0)
-    orders.take(
-        EventRecord(
-            1.0, 0, "order refused", (4,), "order 3 to x 6.00 m, y 0.00 m, z 0 m: battery at 9 %"
-        )
-    )
+    orders.take(EventRecord(1.0, 0, "order refused", (4,), "battery at 9 %", 3, EAST))
     assert words(orders) == ["0 of 1 at their place, 4 refused: battery at 9 %"]
     assert orders.update(state(6.0, drone(4))) == [(4, EAST)]
 

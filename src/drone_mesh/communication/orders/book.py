@@ -12,7 +12,7 @@ from typing import Callable, Iterable
 from drone_mesh.communication.deadlines import Due
 from drone_mesh.communication.heartbeats.node_search import NUMBERS_PER_S, SEARCH_EVERY_S
 from drone_mesh.communication.messages import GoToLocationMessage, with_order_number
-from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.communication.observer import MeshEventKind, explanation
 from drone_mesh.communication.order_record import OrderRecord, OrderState
 from drone_mesh.communication.orders.messages import OrderOutcome, OrderQuery, OrderReply
 from drone_mesh.communication.parts import NodeParts
@@ -252,13 +252,12 @@ class OrderBook:
         self._report(order)
 
     def _report(self, order: _Order) -> None:
-        what = f"order {order.number} to {order.goal.in_words()}"
+        number, goal = order.number, order.goal
         if order.state in _FAILURES:
-            words = order.state.in_words(order.reason)
+            words = explanation(number, goal, order.state.in_words(order.reason))
             reason = f"an order for drone {order.drone} failed"
-            self._parts.complaints.add(reason, f"{what}: {words}", self._parts.now_s)
-        detail = f"{what}: {order.reason}" if order.reason else what
-        self._parts.report(EVENT_OF[order.state], order.drone, detail)
+            self._parts.complaints.add(reason, words, self._parts.now_s)
+        self._parts.report(EVENT_OF[order.state], order.drone, order.reason, number, goal)
 
     def _wait(self, order: _Order, seconds: float) -> None:
         """Repeat or query after so many seconds, on a slow medium more."""

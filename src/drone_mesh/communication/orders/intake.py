@@ -79,7 +79,7 @@ class OrderIntake:
                 self._reply(other, OrderOutcome.REPLACED, _by(order, other.gateway))
         self._reply(order, OrderOutcome.ACCEPTED)
         if starts:
-            self._parts.report(MeshEventKind.FLIGHT_ORDERED, gateway, f"to {goal.in_words()}")
+            self._parts.report(MeshEventKind.FLIGHT_ORDERED, gateway, order=number, place=goal)
             self._took_off()
 
     def on_foreign_order(self, order: GoToLocationMessage, number: int, passed_by: int) -> None:

@@ -110,13 +110,21 @@ def event_msg(event: EventRecord) -> MeshEventMsg:
         kind=event.kind,
         peers=bytes(event.peers),
         detail=event.detail,
+        order=event.order,
+        place=[] if event.place is None else [location_msg(*event.place)],
     )
 
 
 def event_record(message: MeshEventMsg) -> EventRecord:
-    """The event in a message."""
+    """The event in a message, or in one of an older definition, from a bag."""
     return EventRecord(
-        message.stamp.to_sec(), message.node, message.kind, tuple(message.peers), message.detail
+        message.stamp.to_sec(),
+        message.node,
+        message.kind,
+        tuple(message.peers),
+        message.detail,
+        getattr(message, "order", 0),
+        next(map(location_of, getattr(message, "place", ())), None),
     )
 
 

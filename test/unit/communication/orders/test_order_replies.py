@@ -274,9 +274,9 @@ def state(rig):
 
 
 def told(rig):
-    """The events about orders, with their words."""
+    """The events about orders."""
     return [
-        (event.kind.value, event.peer, event.detail)
+        (event.kind.value, event.peer, event.order, event.place, event.detail)
         for event in rig.events
         if event.kind.name.startswith("ORDER")
     ]
@@ -290,9 +290,9 @@ def test_a_gateway_follows_an_order_from_the_request_to_the_arrival():
     rig.hear("05 05 40 00 00 01 00 03")
     assert state(rig) == (OrderState.ARRIVED, "")
     assert told(rig) == [
-        ("order sent", 5, "order 1 to x 0.00 m, y 1.00 m, z 0 m"),
-        ("order accepted", 5, "order 1 to x 0.00 m, y 1.00 m, z 0 m"),
-        ("order arrived", 5, "order 1 to x 0.00 m, y 1.00 m, z 0 m"),
+        ("order sent", 5, 1, (1.0, 0.0, 0), ""),
+        ("order accepted", 5, 1, (1.0, 0.0, 0), ""),
+        ("order arrived", 5, 1, (1.0, 0.0, 0), ""),
     ]
     rig.forget()
     rig.wait(100.0)
