@@ -1,4 +1,4 @@
-"""The files and folders that README, CONTRIBUTING and docs name are there."""
+"""The files and folders that README, CONTRIBUTING, docs and modules name are there."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ FENCED = re.compile(r"^```.*?^```", flags=re.DOTALL | re.MULTILINE)
 PATH = re.compile(r"`([\w.-]+(?:/[\w.-]+)*/?)`")
 FILE = re.compile(r"\.(?:py|js|launch|html|bash)$")
 OF_A_ROOM = re.compile(r"\| `([\w/]+)` \|")  # a row of the table of rooms begins with the room
+IN_A_MODULE = re.compile(r"(?<![\w./~-])(?:\w+/)+\w+\.(?:py|md|yaml|launch)\b")
 # Made by a user or a run, or not files: packages of ROS, topics of MQTT, templates.
 NOT_IN_THE_REPOSITORY = re.compile(
     r"\.+/|\.venv/|logs/|results/|drone_mesh/|half_way\.py$|drone_mesh\.\w+$|.*\bNAME\b"
@@ -57,3 +58,17 @@ def test_a_module_that_moved_and_a_folder_that_went_are_found():
         "box.py",
         "old/",
     ]
+
+
+def test_each_path_that_a_module_names_exists():
+    """From the root, the package, or a folder above the module."""
+    missing = []
+    for module in sorted(PACKAGE.rglob("*.py")):
+        starts = [
+            ROOT,
+            *(folder for folder in module.parents if PACKAGE in (folder, *folder.parents)),
+        ]
+        for path in IN_A_MODULE.findall(module.read_text(encoding="utf-8")):
+            if not any((start / path).exists() for start in starts):
+                missing.append(f"{module.relative_to(ROOT)}: {path}")
+    assert missing == []
