@@ -42,8 +42,11 @@ class IControlHost(IMeshDebugInfo):
     def on_node_heard(self, node: int, hops: int) -> None:
         """At a gateway: a packet of `node` proves a path of so many hops."""
 
-    def on_node_missing(self, node: int) -> None:
-        """Another node has no route to `node`."""
+    def on_node_missing(self, node: int, told: bool) -> None:
+        """Another node has no route to `node`.
+
+        `told`: it told this node alone, as after it dropped an order of it, not all neighbours.
+        """
 
 
 class IControlPlane(abc.ABC):

@@ -139,10 +139,10 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
                 nodes.append(KnownNode(node, next_hop, hops, heard_s))
         return nodes
 
-    def on_node_missing(self, node: int) -> None:
+    def on_node_missing(self, node: int, told: bool) -> None:
         """A relay that cannot forward an order reports this to the gateway."""
-        super().on_node_missing(node)
-        self._book.on_missing(node)
+        super().on_node_missing(node, told)
+        self._book.on_missing(node, told)
 
     def on_node_heard(self, node: int, hops: int) -> None:
         """Its path works: send it what waits."""

@@ -193,7 +193,7 @@ class MeshNode(IControlHost):
 
     # For the control plane --------------------------------------------------------------------
 
-    def on_node_missing(self, node: int) -> None:
+    def on_node_missing(self, node: int, told: bool) -> None:
         """Messages for it may not arrive."""
         self.data.on_node_missing(node)
 

@@ -115,10 +115,10 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
             if missing == self.gateway:
                 self._neighbours.set_hops(creator, NO_ROUTE)
             self._delivery.forget_route(creator, missing, from_)
-            self._after_missing(missing)
+            self._after_missing(missing, messages.addressee(payload) != BROADCAST)
 
-    def _after_missing(self, missing: int) -> None:
-        """The routes are updated."""
+    def _after_missing(self, missing: int, told: bool) -> None:
+        """The routes are updated. `told`: this node alone, not all neighbours."""
 
     def receive_of_technique(self, payload: bytes, creator: int, from_: int) -> None:
         """A packet of the technique's own types."""

@@ -163,9 +163,9 @@ class RouterHeartbeats(HeartbeatPlane):
                 self._host.on_connected()
         self._forwarding.forward(payload, creator, from_, kind, forward, now_s)
 
-    def _after_missing(self, missing: int) -> None:
+    def _after_missing(self, missing: int, told: bool) -> None:
         self._connection.on_route_lost()
-        self._host.on_node_missing(missing)
+        self._host.on_node_missing(missing, told)
 
     def _check_soon(self) -> None:
         """Let the next check come sooner, because the surroundings of this node have changed."""

@@ -63,6 +63,7 @@ class _Order:
     due_s: float = math.inf  # next repeat or query
     searches: int = 0  # number of searches for the drone without a route
     seeking: bool = False  # a search for it is running or about to start
+    copies: int = 0  # that left and that no relay said to have dropped: the drone may have one
     unanswered: int = 0  # packets since the drone's last reply about it
     heard_s: float = 0.0  # when the drone last reported about it, or when it was ordered
     settled: bool = False  # the drone itself has reported the outcome
@@ -116,7 +117,7 @@ class OrderBook:
         False: there is no route and no search; it is not tried again.
         """
         order = self._orders[number]
-        if self._parts.delivery.send_own(self._packet(order)):
+        if self._send(order):
             self._wait(order, REPEAT_AFTER_S[0])
         elif not self._seek(order):
             self._move(order, OrderState.NO_ROUTE)
@@ -126,9 +127,13 @@ class OrderBook:
         self._report(order)
         return True
 
-    def on_missing(self, drone: int) -> None:
-        """A relay reports that it has no route to this drone."""
+    def on_missing(self, drone: int, told: bool) -> None:
+        """A relay has no route to this drone; `told`: it tells this gateway, and drops an order.
+
+        One that tells all its neighbours has lost the drone, which may have left for this order.
+        """
         for order in self._open_for(drone):
+            order.copies -= told and order.copies > 0
             waits = order.state is not OrderState.SENT or order.seeking
             if not waits and not self._seek(order):
                 self._move(order, OrderState.NO_ROUTE)
@@ -138,14 +143,19 @@ class OrderBook:
         for order in self._open_for(drone):
             if order.seeking:
                 order.seeking = False
-                self._parts.delivery.send_own(self._packet(order))
+                self._send(order)
                 self._wait(order, REPEAT_AFTER_S[0])
 
     def _seek(self, order: _Order) -> bool:
-        """Search for the drone; the order is lost unless a search finds it in time."""
-        if order.searches >= MOST_SEARCHES or not self._may_find(order.drone):
-            return False
-        order.seeking = True
+        """Search for the drone. False: the order is lost.
+
+        Not if the drone may have it: after the last search it is repeated, as without searches.
+        """
+        order.seeking = order.searches < MOST_SEARCHES and self._may_find(order.drone)
+        if not order.seeking:
+            if order.copies and order.due_s == math.inf:
+                self._wait(order, REPEAT_AFTER_S[order.unanswered])
+            return order.copies > 0
         if self._search(order.drone):
             order.searches += 1
             self._wait(order, FOUND_WITHIN_S)
@@ -201,20 +211,26 @@ class OrderBook:
             if order.unanswered >= len(REPEAT_AFTER_S):
                 self._lost(order, order.dropped or "it did not reply")
                 return
-            self._send_if_routed(order, self._packet(order))
+            if self._has_route(order):
+                self._send(order)
             self._wait(order, REPEAT_AFTER_S[order.unanswered])
         elif order.state is OrderState.ACCEPTED:
             if order.unanswered > MOST_QUERIES:
                 self._lost(order, "it fell silent on its way")
                 return
             query = OrderQuery.packet(order.number, self._parts.node_id, order.drone)
-            self._send_if_routed(order, query)
+            if self._has_route(order):
+                self._parts.delivery.send_own(query)
             self._wait(order, QUERY_PERIOD_S)
 
-    def _send_if_routed(self, order: _Order, packet: bytes) -> None:
-        """Send nothing without a route: the drone may be in flight, out of reach."""
-        if self._parts.routing.may_reach(order.drone):
-            self._parts.delivery.send_own(packet)
+    def _has_route(self, order: _Order) -> bool:
+        """Without one nothing is repeated: the drone may be in flight, out of reach."""
+        return self._parts.routing.may_reach(order.drone)
+
+    def _send(self, order: _Order) -> bool:
+        taken = self._parts.delivery.send_own(self._packet(order))
+        order.copies += taken
+        return taken
 
     def _packet(self, order: _Order) -> bytes:
         me, to = self._parts.node_id, order.drone

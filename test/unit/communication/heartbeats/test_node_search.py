@@ -67,6 +67,36 @@ def test_the_order_is_lost_if_three_searches_of_a_second_each_find_nothing():
     assert rig.kinds()[-1] == "NO_ROUTE"
 
 
+TAKEN_OFF = "02 02 05 01 fe 05"  # 2 tells all its neighbours that it has lost 5
+
+
+def test_an_order_that_nobody_dropped_is_not_lost_because_its_drone_flies_and_is_not_found():
+    rig = gateway_rig()
+    rig.hear(TAKEN_OFF)
+    rig.wait(20.0)
+    assert len(searches(rig)) == 3
+    assert "NO_ROUTE" not in rig.kinds()
+    rig.wait(13.1)  # three searches of 1 s, and as long as without them
+    assert rig.kinds()[-1] == "ORDER_LOST_CONTACT"
+
+
+def test_a_copy_that_a_relay_dropped_says_nothing_of_the_first_one():
+    rig = gateway_rig()
+    rig.hear(TAKEN_OFF, FROM_5_THROUGH_2, LOST_BEHIND_2)
+    rig.wait(10.0)
+    assert "NO_ROUTE" not in rig.kinds()
+    rig.hear("05 02 40 01 01 21 00 01")
+    assert rig.kinds()[-1] == "ORDER_ACCEPTED"
+
+
+def test_reports_of_a_loss_do_not_put_off_the_repeats_of_an_order():
+    rig = gateway_rig()
+    for _second in range(34):
+        rig.hear(TAKEN_OFF)
+        rig.wait(1.0)
+    assert "ORDER_LOST_CONTACT" in rig.kinds()
+
+
 def test_searches_do_not_count_as_orders_without_a_reply():
     rig = gateway_rig()
     rig.hear(LOST_BEHIND_2)
