@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Callable
 
+from drone_mesh.by_name import create_by_name
 from drone_mesh.communication.beacon.plane import BeaconTechnique
-from drone_mesh.communication.by_name import create_by_name
 from drone_mesh.communication.routing.child_table_tree import ChildTableTree
 from drone_mesh.communication.routing.techniques.babel import Babel
 from drone_mesh.communication.routing.techniques.batman import Batman
@@ -28,9 +28,9 @@ ROUTING_TECHNIQUES: dict[str, Callable[[], ITechnique]] = {
 }
 
 
-def create_routing_technique(name: str) -> ITechnique:
-    """A new technique: a name in ROUTING_TECHNIQUES, or "package.module:Class" for your own.
+def create_routing_technique(chosen: str | Callable[[], ITechnique]) -> ITechnique:
+    """A new technique: a name in ROUTING_TECHNIQUES, "package.module:Class" or a class.
 
     Raises ConfigurationError, with the known names, for anything else.
     """
-    return create_by_name("routing technique", name, ROUTING_TECHNIQUES, ITechnique)
+    return create_by_name("routing technique", chosen, ROUTING_TECHNIQUES, ITechnique)

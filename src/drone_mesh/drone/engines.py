@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import importlib
 from dataclasses import dataclass, field
 
+from drone_mesh.by_name import in_one_line, load_by_name
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.ground import GroundEngine
 from drone_mesh.drone.interfaces import IDroneEngine
@@ -58,16 +58,13 @@ def _mavlink_engine(node_id: int, options: FlightOptions) -> IDroneEngine:
 
 
 def _own_engine(node_id: int, name: str) -> IDroneEngine:
-    module_name, colon, class_name = name.partition(":")
-    if not colon:
+    if ":" not in name:
         raise ConfigurationError(
             f"invalid --drone {name!r}: use ground, mavlink:ADDRESS or package.module:Class"
         )
-    try:
-        make = getattr(importlib.import_module(module_name), class_name)
+    make = load_by_name("--drone", name)
+    with in_one_line(f"--drone {name!r} cannot be created"):
         engine = make(node_id)
-    except (ImportError, AttributeError, TypeError, ValueError) as error:
-        raise ConfigurationError(f"--drone {name} cannot be created: {error}") from error
     if not isinstance(engine, IDroneEngine):
-        raise ConfigurationError(f"--drone {name} does not implement IDroneEngine")
+        raise ConfigurationError(f"--drone {name!r} does not implement IDroneEngine")
     return engine

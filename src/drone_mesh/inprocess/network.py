@@ -18,7 +18,10 @@ from drone_mesh.communication.interfaces import (
     NO_ROUTE,
     IWirelessCommunication,
 )
-from drone_mesh.communication.named_techniques import DEFAULT_ROUTING
+from drone_mesh.communication.named_techniques import (
+    DEFAULT_ROUTING,
+    create_routing_technique,
+)
 from drone_mesh.communication.observer import MeshEvent
 from drone_mesh.communication.repair.interfaces import IRepairStrategy
 from drone_mesh.communication.repair.named_strategies import create_repair_strategy
@@ -66,7 +69,7 @@ class Network:
         self,
         seed: int = 0,
         timing: MeshTiming | None = None,
-        routing: str = DEFAULT_ROUTING,
+        routing: str | Callable[[], ITechnique] = DEFAULT_ROUTING,
         max_distance_m: float = MAX_DISTANCE_M,
         loss: float = 0.0,
         delay_s: float = HOP_DELAY_S,
@@ -82,10 +85,10 @@ class Network:
         positions: PositionErrors | None = None,
     ) -> None:
         """`loss`, `delay_s` and `jitter_s` as for InProcessAir; `routing` as in a launch file, or
-        "shortest_path", which knows all links: the bound for every other technique.
+        "shortest_path", which knows all links: the bound for every other technique; or a class.
 
-        `repair` is the name of a repair strategy, as in a launch file, or "oracle"; or a function
-        that creates one.
+        `repair` is the name of a repair strategy, as in a launch file, or "oracle"; or a class, or
+        a function that creates one.
 
         `radio`: "disc", on which packets never meet; "shared", a fast model of nRF24L01+ radios on
         one channel; "chips", the driver on emulated chips; or an air of your own. For "shared" and
@@ -102,8 +105,10 @@ class Network:
         self._timing = timing
         self._routing = routing
         self._repair = repair
-        if isinstance(repair, str) and repair != ORACLE:
-            create_repair_strategy(repair)  # raises here for an unknown name, not per node
+        if repair != ORACLE:
+            create_repair_strategy(repair)  # raises here, not per node
+        if routing != SHORTEST_PATH:
+            create_routing_technique(routing)
         self._repair_options = repair_options
         self._key = key
         self._positions = positions or PositionErrors()
@@ -212,10 +217,10 @@ class Network:
         rng = random.Random(f"{self._seed} position {node_id}")
         return PositionReceiver(node.drone, self.clock, self._positions, rng)
 
-    def _technique(self, node_id: int) -> str | ITechnique:
+    def _technique(self, node_id: int) -> ITechnique:
         if self._routing == SHORTEST_PATH:
             return ShortestPath(self._link_map, node_id)
-        return self._routing
+        return create_routing_technique(self._routing)
 
     @property
     def sealed(self) -> bool:
@@ -330,9 +335,11 @@ class Network:
     def status(self) -> MeshStatus:
         """The state of all nodes, like /mesh/state: for tables, samples, reports and pictures."""
         state = mesh_status(self.nodes, self.clock.now_s, self.air.max_distance_m)
-        repair = self._repair
-        repair = repair if isinstance(repair, str) else getattr(repair, "__name__", "")
-        return replace(state, routing=self._routing, repair_strategy=repair)
+        routing, repair = (
+            chosen if isinstance(chosen, str) else getattr(chosen, "__name__", "")
+            for chosen in (self._routing, self._repair)
+        )
+        return replace(state, routing=routing, repair_strategy=repair)
 
     def event_records(self) -> list[EventRecord]:
         """All events so far, like those on /mesh/events: for the story of the run."""
@@ -379,10 +386,10 @@ class Network:
             path.append(step)
         return path
 
-    def _make_repair(self) -> str | IRepairStrategy:
+    def _make_repair(self) -> IRepairStrategy:
         if self._repair == ORACLE:
             return Oracle(self._places_of_connected)
-        return self._repair if isinstance(self._repair, str) else self._repair()
+        return create_repair_strategy(self._repair)
 
     def _places_of_connected(self) -> dict[int, Location]:
         return {

@@ -5,14 +5,13 @@ To load an experiment checks their names; only a run, or `check_own` before it, 
 
 from __future__ import annotations
 
-import contextlib
 import difflib
-import importlib
 import inspect
 import re
 import sys
-from typing import Callable, Iterable, Iterator, cast
+from typing import Callable, Iterable, cast
 
+from drone_mesh.by_name import in_one_line, load_by_name
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.inprocess import Network
 from drone_mesh.lab.metrics import METRICS
@@ -65,7 +64,7 @@ def check_technique(kind: str, name: str, model: str) -> None:
 
 
 def _create(kind: str, name: str) -> None:
-    with _one_line(f"{kind} {name!r} cannot be created"):
+    with in_one_line(f"{kind} {name!r} cannot be created"):
         network = Network(**{kind: name})  # type: ignore[arg-type]
         network.add_gateway(0, 0.0, 0.0)
         network.add_router(1, 1.0, 0.0)
@@ -81,9 +80,7 @@ def check_metric(name: str) -> None:
 
 def own_metric(name: str) -> OwnMetric:
     """The function named `package.module:function`. Raises ConfigurationError if there is none."""
-    module_name, _, function_name = name.partition(":")
-    with _one_line(f"metric {name} cannot be loaded"):
-        function = getattr(importlib.import_module(module_name), function_name)
+    function = load_by_name("metric", name)
     if not callable(function):
         raise ConfigurationError(f"metric {name} is not a function")
     try:
@@ -91,23 +88,6 @@ def own_metric(name: str) -> OwnMetric:
     except TypeError as error:
         raise ConfigurationError(f"metric {name} must take one argument: the record") from error
     return cast(OwnMetric, function)
-
-
-@contextlib.contextmanager
-def _one_line(what: str) -> Iterator[None]:
-    """A user's module may raise anything, even SyntaxError and SystemExit: report it as its error.
-
-    Raises ConfigurationError, in one line.
-    """
-    try:
-        yield
-    except (ConfigurationError, KeyboardInterrupt):
-        raise
-    except BaseException as error:
-        words = " ".join(str(error).split())
-        if not isinstance(error, (ImportError, AttributeError)):
-            words = f"{type(error).__name__}: {words}"
-        raise ConfigurationError(f"{what}: {words}") from error
 
 
 def own_column(name: str) -> str:

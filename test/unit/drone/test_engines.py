@@ -53,7 +53,7 @@ def test_an_own_engine_is_made_with_the_id_of_the_node_and_can_fly() -> None:
     [
         ("rocket", "use ground, mavlink:ADDRESS or package.module:Class"),
         ("no.such.module:Engine", "No module named 'no"),
-        (f"{__name__}:NoSuchClass", "cannot be created"),
+        (f"{__name__}:NoSuchClass", "cannot be loaded: .*NoSuchClass"),
         (f"{__name__}:NotAnEngine", "does not implement IDroneEngine"),
         ("mavlink:serial0", "use /dev/NAME,BAUD or udpin"),
         ("mavlink:udpin:here", "use /dev/NAME,BAUD or udpin"),

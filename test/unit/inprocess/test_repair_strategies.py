@@ -13,6 +13,8 @@ from drone_mesh.communication.repair.named_strategies import (
     REPAIR_STRATEGIES,
     create_repair_strategy,
 )
+from drone_mesh.communication.repair.strategies.stay import Stay
+from drone_mesh.communication.routing.child_table_tree import ChildTableTree
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.network import ORACLE
@@ -194,6 +196,31 @@ def test_a_users_own_strategy_is_created_by_its_module_and_class():
     network = Network(repair="drone_mesh.communication.repair.strategies.stay:Stay")
     network.add_router(1, 0.0, 0.0)
     assert isinstance(create_repair_strategy("stay"), IRepairStrategy)
+
+
+def test_a_network_takes_the_classes_of_a_technique_and_of_a_strategy():
+    network = Network(routing=ChildTableTree, repair=Stay)
+    network.add_gateway(0, 0.0, 0.0)
+    network.add_router(1, 5.0, 0.0)
+    assert run_until(network, network.all_connected, within_s=15.0)
+    status = network.status()
+    assert (status.routing, status.repair_strategy) == ("ChildTableTree", "Stay")
+
+
+@pytest.mark.parametrize(
+    ("parts", "why"),
+    [
+        ({"routing": Stay}, "routing technique 'Stay' is not an ITechnique"),
+        ({"repair": ChildTableTree}, "repair strategy 'ChildTableTree' is not an IRepairStrategy"),
+        ({"routing": ChildTableTree()}, "'ChildTableTree' object is not callable"),
+        ({"repair": IRepairStrategy}, "'IRepairStrategy' cannot be created without arguments"),
+        ({"repair": None}, "unknown repair strategy 'None': use one of field"),
+    ],
+)
+def test_what_is_no_class_of_a_part_is_refused_in_one_sentence(parts, why):
+    with pytest.raises(ConfigurationError, match=why) as caught:
+        Network(**parts)
+    assert "\n" not in str(caught.value)
 
 
 def test_an_unknown_strategy_is_refused_with_the_known_names():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Callable
 
-from drone_mesh.communication.by_name import create_by_name
+from drone_mesh.by_name import create_by_name
 from drone_mesh.communication.repair.interfaces import IRepairStrategy
 from drone_mesh.communication.repair.options import DEFAULT_REPAIR
 from drone_mesh.communication.repair.strategies.field import Field
@@ -26,9 +26,9 @@ REPAIR_STRATEGIES: dict[str, Callable[[], IRepairStrategy]] = {
 }
 
 
-def create_repair_strategy(name: str) -> IRepairStrategy:
-    """A new strategy: a name in REPAIR_STRATEGIES, or "package.module:Class" for your own.
+def create_repair_strategy(chosen: str | Callable[[], IRepairStrategy]) -> IRepairStrategy:
+    """A new strategy: a name in REPAIR_STRATEGIES, "package.module:Class" or a class.
 
     Raises ConfigurationError, with the known names, for anything else.
     """
-    return create_by_name("repair strategy", name, REPAIR_STRATEGIES, IRepairStrategy)
+    return create_by_name("repair strategy", chosen, REPAIR_STRATEGIES, IRepairStrategy)
