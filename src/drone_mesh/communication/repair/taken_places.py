@@ -13,6 +13,7 @@ from drone_mesh.communication.repair.options import LostPlace, RepairOptions
 from drone_mesh.communication.repair.spots import Landing, free_spot
 from drone_mesh.drone.location import Location
 
+ROUNDING_M = 0.09  # a place in a beacon has tenths of a metre, on three axes
 FRESH_S = 5.0  # with EXACT, a drone that was silent for longer takes no place
 
 
@@ -37,7 +38,7 @@ class TakenPlaces:
 
     def is_free(self, spot: Location, tried: Sequence[Location] = ()) -> bool:
         """Whether the spot is clear of other drones, and of spots that were tried in vain."""
-        clearance_m = self._options.clearance_m
+        clearance_m = self._options.clearance_m + ROUNDING_M
         return all(spot.distance_m(other) >= clearance_m for other in [*self.all(), *tried])
 
     def at_or_beside(
