@@ -322,6 +322,7 @@ class NodeState(Message, NodeStatus):
     shares_id: bool
     why_not_fly: str
     repair: str
+    repair_reason: str
     def __init__(
         self,
         id: int = ...,
@@ -363,6 +364,7 @@ class NodeState(Message, NodeStatus):
         shares_id: bool = ...,
         why_not_fly: str = ...,
         repair: str = ...,
+        repair_reason: str = ...,
     ) -> None: ...
 
 class Obstacle(Message, ObstacleStatus):

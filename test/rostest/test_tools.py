@@ -22,8 +22,8 @@ import rospy
 import rostest
 from rostest_support import WALL_LIMIT_S, call, receives, wait_for
 
-from drone_mesh.msg import HostReport, MeshState, NodeState
-from drone_mesh.ros.views.bag import playable, read_states, topics_in_bag
+from drone_mesh.msg import HostReport, MeshEvent, MeshState, NodeState
+from drone_mesh.ros.views.bag import playable, read_events, read_states, topics_in_bag
 from drone_mesh.srv import PowerSwitch, SetSpeed
 
 TOOLS = ("status", "snapshot", "report")
@@ -37,6 +37,7 @@ NODES = (
     "console",
 )
 TOOL_LIMIT_S = 60.0
+OLD_DETAIL = "order 7 to x 1.00 m, y 2.00 m, z 3 m: battery at 9 %"
 
 
 def run(tool: str, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -74,7 +75,7 @@ def gateway_record() -> Iterator[str]:
 
 
 def record_in_an_older_definition(path: Path) -> None:
-    """A bag with one state, of a MeshState without its newer fields."""
+    """A bag with one state and one event, of messages without their newer fields."""
     newer = (
         r"(float32 (airtime|tries|battery)|uint16 queue|uint32 given_up|bool crashed|string \w+"
         r"|Obstacle\[\] \w+) .*\n"
@@ -82,8 +83,12 @@ def record_in_an_older_definition(path: Path) -> None:
     definition = re.sub(newer, "", MeshState._full_text)
     older = genpy.dynamic.generate_dynamic("drone_mesh/MeshState", definition)
     node = older["drone_mesh/NodeState"](id=4, connected=True, on=True, position=[1.0, 2.0, 0.0])
+    definition = re.sub(r"(uint16 order|Location\[\] place) .*\n", "", MeshEvent._full_text)
+    older.update(genpy.dynamic.generate_dynamic("drone_mesh/MeshEvent", definition))
+    event = older["drone_mesh/MeshEvent"](kind="order sent", node=0, peers=[4], detail=OLD_DETAIL)
     with rosbag.Bag(str(path), "w") as bag:
         bag.write("/mesh/state", older["drone_mesh/MeshState"](nodes=[node]))
+        bag.write("/mesh/events", event)
 
 
 def recorder_listens() -> bool:
@@ -199,6 +204,8 @@ class ToolsTest(unittest.TestCase):
         heading, _columns, row = finished.stdout.splitlines()
         self.assertNotIn("routing", heading)
         self.assertRegex(row, r"^4 .* 1\.0, 2\.0, 0\.0 ")
+        (event,) = read_events(bag)
+        self.assertEqual((event.order, event.place, event.explanation()), (0, None, OLD_DETAIL))
         report = run("report", str(bag), "-o", f"{self.folder}/older.html")
         self.assertEqual(report.returncode, 0, report.stderr)
 

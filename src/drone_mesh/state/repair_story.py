@@ -138,9 +138,9 @@ class RepairStory:
         abstain: dict[str, list[int]] = {}
         for node in bidding:
             if node.bid < 0:
-                abstain.setdefault(node.repair.partition("does not bid")[2], []).append(node.id)
+                abstain.setdefault(node.repair_reason, []).append(node.id)
         for why, ids in abstain.items():
-            parts.append(f"{and_(ids)} {_each(ids, 'does', 'do')} not bid{why}")
+            parts.append(f"{and_(ids)} {_each(ids, 'does', 'do')} not bid{why and f': {why}'}")
         self._last(("bids", len(self._fliers)), "; ".join(parts), now_s)
 
     def _describe_flights(self, fliers: Sequence[NodeStatus], mesh: MeshStatus) -> None:
