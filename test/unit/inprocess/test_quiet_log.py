@@ -42,6 +42,11 @@ def test_the_default_run_has_a_quiet_log(radio, routing, key, caplog):
     assert_quiet(caplog)
 
 
+def test_no_relay_is_suspected_because_the_gateway_answers_along_an_old_way(caplog):
+    fly_to(0, seed=9, radio="shared", key=KEY)
+    assert_quiet(caplog)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("layout", [case for case in ALL if case != GRID_CASE])
 @pytest.mark.parametrize(("radio", "key"), [("disc", None), ("disc", KEY), ("shared", None)])

@@ -266,8 +266,11 @@ class GatewayConnection:
 
     def check(self, patience: float) -> None:
         """The part of the periodic check for a connected router."""
+        shows_way_back = self._relay_check.swallowing.wants_heartbeat(self.hops)
+        if shows_way_back:
+            self.send_heartbeat()
         asked = self._relay_check.run(self.gateway, self.next_hop(), self.hops, self._answered_s)
-        if self.proven(patience):
+        if shows_way_back or self.proven(patience):
             return
         fresh_periods = self._parts.antenna.medium.place_periods
         self._ask_for_places(fresh_periods * self._parts.timing.check_period_s, asked)

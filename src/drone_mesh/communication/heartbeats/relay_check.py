@@ -41,6 +41,13 @@ class Swallowing:
         wait_s = self._wait_s if self._unanswered else self._ask_period_s
         return now_s - self._asked_s >= wait_s
 
+    def wants_heartbeat(self, hops: int) -> bool:
+        """Whether to show the gateway the way back before the next question.
+
+        It may have answered the latest one along a way that no longer leads here.
+        """
+        return self._unanswered > 0 and not self.noticed(hops)
+
     def is_over(self, now_s: float, heartbeat_s: float) -> bool:
         """Whether the time for an answer is over and the gateway has answered a heartbeat since."""
         return now_s - self._asked_s >= self._wait_s and heartbeat_s >= self._asked_s
