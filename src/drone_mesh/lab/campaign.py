@@ -5,14 +5,18 @@ from __future__ import annotations
 import math
 import shlex
 from pathlib import Path
-from typing import Sequence
+from typing import Iterator, Mapping, Sequence
 
 from drone_mesh.lab.engine import run_all
 from drone_mesh.lab.experiment import LoadedExperiment
 from drone_mesh.lab.plan import Plan, PlannedRun
 from drone_mesh.lab.progress import Progress
-from drone_mesh.lab.provenance import describe_session
-from drone_mesh.lab.store import Store, read_runs
+from drone_mesh.lab.provenance import code_of, describe_session
+from drone_mesh.lab.store import Store, StoreError, read_runs
+
+
+class OlderCodeError(StoreError):
+    """New runs would be in one cell with runs of older code."""
 
 
 class Campaign:
@@ -32,8 +36,12 @@ class Campaign:
         cluster: str | None,
         shard: tuple[int, int] | None = None,
         retry_failed: bool = False,
+        again: bool = False,
     ) -> None:
         """Execute missing runs; add seeds if the experiment requests it.
+
+        `again`: those of older code count as missing. Otherwise raises OlderCodeError rather than
+        mix them with others in a cell.
 
         Loads the modules that the experiment names. Raises ConfigurationError for one that fails,
         StoreError or EngineError; completed runs are kept, in order.
@@ -45,6 +53,8 @@ class Campaign:
             if retry_failed:
                 store.forget_failures()
             name = cluster or ("in this process" if workers == 0 else f"{workers} local")
+            if again:
+                store.forget(_older(plan, store))
             store.describe([describe_session(self._command, self.loaded, name)])
             while True:
                 self._run_plan(plan, store, workers, cluster, shard)
@@ -73,6 +83,7 @@ class Campaign:
             if planned.spec.run not in store.codes and planned.spec.run not in store.failed
             if shard is None or place % shard[1] == shard[0]
         }
+        self._check_code(plan, store, missing)
         if not missing:
             return
         progress = Progress(len(missing))
@@ -89,6 +100,19 @@ class Campaign:
         finally:
             outcomes.close()  # type: ignore[attr-defined]
             progress.close()
+
+    def _check_code(self, plan: Plan, store: Store, missing: Mapping[str, PlannedRun]) -> None:
+        older = _older(plan, store)
+        if not older:
+            return
+        words = {word for run, code in older.items() for word in _changed(store.codes[run], code)}
+        text = f"{len(older)} runs are of an older {', '.join(sorted(words))}"
+        cells = {one.cell for one in missing.values()}
+        if any(one.cell in cells and one.spec.run in older for one in plan):
+            raise OlderCodeError(
+                f"{self.folder}: {text}: `--again` repeats them, another --out keeps them"
+            )
+        print(f"{text}: `--again` repeats them", flush=True)
 
     def show_command(self, run: str) -> str:
         """The command that repeats one run."""
@@ -109,6 +133,19 @@ class Campaign:
             if not _is_narrow(found, stop.half_width, stop.relative_half_width):
                 return min(stop.max_seeds, plan.seeds + self.loaded.experiment.seeds)
         return None
+
+
+def _older(plan: Plan, store: Store) -> dict[str, str]:
+    """The finished runs of the plan that are not of this code, and the code that is."""
+    now = {one.spec.run: code_of(one.spec) for one in plan if one.spec.run in store.codes}
+    return {run: code for run, code in now.items() if store.codes[run] != code}
+
+
+def _changed(old: str, new: str) -> Iterator[str]:
+    """What differs between two versions of the code: modules of the user, or this package."""
+    for word in set(new.split()) - set(old.split()):
+        module, colon, _ = word.partition(":")
+        yield f"{module}.py" if colon else "drone_mesh"
 
 
 def _is_narrow(

@@ -11,7 +11,7 @@ from typing import Callable, Sequence
 
 from drone_mesh.arguments import MOST, is_up_to, whole
 from drone_mesh.errors import MeshError
-from drone_mesh.lab.campaign import Campaign
+from drone_mesh.lab.campaign import Campaign, OlderCodeError
 from drone_mesh.lab.estimate import Estimate, estimate
 from drone_mesh.lab.experiment import load_experiment
 from drone_mesh.lab.merge import merge
@@ -82,6 +82,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     run.add_argument("--out", type=Path, help="results folder (default: results/NAME)")
     run.add_argument("--retry-failed", action="store_true", help="repeat failed runs")
+    run.add_argument(
+        "--again", action="store_true", help="discard and repeat the runs of older code"
+    )
     run.set_defaults(run=_run)
 
     status = commands.add_parser("status", help="show the progress of a results folder")
@@ -138,10 +141,14 @@ def _add_analysis(commands: argparse._SubParsersAction[argparse.ArgumentParser])
     )
     show.set_defaults(run=_show)
 
-    compare = commands.add_parser("compare", help="compare two cells: differences paired by seed")
+    compare = commands.add_parser(
+        "compare", help="compare two cells, or two folders: differences paired by seed"
+    )
     compare.add_argument("results", type=Path, help=_RESULTS)
-    compare.add_argument("a", metavar="A", help="a cell: axis=value[,axis=value...]")
-    compare.add_argument("b", metavar="B", help="the other cell")
+    compare.add_argument(
+        "a", metavar="A", help="a cell: axis=value[,axis=value...]; or another results folder"
+    )
+    compare.add_argument("b", metavar="B", nargs="?", help="the other cell; not with a folder")
     compare.add_argument(
         "--metric",
         action="append",
@@ -226,11 +233,15 @@ def _run(options: argparse.Namespace) -> int:
     again = f"{PROGRAM} {shlex.join(options.command_line)}"
     campaign = Campaign(loaded, folder, [PROGRAM, *options.command_line])
     try:
-        campaign.run(options.workers, options.cluster, options.shard, options.retry_failed)
+        campaign.run(
+            options.workers, options.cluster, options.shard, options.retry_failed, options.again
+        )
     except KeyboardInterrupt:
         print(f"interrupted; {campaign.completed} runs were added to {folder}", file=sys.stderr)
         print(f"continue with: {again}", file=sys.stderr)
         return 130
+    except OlderCodeError as error:
+        raise MeshError(f"{error}\ncontinue with: {again} --again") from error
     except MeshError as error:
         raise MeshError(f"{error}\ncontinue with: {again}") from error
     print(describe_folder(folder))
@@ -288,9 +299,12 @@ def _show(options: argparse.Namespace) -> int:
 
 
 def _compare(options: argparse.Namespace) -> int:
-    from drone_mesh.lab.comparison import print_comparison
+    from drone_mesh.lab.comparison import print_cells, print_folders
 
-    print_comparison(options.results, options.a, options.b, options.metric)
+    if options.b is None:
+        print_folders(options.results, Path(options.a), options.metric)
+    else:
+        print_cells(options.results, options.a, options.b, options.metric)
     return 0
 
 

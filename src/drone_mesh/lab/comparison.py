@@ -1,32 +1,95 @@
-"""Paired differences between cells: the same seed, another technique."""
+"""Paired differences: the same seed, another technique or another version of the code."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Sequence
+from typing import NamedTuple, Sequence
 
-from drone_mesh.lab.results import load_results
+from drone_mesh.errors import ConfigurationError
+from drone_mesh.lab.results import Row, load_results, number
 from drone_mesh.lab.statistics import holm, mean_interval, paired_difference
 
 
-def print_comparison(folder: Path, a: str, b: str, metrics: Sequence[str]) -> None:
-    """Print a table: metrics over the seeds that both cells have, with Holm over the metrics.
+class _Pairs(NamedTuple):
+    """Two groups of runs with the same seeds, in the same order."""
 
-    Raises ConfigurationError for unknown cells or metrics.
+    label: str
+    a: Sequence[Row]
+    b: Sequence[Row]
+
+
+def print_cells(folder: Path, a: str, b: str, metrics: Sequence[str]) -> None:
+    """Print a table: metrics over the seeds that both cells have, with Holm over the table.
+
+    Raises ConfigurationError for unknown cells or metrics, and for a cell of mixed code.
     """
     results = load_results(folder)
-    cell_a, cell_b = results.find_cell(a), results.find_cell(b)
+    cells = results.find_cell(a), results.find_cell(b)
+    rows_a, rows_b = map(results.of_cell, cells)
+    seeds = sorted(rows_a.keys() & rows_b.keys())
+    pairs = _Pairs("", [rows_a[seed] for seed in seeds], [rows_b[seed] for seed in seeds])
     chosen = list(metrics) or results.metrics
     results.check_columns(chosen)
-    print(f"A: {results.loaded.cells[cell_a].label}")
-    print(f"B: {results.loaded.cells[cell_b].label}")
-    print(f"{'metric':20} {'seeds':>5}  {'A':26} {'B':26} {'B - A, paired':28} {'p (Holm)':>9}")
-    pairs = [results.paired(cell_a, cell_b, metric) for metric in chosen]
-    differences = [paired_difference(xs, ys) for xs, ys in pairs]
-    adjusted = holm([paired.p for paired in differences])
-    for metric, (xs, ys), paired, p in zip(chosen, pairs, differences, adjusted):
-        print(
-            f"{metric:20} {len(xs):5}  {mean_interval(xs)!s:26} {mean_interval(ys)!s:26} "
-            f"{paired.difference!s:28} {p:9.2g}"
+    codes = _one_code(pairs.a), _one_code(pairs.b)
+    differ = codes[0].partition(" ")[0] != codes[1].partition(" ")[0]  # more than the techniques
+    for name, cell, code in zip("AB", cells, codes):
+        print(f"{name}: {results.loaded.cells[cell].label}{f', code {code}' if differ else ''}")
+    _print_table([pairs], chosen)
+
+
+def print_folders(a: Path, b: Path, metrics: Sequence[str]) -> None:
+    """The same of all runs that two folders have in common, by cell: what other code changed.
+
+    Raises ConfigurationError if there are none, too.
+    """
+    results, other = load_results(a), load_results(b)
+    chosen = list(metrics) or results.metrics
+    results.check_columns(chosen)
+    other.check_columns(chosen)
+    found = []
+    for index, cell in enumerate(results.loaded.cells):
+        rows = [row for _, row in sorted(results.of_cell(index).items())]
+        rows = [row for row in rows if row["run"] in other.rows]
+        if rows:
+            found.append(_Pairs(cell.label, rows, [other.rows[row["run"]] for row in rows]))
+    if not found:
+        raise ConfigurationError(f"{a} and {b} have no run in common: same cell, seed and metrics")
+    for name, folder, groups in (
+        ("A", a, [pairs.a for pairs in found]),
+        ("B", b, [pairs.b for pairs in found]),
+    ):
+        print(f"{name}: {folder}, code {', '.join(sorted(set(map(_one_code, groups))))}")
+    _print_table(found, chosen)
+
+
+def _one_code(rows: Sequence[Row]) -> str:
+    codes = sorted({row["code"] for row in rows})
+    if len(codes) > 1:
+        raise ConfigurationError(
+            f"a cell mixes runs of different code ({', '.join(codes)}): `lab run` with --again "
+            "repeats the older"
         )
+    return codes[0] if codes else "unknown"
+
+
+def _print_table(found: Sequence[_Pairs], metrics: Sequence[str]) -> None:
+    print(f"{'metric':20} {'seeds':>5}  {'A':26} {'B':26} {'B - A, paired':28} {'p (Holm)':>9}")
+    columns = [_values(pairs, metric) for pairs in found for metric in metrics]
+    differences = [paired_difference(xs, ys) for xs, ys in columns]
+    lines = zip(columns, differences, holm([paired.p for paired in differences]))
+    for pairs in found:
+        if pairs.label:
+            print(pairs.label)
+        for metric, ((xs, ys), paired, p) in zip(metrics, lines):
+            print(
+                f"{metric:20} {len(xs):5}  {mean_interval(xs)!s:26} {mean_interval(ys)!s:26} "
+                f"{paired.difference!s:28} {p:9.2g}"
+            )
     print("means with 95 % BCa bootstrap intervals; p: Wilcoxon signed-rank, Holm over the rows")
+
+
+def _values(pairs: _Pairs, metric: str) -> tuple[list[float], list[float]]:
+    """A metric of both, for the seeds for which both have a value."""
+    values = ((number(a, metric), number(b, metric)) for a, b in zip(pairs.a, pairs.b))
+    whole = [(x, y) for x, y in values if x is not None and y is not None]
+    return [x for x, _ in whole], [y for _, y in whole]

@@ -7,6 +7,7 @@ import json
 from typing import Any, Iterator, NamedTuple, Sequence
 
 from drone_mesh.lab.experiment import Cell, LoadedExperiment, as_text
+from drone_mesh.lab.own_code import own_code
 from drone_mesh.lab.scenario import Scenario
 
 LONGEST_VALUE = 200  # characters in one field of runs.csv; longer values become a hash
@@ -22,6 +23,7 @@ class RunSpec(NamedTuple):
     repetition: int
     own_metrics: tuple[str, ...]
     search_path: str  # folder of the user's modules; empty: none
+    own_code: str  # of these modules, as `own_code` returns it
     timeout_s: float
 
 
@@ -40,21 +42,31 @@ class Plan:
         self.cells: Sequence[Cell] = loaded.cells
         self.seeds = loaded.experiment.seeds if seeds is None else seeds
         self.own_metrics = tuple(name for name in loaded.experiment.metrics if ":" in name)
+        self._hashes: dict[tuple[str, ...], str] = {}
         self._texts = [as_json(cell.scenario) for cell in self.cells]
+        self._folder = str(loaded.folder.resolve())
+        self._own_code = [self._code_of(cell.scenario) for cell in self.cells]
         self._identities = [identity(cell.scenario) for cell in self.cells]
+
+    def _code_of(self, scenario: Scenario) -> str:
+        names = (scenario.routing, scenario.repair, *self.own_metrics)
+        modules = sorted({name.partition(":")[0] for name in names if ":" in name})
+        if tuple(modules) not in self._hashes:
+            self._hashes[tuple(modules)] = own_code(modules, self._folder)
+        return self._hashes[tuple(modules)]
 
     def __len__(self) -> int:
         return len(self.cells) * self.seeds
 
     def __iter__(self) -> Iterator[PlannedRun]:
         experiment = self.loaded.experiment
-        folder = str(self.loaded.folder.resolve()) if self.loaded.own_modules else ""
+        folder = self._folder if self.loaded.own_modules else ""
         for repetition in range(self.seeds):
             for cell, (text, what) in enumerate(zip(self._texts, self._identities)):
                 run = run_id(what, experiment.seed, repetition, self.own_metrics)
                 spec = RunSpec(
                     run, text, experiment.seed, repetition, self.own_metrics, folder,
-                    experiment.timeout_s,
+                    self._own_code[cell], experiment.timeout_s,
                 )  # fmt: skip
                 yield PlannedRun(spec, cell)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import functools
+import hashlib
 import importlib.metadata
 import platform
 import subprocess
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from drone_mesh.lab.experiment import LoadedExperiment
+    from drone_mesh.lab.plan import RunSpec
 
 _HERE = Path(__file__).resolve().parent
 _PACKAGES = ("drone_mesh", "numpy", "pydantic", "scipy", "dask", "distributed", "matplotlib")
@@ -20,12 +22,23 @@ _PACKAGES = ("drone_mesh", "numpy", "pydantic", "scipy", "dask", "distributed", 
 
 @functools.lru_cache(maxsize=None)
 def code_version() -> str:
-    """The commit of this checkout, with "+dirty" if files differ; or the package version."""
-    commit = _git("rev-parse", "--short=12", "HEAD")
-    if commit is None:
+    """The last commit of this checkout that changed the package; or the package version.
+
+    With "+dirty." and a hash if files differ from it.
+    """
+    package = str(_HERE.parent)
+    commit = _git("log", "-1", "--format=%h", "--abbrev=12", "--", package)
+    if not commit:
         return _version("drone_mesh") or "unknown"
-    changed = _git("status", "--porcelain", "--untracked-files=no", "--", str(_HERE.parent))
-    return commit + ("+dirty" if changed else "")
+    changed = _git("diff", "HEAD", "--", package)
+    if not changed:
+        return commit
+    return f"{commit}+dirty.{hashlib.sha256(changed.encode()).hexdigest()[:8]}"
+
+
+def code_of(spec: RunSpec) -> str:
+    """The code of a run that starts now: of this package, and of the user's modules."""
+    return f"{code_version()} {spec.own_code}".rstrip()
 
 
 def describe_session(command: list[str], loaded: LoadedExperiment, workers: str) -> dict[str, Any]:

@@ -99,6 +99,14 @@ class Results(NamedTuple):
         """All rows of one cell, by repetition."""
         return self.by_cell.get(cell, {})
 
+    def codes(self, cell: int) -> list[str]:
+        """The versions of the code of its runs. More than one: they are not the same experiment."""
+        return sorted({row["code"] for row in self.drawn(cell).values()})
+
+    def marked(self, cell: int, runs: int) -> str:
+        """A number of runs of a cell in a table, marked if their code is not the same."""
+        return f"{runs} (mixed code)" if len(self.codes(cell)) > 1 else str(runs)
+
     def paired(self, a: int, b: int, metric: str) -> tuple[list[float], list[float]]:
         """A metric in two cells, for the seeds for which both have a value, in the same order."""
         in_a, in_b = self.of_cell(a), self.of_cell(b)

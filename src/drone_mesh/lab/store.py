@@ -11,7 +11,7 @@ import os
 import shutil
 import sqlite3
 from pathlib import Path
-from typing import Any, Iterator, Mapping, Sequence
+from typing import Any, Iterable, Iterator, Mapping, Sequence
 
 from drone_mesh.errors import MeshError
 from drone_mesh.lab.plan import Plan, flatten
@@ -35,6 +35,8 @@ COMMIT;
 """
 _RUNS, _FAILURES = "SELECT runs.row FROM runs", "SELECT failures.row FROM failures"
 _IN_ORDER = "LEFT JOIN plan USING (run) ORDER BY place IS NULL, place, run"  # then earlier plans
+
+_MIXED = "SELECT cell FROM plan JOIN runs USING (run) GROUP BY cell HAVING min(code) != max(code)"
 
 
 class StoreError(MeshError):
@@ -157,6 +159,13 @@ class Store:
         self.codes = codes
         return len(codes) - before
 
+    def forget(self, runs: Iterable[str]) -> None:
+        """Remove finished runs, so that they count as missing."""
+        for run in list(runs):
+            with _explained("write", self.folder / DATABASE):
+                self._database.execute("DELETE FROM runs WHERE run = ?", (run,))
+            del self.codes[run]
+
     def forget_failures(self) -> None:
         """Remove failed runs, so that they count as missing."""
         with _explained("write", self.folder / DATABASE):
@@ -232,7 +241,9 @@ def describe_folder(folder: Path) -> str:
 
         planned, done, failed = count("plan"), count("runs"), count("failures")
         in_plan = count("plan JOIN runs USING (run)")
-        codes = sorted(code for (code,) in database.execute("SELECT DISTINCT code FROM runs"))
+        found = database.execute("SELECT DISTINCT code FROM runs")
+        codes = sorted({code.partition(" ")[0] for (code,) in found})
+        mixed = database.execute(_MIXED).fetchall()
     lines = [f"{folder}: {in_plan} of {planned} runs done"]
     if failed:
         lines[0] += f", {failed} failed"
@@ -240,8 +251,10 @@ def describe_folder(folder: Path) -> str:
         lines.append(f"{done - in_plan} more runs are of an earlier plan and are kept")
     if len(codes) > 1:
         lines.append(f"warning: rows of {len(codes)} versions of the code: {', '.join(codes)}")
-    elif codes and codes[0].endswith("+dirty"):
+    elif codes and "+dirty" in codes[0]:
         lines.append(f"warning: run with uncommitted changes ({codes[0]})")
+    if mixed:
+        lines.append(f"warning: {len(mixed)} cells mix runs of different code; see run --again")
     sessions = read_provenance(folder)
     if sessions:
         last = sessions[-1]

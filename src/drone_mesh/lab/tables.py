@@ -108,7 +108,7 @@ def cells_table(results: Results) -> Table:
         rows.append(
             [
                 *map(as_text, cell.values.values()),
-                f"{len(counted)}",
+                results.marked(index, len(counted)),
                 f"{split} of {len(drawn)}",
                 *(_shown(summary_of(counted, metric), metric) for metric in metrics),
             ]
@@ -181,16 +181,18 @@ def paired_table(results: Results) -> Table | None:
             continue
         for metric in results.metrics:
             xs, ys = results.paired(base, index, metric)
-            found.append((cell.values, metric, len(xs), paired_difference(xs, ys)))
+            seeds = max(results.marked(one, len(xs)) for one in (base, index))
+            found.append((cell.values, metric, seeds, paired_difference(xs, ys)))
     adjusted = holm([paired.p for *_, paired in found])
     rows = [
         [
-            *map(as_text, values.values()), _with_unit(metric), str(n), str(paired.difference),
+            *map(as_text, values.values()), _with_unit(metric), n, str(paired.difference),
             _verdict(paired.difference, p, metric), "-" if math.isnan(p) else f"{p:.2g}",
         ]
         for (values, metric, n, paired), p in zip(found, adjusted)
     ]  # fmt: skip
-    header = [*results.axis_names.values(), "metric", "seeds", "difference", "", "p (Holm)"]
+    difference = f"difference to {as_text(compare.baseline)}"
+    header = [*results.axis_names.values(), "metric", "seeds", difference, "", "p (Holm)"]
     caption = (
         f"Difference to {compare.over} = {as_text(compare.baseline)}, per seed (common random "
         "numbers): mean with 95 % BCa bootstrap interval; Wilcoxon signed-rank test, Holm over "

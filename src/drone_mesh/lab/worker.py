@@ -11,10 +11,12 @@ import time
 import traceback
 from typing import Mapping, NamedTuple, Sequence
 
+from drone_mesh.errors import ConfigurationError
 from drone_mesh.lab import extensions
 from drone_mesh.lab.metrics import METRICS, measure_all
+from drone_mesh.lab.own_code import imported_code
 from drone_mesh.lab.plan import RunSpec
-from drone_mesh.lab.provenance import code_version
+from drone_mesh.lab.provenance import code_of
 from drone_mesh.lab.quiet import quiet_nodes
 from drone_mesh.lab.record import RunRecord, ServiceGap
 from drone_mesh.lab.scenario import Scenario
@@ -62,12 +64,17 @@ def execute(spec: RunSpec) -> Outcome:
         else:
             message = f"still running after {spec.timeout_s:g} s of wall time"
         wall_s, words = time.perf_counter() - started, traceback.format_exc()
-        return Outcome(spec, wall_s, code_version(), failure=kind, message=message, traceback=words)
+        return Outcome(spec, wall_s, code_of(spec), failure=kind, message=message, traceback=words)
     wall_s = time.perf_counter() - started
-    return Outcome(spec, wall_s, code_version(), values, event_hash, outages)
+    return Outcome(spec, wall_s, code_of(spec), values, event_hash, outages)
 
 
 def _measure(spec: RunSpec) -> tuple[dict[str, float], str, Sequence[ServiceGap]]:
+    modules = tuple(word.partition(":")[0] for word in spec.own_code.split())
+    if imported_code(modules, spec.search_path) != spec.own_code:
+        raise ConfigurationError(
+            f"this worker imported an older {spec.own_code}: start the workers again"
+        )
     if scenario_of(spec.scenario).model == "ideal":
         from drone_mesh.lab.ideal import run_ideal  # needs scipy, which a mesh does not
 
