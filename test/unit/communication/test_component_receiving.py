@@ -548,3 +548,22 @@ def test_a_gateway_that_has_lost_its_internet_sends_it_on_to_another_gateway():
     rig.connect_through(2)
     rig.hear(DATA_FOR_9)
     assert rig.sent(0x80) == [packet("05 01 80 02 09 00 ab cd")]
+
+
+# Another radio with the same id -----------------------------------------------------------------
+
+
+def test_a_new_node_shows_itself_to_another_one_with_its_id_and_gives_way_if_that_is_connected():
+    rig, connected_1 = Rig(), "01 01 03 01 fe 01 01"
+    rig.hear(connected_1)
+    assert (rig.broadcasts(), rig.antenna.switched) == ([packet("01 01 03 fe fe ff")], [])
+    rig.hear("01 01 03 01 fe ff 00")
+    assert rig.antenna.switched == []
+    rig.hear(connected_1)
+    assert rig.antenna.switched == [False]
+    rig.wait_until(44.9)
+    assert rig.antenna.switched == [False]
+    rig.connect_to_gateway()
+    rig.wait_until(55.0)
+    rig.hear(connected_1, connected_1)  # by now the mesh knows this one
+    assert rig.antenna.switched == [False, True]

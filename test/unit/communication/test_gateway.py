@@ -279,3 +279,16 @@ def test_a_node_that_is_lost_is_still_listed_without_a_route():
     rig.antenna.dead = {5}
     rig.wait_until(5.0)
     assert rig.mesh.get_known_nodes() == [KnownNode(5, NO_ROUTE, 1, 0.0)]
+
+
+def test_a_heartbeat_that_counts_more_hops_than_there_are_comes_from_an_unknown_distance():
+    rig = gateway_rig()
+    rig.hear("05 02 04 01 01 00 ff ff")
+    assert rig.mesh.get_known_nodes()[-1] == KnownNode(5, 2, NO_ROUTE, 0.0)
+
+
+@pytest.mark.parametrize("outcome_and_part", ["63 00", "01 7f"])
+def test_a_reply_to_an_order_that_is_none_is_counted(outcome_and_part):
+    rig = gateway_rig()
+    rig.hear(f"05 02 40 01 01 01 00 {outcome_and_part}")
+    assert rig.mesh.complaints.counts == {"dropped an invalid reply to an order": 1}

@@ -148,6 +148,12 @@ def test_a_failed_hop_is_replaced_at_once_and_back_when_it_is_heard_again(routes
     assert routes.parent == 1
 
 
+def test_a_neighbour_that_returned_a_packet_leads_to_its_addressee_no_longer(routes):
+    routes.heard(1, beacon(hops=3, parent=8, below=Below(20, (20, 21))))
+    routes.leads_not_to(20, 1)
+    assert (ways(routes, 20), ways(routes, 21)) == ([], [1])
+
+
 def test_a_link_that_will_break_costs_but_does_not_exclude(routes):
     routes.motion = Motion(Location(0.0, 0.0, 0.0), STILL)
     routes.heard(1, beacon(hops=1, x=9.0, east=2.0))

@@ -652,6 +652,15 @@ def test_a_packet_for_the_gateway_that_a_hop_does_not_take_goes_through_another_
     assert rig.sent(HEARTBEAT) == [packet("01 01 04 03 00 01 00")]
 
 
+@pytest.mark.parametrize(("given_up_s", "lost"), [(2.9, False), (3.0, True)])
+def test_a_neighbour_that_was_heard_lately_survives_one_packet_that_is_given_up(given_up_s, lost):
+    rig = shared_rig()
+    rig.antenna.medium = replace(rig.antenna.medium, silence_s=3.0)
+    rig.connect_through(2)
+    rig.mesh.on_undelivered(packet("01 01 04 02 00 01 00"), 9, given_up_s)
+    assert (2 not in rig.mesh.get_neighbours()) is lost
+
+
 def test_a_packet_goes_through_no_neighbour_that_is_farther_from_the_gateway():
     rig = shared_rig()
     rig.antenna.medium = replace(rig.antenna.medium, silence_s=3.0)

@@ -76,3 +76,14 @@ def test_a_technique_given_by_its_path_carries_a_mesh_its_orders_and_the_death_o
     left = [node for node in range(2, 12) if node in network.shortest_hops()]
     assert len(left) == 10
     assert network.run_until(lambda: all(map(network.connected, left)), within_s=60.0)
+
+
+def test_by_default_a_heartbeat_proves_a_path_and_other_packets_teach_it_only_to_the_unknown():
+    data, heartbeat = 0x80, 0x04
+    technique = LatestNeighbour()
+    for from_, kind, learned in [(2, data, 2), (3, data, 2), (3, heartbeat, 3), (2, data, 3)]:
+        assert technique.learn(5, from_, kind, bytes(32))
+        assert technique.get_direction_to_node(5) == learned
+        assert technique.get_direction_to_node(from_) == from_
+    assert technique.learn(4, 4, heartbeat, bytes(32))
+    assert technique.get_set_of_children() == {2, 3, 4}

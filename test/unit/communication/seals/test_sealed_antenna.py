@@ -4,6 +4,7 @@ import logging
 import random
 
 import pytest
+from rig import Rig
 from seal_rig import KEY, OTHER_KEY, packet
 
 from drone_mesh.communication.data import packets
@@ -344,3 +345,31 @@ def test_recorded_challenges_are_answered_once():
         network.run_for(0.1)
     answers = [one for one in heard()[before:] if one.payload[2] == 127]
     assert len(answers) < 10
+
+
+def layer_of_1():
+    """The layer of node 1, and its rig."""
+    rig = Rig(node_id=1)
+    layer = SealedAntenna(rig.antenna, 1, KEY, random.Random(1), lambda: rig.now_s)
+    layer.start_antenna(rig.mesh)
+    return layer, rig
+
+
+def test_a_neighbour_that_has_answered_gets_the_same_time_again_before_it_is_named():
+    layer, rig = layer_of_1()
+    without_seal = packet("07 07 03 01 fe 00 01")
+    layer.on_msg(without_seal, 0.0)
+    (challenge,) = rig.antenna.taken
+    layer.on_msg(HopSeal(7, KEY, random.Random(7), 30.0).answer(challenge, 0.0), 0.0)
+    for now_s in (40.0, 41.0, 42.0, 59.9):
+        layer.on_msg(without_seal, now_s)
+        assert not layer.complaints.counts
+    layer.on_msg(without_seal, 60.0)
+    assert "node 7, sends packets without a seal" in next(iter(layer.complaints.counts))
+
+
+def test_another_radio_with_this_nodes_id_and_no_key_is_named_and_challenged_by_a_broadcast():
+    layer, rig = layer_of_1()
+    layer.on_msg(packet("01 01 03 01 fe 00 01"), 0.0)
+    assert layer.complaints.counts == {"another radio uses id 1": 1}
+    assert (rig.antenna.taken, [sent[2] for sent in rig.broadcasts()]) == ([], [126])

@@ -1,0 +1,127 @@
+"""Proofs: node 9, whose mesh has a key, and its gateway 0 tell each other their nonces."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+
+import pytest
+from rig import AlwaysHalf, RecordingAntenna, packet
+
+from drone_mesh.communication.beacon.packets import NO_ANCESTORS, Beacon
+from drone_mesh.communication.beacon.proofs import Proofs
+from drone_mesh.communication.beacon.routes import BeaconRoutes
+from drone_mesh.communication.complaints import Complaints
+from drone_mesh.communication.courier import DROP, Courier
+from drone_mesh.communication.deadlines import Deadlines
+from drone_mesh.communication.places import KnownPlaces
+from drone_mesh.drone.location import Location
+
+TO_GATEWAY = packet("09 09 04 01 00 01 00")
+ASKS = packet("09 09 02 01 00 00 00 00 00 00 00 00 00 01")
+ANSWER = packet("00 01 04 09 09 01 00")
+FROM_ROUTER_5 = packet("05 01 04 09 09 01 09")
+
+
+class Node:
+    """Sends all packets to its neighbour 1; AlwaysHalf: what is due within 5 s is due in 2.5 s."""
+
+    def __init__(self, is_gateway=False, has_key=True):
+        self.antenna, self.proved = RecordingAntenna(), set()
+        self.routes = BeaconRoutes(9, is_gateway, 10.0, lambda _node: None, shared=False)
+        courier = Courier(
+            9, self.antenna, Deadlines(), 1, lambda transit: DROP if transit.sent_s else 1,
+            *3 * [lambda *_: None], lambda payload: payload,
+        )  # fmt: skip
+        self.basics = SimpleNamespace(
+            node_id=9,
+            has_key=has_key,
+            rng=AlwaysHalf(),
+            seals=SimpleNamespace(may_be_gateway=self.proved.__contains__),
+            places=KnownPlaces(),
+            complaints=Complaints(9),
+            pilot=SimpleNamespace(goal=None, place=lambda: Location(0.0, 0.0, 0.0)),
+        )
+        self.proofs = Proofs(self.basics, self.routes, courier, is_gateway)
+
+    def connect(self):
+        self.routes.heard(1, Beacon(0, 5, 1, 0, NO_ANCESTORS, 1.0))
+        self.routes.choose()
+        self.proofs.connected()
+
+    def sent(self, now_s):
+        self.routes.now_s = now_s
+        self.antenna.taken.clear()
+        self.proofs.on_time()
+        return self.antenna.taken
+
+
+@pytest.fixture
+def node():
+    node = Node()
+    node.connect()
+    return node
+
+
+def test_a_new_gateway_is_told_the_nonce_and_asked_for_its_place_at_a_random_moment(node):
+    assert node.sent(2.4) == []
+    node.connect()
+    assert node.proofs.next_s == 2.5
+    assert node.sent(2.5) == [TO_GATEWAY, ASKS]
+
+
+def test_heartbeats_are_frequent_until_the_second_answer_and_then_come_once_a_minute(node):
+    node.sent(2.5)
+    node.proofs.heard(ANSWER, 0)
+    for _ in range(2):
+        node.proofs.heard(packet("07 01 04 09 09 01 07"), 7)  # another gateway
+    assert node.proofs.next_s == 10.0
+    node.proved.add(0)
+    node.basics.places.update_gateway(Location(0.0, 0.0, 0.0), 0.0)
+    assert node.sent(10.0) == [TO_GATEWAY]
+    assert node.routes.tried[0] == 1  # only the first one was in vain
+    node.proofs.heard(ANSWER, 0)
+    assert node.proofs.next_s == 10.0 + 54.0
+
+
+def test_without_a_way_up_nothing_is_sent_until_there_is_one(node):
+    node.routes.neighbours.clear()
+    node.routes.choose()
+    assert node.sent(2.5) == []
+    assert node.proofs.next_s == math.inf
+    node.connect()
+    assert node.proofs.next_s == 5.0
+
+
+def test_a_gateway_that_moves_is_asked_once_in_ten_seconds_at_a_random_moment(node):
+    node.proofs.due_s = math.inf
+    node.proofs.ask_soon()
+    node.routes.now_s = 1.0
+    node.proofs.ask_soon()
+    assert node.sent(2.5) == [ASKS]
+    node.routes.now_s = 12.4
+    node.proofs.ask_soon()
+    assert node.proofs.next_s == math.inf
+    node.routes.now_s = 12.5
+    node.proofs.ask_soon()
+    assert node.proofs.next_s == 15.0
+
+
+def test_a_gateway_answers_routers_and_no_other_gateway_and_tells_nobody_by_itself():
+    node = Node(is_gateway=True)
+    node.connect()
+    node.proofs.heard(FROM_ROUTER_5, 5)
+    node.proofs.heard(ANSWER, 0)
+    assert node.antenna.taken == [packet("09 09 04 01 05 01 09")]
+    assert node.proofs.next_s == math.inf
+    router = Node()
+    router.proofs.heard(FROM_ROUTER_5, 5)
+    assert router.antenna.taken == []
+
+
+def test_without_a_key_a_heartbeat_is_of_another_technique_and_none_is_sent():
+    node = Node(has_key=False)
+    node.connect()
+    node.proofs.heard(ANSWER, 0)
+    assert node.basics.complaints.counts == {"dropped a heartbeat of another technique": 1}
+    assert node.proofs.next_s == math.inf
