@@ -173,10 +173,11 @@ def test_a_flight_ordered_at_a_gateway_replaces_the_drones_goal():
 
 
 @pytest.mark.parametrize("x", [1.125, 2.675, 0.005, -3.315, 2.005])
-def test_a_drone_is_never_replaced_by_its_own_order_whatever_its_decimals(x):
+@pytest.mark.parametrize("at_once", [False, True])
+def test_a_drone_is_never_replaced_by_its_own_order_whatever_its_decimals(x, at_once):
     orders = StandingOrders()
     goal = Location.from_vector((x, 2.045, 2.4))
-    orders.give("my.csv", {4: goal}, now_s=0.0)
+    orders.give("my.csv", {4: goal}, now_s=0.0, at_once=at_once)
     assert len(orders.update(state(1.0, drone(4)))) == 1
     carried = Location(*struct.unpack("<ffh", struct.pack("<ffh", 2.045, x, 2)))
     for kind in ("order sent", "order accepted", "order arrived"):
