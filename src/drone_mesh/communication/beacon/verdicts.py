@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import itertools
 import math
+from typing import Iterator
 
-from drone_mesh.communication.beacon.routes import BeaconRoutes
+from drone_mesh.communication.beacon.routes import BeaconRoutes, Way
 from drone_mesh.communication.beacon.search import HOPS_AROUND, MOST_HOPS, Searches
 from drone_mesh.communication.courier import DROP, HOLD, Transit
 from drone_mesh.communication.deadlines import Deadlines, Due
@@ -16,6 +17,7 @@ HELD_S = 2.5  # our choice: a packet without a next hop waits this long
 RETRY_S = 0.15  # our choice: so often it asks again, beside each beacon that arrives
 MOST_WAYS = 3  # our choice: to which one node sends a packet down; after that it searches
 SEARCHES_S = 0.6  # our choice: a relay without a way searches for so long, then returns a packet
+SUSPECTED_S = 30.0  # our choice: an order is repeated within 16 s
 NOT_HELD = (MessageType.MOVEMENT_NEGOTIATION, MessageType.FOUND)  # soon sent again
 
 
@@ -25,6 +27,8 @@ class Verdicts:
     def __init__(self, routes: BeaconRoutes, searches: Searches, deadlines: Deadlines) -> None:
         self._routes, self._searches, self._deadlines = routes, searches, deadlines
         self.retry_s = -math.inf  # when held packets are looked at again
+        # By drone: the neighbours that took orders for it, and when.
+        self._ordered: dict[int, dict[int, float]] = {}
 
     def of(self, transit: Transit) -> int:
         """The next hop of a packet, HOLD or DROP."""
@@ -32,12 +36,17 @@ class Verdicts:
         routes.now_s = now_s = self._deadlines.now_s
         is_up = transit.addressee == routes.gateway
         ways = routes.next_hops(transit.addressee, transit.came_from)
+        is_order = transit.kind == MessageType.MOVE_TO_LOCATION
+        if is_order:
+            ways = self._answered_first(transit.addressee, ways)
         most = None if is_up or len(transit.sent_s) < MOST_WAYS else 1
         for to, shown_s in itertools.islice(ways, most):
             if to == transit.came_from or shown_s <= transit.sent_s.get(to, -math.inf):
                 continue
             failed_s = transit.failed_s.get(to)
             if failed_s is None or routes.neighbours[to].alive_s > failed_s:
+                if is_order:
+                    self._ordered.setdefault(transit.addressee, {})[to] = now_s
                 return to
         if now_s - transit.seen_s >= HELD_S or transit.kind in NOT_HELD:
             return DROP
@@ -55,6 +64,18 @@ class Verdicts:
     def retries(self) -> None:
         """All held packets ask again now."""
         self.retry_s = self._deadlines.now_s + RETRY_S
+
+    def _answered_first(self, drone: int, ways: Iterator[Way]) -> Iterator[Way]:
+        """Last the neighbours that took orders since the drone was heard: they may swallow them."""
+        routes = self._routes
+        direct = routes.neighbours.get(drone)
+        heard_s = max(routes.led_s(drone), -math.inf if direct is None else direct.heard_s)
+        ordered = self._ordered[drone] = {
+            to: at_s
+            for to, at_s in self._ordered.get(drone, {}).items()
+            if at_s > max(heard_s, routes.now_s - SUSPECTED_S)
+        }
+        return iter(sorted(ways, key=lambda way: ordered.get(way.neighbour, -math.inf)))
 
     def _may_return(self, transit: Transit) -> bool:
         """Whether the sender of a packet, who may know another way, can get it back."""
