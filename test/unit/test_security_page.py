@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 import pytest
+from proofs import attacks, claims, damage
 
 from drone_mesh.communication import complaints, limits
 from drone_mesh.communication.beacon import proofs, trickle
@@ -20,7 +21,6 @@ from drone_mesh.communication.seals import end_to_end, keys, message_seal, repla
 from drone_mesh.communication.seals import sealed_antenna as antenna
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.internet import guarded_app
-from drone_mesh.lab.proofs import attacks, claims, damage
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs/security.md").read_text(encoding="utf-8")
 TEXT = " ".join(PAGE.split())
@@ -68,7 +68,12 @@ SENTENCES = [
     f"are {claims.ELSEWHERE.longitude * math.sqrt(2) / 1000:.1f} km away; "
     f"then the gateway is off for {claims.OUTAGE_S:g} s",
     f"a gateway draws one every {end_to_end.NEW_GATEWAY_NONCE_AFTER_S:g} s",
-    f"*with numbers ahead* are {claims.AHEAD} ahead",
+    f"and {claims.LIE_M:g} m nearer to it than it is; those *with numbers ahead* are "
+    f"{claims.AHEAD} ahead",
+    f"promises the next one in {claims.LONGEST_S:g} s, and none for {claims.SILENT_TURNS / 2:g} s",
+    f"*Frames in neighbours' names*: {attacks.FRAMES_PER_S} a second",
+    f"are {claims.MOST_AHEAD} ahead, the most that counts as newer",
+    f"at that one of {('four', 'five')[len(damage.PLACES) - 4]} places",
     f"Meanwhile the owner orders {len(claims.ORDERED)} drones away by {claims.ORDERED_M:g} m;",
     f"a heartbeat within {proofs.AGAIN_S:g} s after it connects",
     f"again after {proofs.AGAIN_S:g} to {2 * proofs.AGAIN_S:g} s until the gateway",
@@ -121,7 +126,8 @@ it costs only 2 bytes per message more
 
 256 messages earlier
 
-figures of 2026-11-24
+figures of 2026-11-24 (the attacks by beacons but that of far places, and frames in
+neighbours' names: seeds 0 and 1, figures of 2026-11-26)
 
 *A counter far ahead*: once in 2 s
 

@@ -17,7 +17,6 @@ from drone_mesh.lab.experiment import load_experiment
 from drone_mesh.lab.merge import merge
 from drone_mesh.lab.plan import Plan
 from drone_mesh.lab.progress import as_duration
-from drone_mesh.lab.proofs.command import add_proofs
 from drone_mesh.lab.store import describe_folder
 from drone_mesh.lab.template import write_template
 from drone_mesh.stopping import ends_as
@@ -156,8 +155,6 @@ def _add_analysis(commands: argparse._SubParsersAction[argparse.ArgumentParser])
         help="metric to compare; repeatable (default: those of the experiment)",
     )
     compare.set_defaults(run=_compare)
-
-    add_proofs(commands)
 
     metrics = commands.add_parser("metrics", help="list all metrics with unit and definition")
     metrics.set_defaults(run=_metrics)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from proofs.fuzz import tables
+
 from drone_mesh.communication.heartbeats.circulation import CirculationGuard, came_round
-from drone_mesh.lab.proofs.fuzz import tables
 
 
 def test_a_passage_is_remembered_for_half_a_second_whenever_it_came():

@@ -8,13 +8,13 @@ import pytest
 from cryptography.hazmat.primitives.ciphers import Cipher
 from cryptography.hazmat.primitives.ciphers.algorithms import AES
 from cryptography.hazmat.primitives.ciphers.modes import ECB
+from proofs.stranger import Hole, Tap
 from seal_rig import KEY, OTHER_KEY
 
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.ticket import TicketState
 from drone_mesh.communication.seals.message_seal import MessageSeal
 from drone_mesh.inprocess import Network
-from drone_mesh.lab.proofs.stranger import Hole, Tap
 
 TO_ALL = 254
 PLACE = b"\x34\x12\x07\x05\x00"

@@ -4,6 +4,7 @@ import logging
 import random
 
 import pytest
+from proofs.stranger import Tap
 from rig import Rig
 from seal_rig import KEY, OTHER_KEY, packet
 
@@ -12,7 +13,6 @@ from drone_mesh.communication.interfaces import IMeshNetwork, IWirelessCommunica
 from drone_mesh.communication.seals.seal import HopSeal, _epoch_state
 from drone_mesh.communication.seals.sealed_antenna import SealedAntenna
 from drone_mesh.inprocess import Network
-from drone_mesh.lab.proofs.stranger import Tap
 
 
 def line(nodes, key=KEY, radio="disc", **options):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 import pytest
+from proofs.stranger import Hole
 from seal_rig import KEY, packet
 
 from drone_mesh.communication.data.ticket import TO_GATEWAY, TicketState
@@ -15,7 +16,6 @@ from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.routing.child_table_tree import ChildTableTree
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.inprocess import Network
-from drone_mesh.lab.proofs.stranger import Hole
 
 NOTICED_WITHIN_S = 120.0
 

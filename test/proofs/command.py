@@ -1,4 +1,4 @@
-"""The commands of the lab that try to do harm: attack and fuzz."""
+"""scripts/proofs: attack meshes, and send them mutated packets (docs/security.md, "Attacks")."""
 
 from __future__ import annotations
 
@@ -6,16 +6,26 @@ import argparse
 import logging
 import sys
 from pathlib import Path
+from typing import Callable, Sequence
 
 from drone_mesh.arguments import MOST, whole
 from drone_mesh.errors import MeshError
-from drone_mesh.lab.proofs.attacks import ATTACKS
-from drone_mesh.lab.proofs.damage import KEY, TABLE_HEAD, damage_row, keys_of, with_row
-from drone_mesh.lab.proofs.fuzz import NODES, crowd, fuzz
+from drone_mesh.stopping import ends_as
+from proofs.attacks import ATTACKS
+from proofs.damage import KEY, TABLE_HEAD, damage_row, keys_of, with_row
+from proofs.fuzz import NODES, crowd, fuzz
+
+PROGRAM = "scripts/proofs"
 
 
-def add_proofs(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add them to those of the lab."""
+@ends_as(PROGRAM)
+def main(argv: Sequence[str] | None = None) -> int:
+    """Returns the exit status: 0 done, 1 an error, 2 usage, 130 Ctrl-C."""
+    parser = argparse.ArgumentParser(
+        prog=PROGRAM, description="Prove what strangers can do to a mesh (docs/security.md)."
+    )
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+
     attack = commands.add_parser(
         "attack", help="attack meshes without and with a key, and print the damage as a table"
     )
@@ -24,7 +34,7 @@ def add_proofs(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     )
     attack.add_argument(
         "--runs",
-        type=whole(0, MOST),
+        type=whole(1, MOST),
         default=12,
         metavar="N",
         help="number of seeds (default %(default)s)",
@@ -49,13 +59,15 @@ def add_proofs(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     )
     fuzzing.set_defaults(run=_fuzz)
 
+    options = parser.parse_args(argv)
+    run: Callable[[argparse.Namespace], int] = options.run
+    return run(options)
+
 
 def _attack(options: argparse.Namespace) -> int:
     unknown = set(options.attacks).difference(ATTACKS)
     if unknown:
         raise MeshError(f"unknown attack {min(unknown)!r}: use one of {', '.join(ATTACKS)}")
-    if options.runs < 1:
-        raise MeshError(f"invalid --runs {options.runs}: must be 1 or more")
     logging.disable(logging.WARNING)  # an attacked mesh logs a lot
     print(*TABLE_HEAD, sep="\n", flush=True)
     for name in options.attacks or ATTACKS:

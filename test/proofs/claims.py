@@ -8,7 +8,7 @@ from __future__ import annotations
 import functools
 import itertools
 import random
-from typing import Callable, Iterator, Sequence
+from typing import Callable, Iterable, Iterator, Sequence
 
 from drone_mesh.communication import messages
 from drone_mesh.communication.beacon.packets import (
@@ -17,11 +17,13 @@ from drone_mesh.communication.beacon.packets import (
     Beacon,
     Below,
     Motion,
+    newer,
 )
 from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE
 from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.drone.location import Location
-from drone_mesh.lab.proofs.stranger import Stranger
+from drone_mesh.inprocess.radio import InProcessAir
+from proofs.stranger import Stranger
 
 CLAIMING_S = 60.0
 OUTAGE_S = 300.0  # of the gateway, in which its routers step back to places that they know
@@ -31,6 +33,10 @@ ORDERED = (24, 19, 14, 9, 4, 3, 2, 1)  # drones, those far from the gateway firs
 ORDERED_M = 3.5  # to the west, where each keeps its neighbours
 ORDER_PERIOD_S = 15.0
 AHEAD = 10  # numbers of beacons
+LIE_M = 8.0  # less than the range
+MOST_AHEAD = 127  # of them; one more would be an old one
+LONGEST_S = 6.35  # that a beacon can say until the next one
+SILENT_TURNS = 32  # of half a second
 BEACON_ROOM = 20  # bytes, also with a seal
 ELSEWHERE = Location(1500.0, 1500.0, 0.0)  # 2.1 km away; beacons tell places within 3.2 km
 
@@ -77,7 +83,7 @@ def claimed_nonces(stranger: Stranger) -> None:
 
 
 def beacon_black_hole(stranger: Stranger) -> None:
-    """Claim in beacons to be beside the gateway, with its next numbers, and forward nothing."""
+    """Claim in beacons to be one hop from the gateway, and nearer to it, and forward nothing."""
     _beacons(stranger, ahead=1)
 
 
@@ -91,12 +97,81 @@ def beacons_of_all(stranger: Stranger) -> None:
 
     The newest announcement of a drone counts. The stranger forwards nothing.
     """
-    network = stranger.network
-    for turn, drone in enumerate(ORDERED, 1):
-        at_s = network.now_s() + turn * CLAIMING_S / 10
-        network.clock.call_at(at_s, functools.partial(_order_away, stranger), drone)
-    drones = tuple(node for node in network.nodes if node)
+    _order_in_turn(stranger)
+    drones = tuple(node for node in stranger.network.nodes if node)
     _beacons(stranger, ahead=0, lists=(NONE_BELOW, Below(0, drones)))
+
+
+def beacons_near_all(stranger: Stranger) -> None:
+    """Claim in beacons to hear every drone, while the owner sends eight away."""
+    _order_in_turn(stranger)
+    drones = [node for node in stranger.network.nodes if node]
+    for newest, first in zip(_newest_numbers(stranger), itertools.cycle(range(0, 24, 8))):
+        near = tuple(drones[first : first + 8])
+        beacon = Beacon(0, newest, 1, 0, NO_ANCESTORS, LONGEST_S, near=near)
+        _to_all(stranger, stranger.node_id, beacon)
+
+
+def beacon_and_silence(stranger: Stranger) -> None:
+    """Send one beacon that promises the next one in 6.35 s, the longest time, then be silent."""
+    me = stranger.node_id
+    for turn, newest in enumerate(_newest_numbers(stranger)):
+        if turn % SILENT_TURNS == 1:
+            number = (newest + 1) % 256
+            _to_all(stranger, me, Beacon(0, number, 1, 0, NO_ANCESTORS, LONGEST_S))
+
+
+def numbers_of_gateway(stranger: Stranger) -> None:
+    """Say in the gateway's name a number that is 127 ahead, the most that counts as newer."""
+    for newest in _newest_numbers(stranger):
+        number = (newest + MOST_AHEAD) % 256
+        _to_all(stranger, 0, Beacon(0, number, 0, NO_ROUTE, NO_ANCESTORS, 0.5))
+
+
+def replayed_beacons(stranger: Stranger) -> None:
+    """Play each beacon that it hears again, a second later, everywhere in the mesh."""
+    network = stranger.network
+    heard: list[bytes] = []
+    stranger.on_packet = heard.append
+    for _ in stranger.every(1.0, CLAIMING_S):
+        old, heard[:] = list(heard), []
+        for payload, node in itertools.product(old, network.nodes):
+            creator, _from, kind, _to, _forward = messages.header(payload)
+            if kind == MessageType.BEACON and creator != node and not stranger.mute:
+                network.inject(node, messages.readdressed(payload, node))
+
+
+def wormhole(stranger: Stranger) -> None:
+    """Carry beacons, and what keys need to know each other, between the gateway and the far side.
+
+    It carries nothing else, so the nodes of one side take those of the other for neighbours.
+    """
+    network, air = stranger.network, stranger.network.air
+    assert isinstance(air, InProcessAir)
+    near = {0, *network.links(0)}
+    latest: dict[int, bytes] = {}  # by node: its last beacon
+
+    def play(payload: bytes, to: int) -> None:
+        network.inject(to, messages.readdressed(payload, to))
+
+    def overhear(payload: bytes) -> bool:
+        _creator, from_, kind, to, _forward = messages.header(payload)
+        whole = messages.readdressed(payload, BROADCAST)
+        others: Iterable[int] = ()
+        if kind in (MessageType.SEAL_CHALLENGE, MessageType.SEAL_ANSWER):
+            others = (to,)
+        elif kind == MessageType.BEACON and latest.get(from_) != whole:
+            latest[from_] = whole
+            others = network.nodes
+        for other in others:
+            if (other in near) != (from_ in near) and other not in network.links(from_):
+                network.clock.call_at(network.now_s(), functools.partial(play, payload), other)
+        return True
+
+    if not stranger.mute:
+        air.carries = overhear
+    network.run_for(CLAIMING_S)
+    air.carries = None
 
 
 def beacons_in_names(stranger: Stranger) -> None:
@@ -138,32 +213,55 @@ def _order_away(stranger: Stranger, drone: int) -> None:
     network.order(drone, goal.longitude, goal.latitude, allow_shared_place=True)
 
 
+def _order_in_turn(stranger: Stranger) -> None:
+    network = stranger.network
+    for turn, drone in enumerate(ORDERED, 1):
+        at_s = network.now_s() + turn * CLAIMING_S / 10
+        network.clock.call_at(at_s, functools.partial(_order_away, stranger), drone)
+
+
+def _to_all(stranger: Stranger, name: int, beacon: Beacon) -> None:
+    body = beacon.to_body(BEACON_ROOM)
+    for node in stranger.in_range():
+        if node != name:
+            stranger.say(MessageType.BEACON, name, node, BROADCAST, body)
+
+
 def _beacons(stranger: Stranger, ahead: int, lists: Sequence[Below] = (NONE_BELOW,)) -> None:
     """Send beacons of a node beside the gateway, so many numbers ahead of its newest one.
 
     They take turns with the `lists` of the nodes below.
     """
     for newest, below in zip(_newest_numbers(stranger), itertools.cycle(lists)):
-        beacon = Beacon(0, (newest + ahead) % 256, 1, 0, NO_ANCESTORS, 0.5, below=below)
-        body = beacon.to_body(BEACON_ROOM)
-        for node in stranger.in_range():
-            stranger.say(MessageType.BEACON, stranger.node_id, node, BROADCAST, body)
+        motion = None if below.listed else _nearer_place(stranger)
+        beacon = Beacon(0, (newest + ahead) % 256, 1, 0, NO_ANCESTORS, 0.5, motion, below=below)
+        _to_all(stranger, stranger.node_id, beacon)
+
+
+def _nearer_place(stranger: Stranger) -> Motion:
+    """Where it says it is: nearer to the gateway, as far as those beside it believe."""
+    here, there = stranger.drone.get_location(), stranger.network.location(0)
+    part = min(1.0, LIE_M / max(LIE_M, here.distance_m(there)))
+    x, y = (a + part * (b - a) for a, b in zip(here.to_vector()[:2], there.to_vector()[:2]))
+    return Motion(Location.from_vector((x, y, 0.0)), (0.0, 0.0, 0.0))
 
 
 def _newest_numbers(stranger: Stranger) -> Iterator[int]:
-    """Twice a second the number of the gateway's latest beacon."""
-    newest = 0
+    """Twice a second the newest number of the gateway's that it has heard, of whatever node."""
+    newest: int | None = None
 
     def note(payload: bytes) -> None:
         nonlocal newest
-        creator, _from, kind, _to, _forward = messages.header(payload)
-        if kind == MessageType.BEACON and creator == 0:
+        _creator, _from, kind, _to, _forward = messages.header(payload)
+        if kind == MessageType.BEACON:
             beacon = Beacon.from_body(messages.body(payload), None)
-            newest = newest if beacon is None else beacon.number
+            if beacon is not None and beacon.gateway == 0:
+                known = beacon.number if newest is None else newest
+                newest = beacon.number if newer(beacon.number, known) > 0 else known
 
     stranger.on_packet = note
     for _ in stranger.every(0.5, CLAIMING_S):
-        yield newest
+        yield newest or 0
 
 
 BY_BEACONS: tuple[Callable[[Stranger], None], ...] = (
@@ -172,7 +270,12 @@ BY_BEACONS: tuple[Callable[[Stranger], None], ...] = (
     beacons_of_all,
     beacons_in_names,
     beacons_of_far_places,
+    beacons_near_all,
+    beacon_and_silence,
+    numbers_of_gateway,
+    replayed_beacons,
+    wormhole,
 )
 """Those on meshes with the technique `beacon`."""
-FOR_PACKETS_DOWN = (beacons_of_all,)
+FOR_PACKETS_DOWN = (beacons_of_all, beacons_near_all)
 """Those on the packets of the gateway; the others are on those for it."""

@@ -5,12 +5,11 @@ from __future__ import annotations
 import functools
 
 import pytest
-
-from drone_mesh.inprocess import Network
-from drone_mesh.lab.command import main
-from drone_mesh.lab.proofs.attacks import ATTACKS, RECORDING
-from drone_mesh.lab.proofs.damage import (
+from proofs.attacks import ATTACKS, RECORDING
+from proofs.command import main
+from proofs.damage import (
     KEY,
+    PLACES,
     TABLE_HEAD,
     Threat,
     damage_row,
@@ -18,7 +17,9 @@ from drone_mesh.lab.proofs.damage import (
     trial,
     with_row,
 )
-from drone_mesh.lab.proofs.fuzz import crowd, fuzz, tables
+from proofs.fuzz import crowd, fuzz, tables
+
+from drone_mesh.inprocess import Network
 
 # Tolerance where an attack must have no effect: the scenario alone has slightly different results
 # when packets travel at other moments.
@@ -75,8 +76,28 @@ def test_a_captured_node_neither_orders_nor_lures_nor_cuts_off(name):
     assert attacked.cut_off <= quiet.cut_off + SLACK
 
 
-def test_a_captured_node_that_lists_all_drones_takes_the_packets_for_them_but_no_order():
-    attacked = outcome("beacons that list all drones", Threat.CAPTURED)
+@pytest.mark.parametrize("threat", [Threat.WITHOUT_KEY, Threat.CAPTURED])
+@pytest.mark.parametrize("place", range(len(PLACES)))
+def test_beacons_of_a_black_hole_draw_nobody_who_knows_places(threat, place):
+    """In the middle of the mesh half of it was cut off, while hops were believed."""
+    assert trial("beacons of a black hole", threat, seed=1, place=place).cut_off <= SLACK
+
+
+def test_a_node_that_promises_a_beacon_and_falls_silent_is_soon_forgotten():
+    attacked = trial("a beacon, then silence", Threat.WITHOUT_KEY, seed=1, place=3)
+    assert attacked.cut_off <= SLACK
+
+
+@pytest.mark.parametrize("threat", [Threat.WITHOUT_KEY, Threat.CAPTURED])
+@pytest.mark.parametrize("name", ["wormhole", "replayed beacons"])
+def test_beacons_that_are_played_far_from_their_sender_draw_nobody_who_knows_places(name, threat):
+    """Two thirds were cut off while hops were believed."""
+    assert outcome(name, threat).cut_off <= SLACK
+
+
+@pytest.mark.parametrize("name", ["beacons that list all drones", "beacons that hear all drones"])
+def test_a_captured_node_that_claims_all_drones_takes_the_packets_for_them_but_no_order(name):
+    attacked = outcome(name, Threat.CAPTURED)
     assert attacked.cut_off > 0.5
     assert attacked.later == 0.0
     assert attacked.lured == 0  # of the drones that were ordered meanwhile all fly

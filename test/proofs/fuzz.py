@@ -9,7 +9,7 @@ from typing import Callable, Iterable, Iterator, NamedTuple
 from drone_mesh.communication.interfaces import BROADCAST, PAYLOAD_BYTES
 from drone_mesh.communication.seals.keys import Keys
 from drone_mesh.inprocess.network import Network
-from drone_mesh.lab.proofs.stranger import RecordedPacket, Tap
+from proofs.stranger import RecordedPacket, Tap
 
 NODES = 6
 SPACING_M = 6.0

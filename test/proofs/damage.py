@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import functools
 import math
 import statistics
 from typing import AbstractSet, NamedTuple, Sequence
@@ -14,18 +15,20 @@ from drone_mesh.communication.seals.keys import Keys, MeshKey
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import MeshError
 from drone_mesh.inprocess.network import Network
-from drone_mesh.lab.proofs.attacks import (
+from proofs.attacks import (
     ATTACKS,
     RECORDING,
+    borrowed_names,
     highest_bid,
     invented_ids,
     plausible_bid,
 )
-from drone_mesh.lab.proofs.claims import BY_BEACONS, FOR_PACKETS_DOWN
-from drone_mesh.lab.proofs.stranger import BESIDE, Stranger
+from proofs.claims import BY_BEACONS, FOR_PACKETS_DOWN
+from proofs.stranger import BESIDE, Stranger
 
 NODES, SHARED_NODES = 25, 9
 SPACING_M = 6.0
+PLACES = ((0.0, 0.0), (0.0, 0.5), (0.5, 0.0), (0.5, 0.5), (1.0, 1.0))  # of the sides of the mesh
 STRANGER = 200
 LURED_M = 50.0  # farther than any repair flies here
 OFF_ORDER_M = 3.0  # tolerance for a drone that its owner ordered to a place
@@ -53,10 +56,11 @@ class Damage(NamedTuple):
     metres: float  # distance of the farthest of them
 
 
-def trial(name: str, threat: Threat, seed: int) -> Damage:
-    """One attack with this threat, or the same time without one."""
+@functools.lru_cache(maxsize=None)  # a search for the worst place has made some of them
+def trial(name: str, threat: Threat, seed: int, place: int = 0) -> Damage:
+    """One attack with this threat, at this one of the PLACES, or the same time without one."""
     attack = ATTACKS[name]
-    shared = attack is invented_ids  # where an answer to an absent node costs airtime
+    shared = attack in (invented_ids, borrowed_names)  # where strangers cost airtime
     radio = "shared" if shared else "disc"
     network = Network(
         seed,
@@ -72,7 +76,8 @@ def trial(name: str, threat: Threat, seed: int) -> Damage:
     else:
         nodes = SHARED_NODES if shared else NODES
         network.add_fleet(1, nodes - 1, math.ceil(math.sqrt(nodes - 1)), SPACING_M)
-        at = (2.0, 3.0)
+        side_m = SPACING_M * (math.isqrt(nodes - 1) - 1)
+        at = (2.0 + PLACES[place][0] * side_m, 3.0 + PLACES[place][1] * side_m)
     if not network.run_until(network.all_connected, within_s=60.0):
         raise MeshError(f"seed {seed}: the mesh does not connect without an attack")
     network.run_for(20.0)
@@ -119,6 +124,19 @@ TABLE_HEAD = (
 )
 
 
+def worst_place(name: str, threat: Threat) -> int:
+    """The one of the PLACES from where attacks by beacons or frames do most, with the first seed.
+
+    Other attacks are made beside the gateway, through which all packets go, and so are those
+    without a key on a mesh that has one.
+    """
+    is_anywhere = ATTACKS[name] in (*BY_BEACONS, borrowed_names)
+    if not is_anywhere or threat in (Threat.NONE, Threat.WITH_KEY):
+        return 0
+    harm = [trial(name, threat, 0, place) for place in range(len(PLACES))]
+    return max(range(len(PLACES)), key=lambda place: (harm[place].cut_off, harm[place].lured))
+
+
 def damage_row(name: str, runs: int) -> str:
     """A line of the Markdown table: means over the runs, and the farthest of all drones."""
     cells = []
@@ -126,7 +144,8 @@ def damage_row(name: str, runs: int) -> str:
         if threat is Threat.CAPTURED and ATTACKS[name] in RECORDING:
             cells.append("")  # a captured node replays recordings like any other radio
             continue
-        cells.append(_in_words([trial(name, threat, seed) for seed in range(runs)]))
+        place = worst_place(name, threat)
+        cells.append(_in_words([trial(name, threat, seed, place) for seed in range(runs)]))
     return f"| {name} | " + " | ".join(cells) + " |"
 
 

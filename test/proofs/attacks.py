@@ -24,12 +24,13 @@ from drone_mesh.communication.messages import (
 from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.drone.location import Location
 from drone_mesh.inprocess.radio import InProcessAir
-from drone_mesh.lab.proofs import claims
-from drone_mesh.lab.proofs.stranger import Stranger
+from proofs import claims
+from proofs.stranger import Stranger
 
 ATTACK_S = 60.0
 BIDDING_S = 300.0
 SWALLOWING_S = 180.0
+FRAMES_PER_S = 100  # more do hardly more
 FAR = Location(4900.0, 4900.0, 0.0)  # 6.9 km away, within the bounds for goals
 HERE, THERE = Location(-5.0, 2.0, 0.0), Location(-2.0, -4.0, 0.0)  # of two orders of the owner
 LARGEST_BID, PLAUSIBLE_BID = 1e9, 100.0
@@ -101,9 +102,9 @@ def invented_ids(stranger: Stranger) -> None:
 
 
 def borrowed_names(stranger: Stranger) -> None:
-    """Send 20 frames a second that open for nobody, in the names of its living neighbours."""
+    """Send frames that open for nobody, in the names of its living neighbours."""
     chance = random.Random(stranger.node_id)
-    for _ in stranger.every(0.05, ATTACK_S):
+    for _ in stranger.every(1.0 / FRAMES_PER_S, ATTACK_S):
         near = stranger.in_range()
         victim, name = chance.sample(near, 2)
         frame = packet(MessageType.HEARTBEAT, name, name, victim, victim, bytes((0, 255, 0)))
@@ -198,6 +199,11 @@ ATTACKS: Mapping[str, Attack] = {
     "beacons that list all drones": claims.beacons_of_all,
     "beacons in neighbours' names": claims.beacons_in_names,
     "beacons of far places and an outage": claims.beacons_of_far_places,
+    "beacons that hear all drones": claims.beacons_near_all,
+    "a beacon, then silence": claims.beacon_and_silence,
+    "numbers in the gateway's name": claims.numbers_of_gateway,
+    "replayed beacons": claims.replayed_beacons,
+    "wormhole": claims.wormhole,
 }
 RECORDING = (replayed_order, replay_after_restart, replay_on_another_path)
 
