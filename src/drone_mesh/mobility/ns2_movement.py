@@ -24,7 +24,7 @@ _ORDER = re.compile(
 _NO_MOVEMENT = re.compile(r'(\$god_\s.*|\$ns_\s+at\s+\S+\s+"\$god_\s.*|set\s.*)?')
 
 
-class _Order(NamedTuple):
+class _Statement(NamedTuple):
     """Fly somewhere from this time on; at speed 0 it stays, at an infinite one it is there."""
 
     at_s: float
@@ -55,7 +55,7 @@ def read_ns2(lines: Iterable[str]) -> Knots:
             at_s = number_in(at, number)
             if at_s < 0 or speed_m_s < 0:
                 raise ValueError(f"line {number}: time {at} and speed {speed} must be 0 or more")
-            nodes.setdefault(int(node), _Ns2Node()).orders.append(_Order(at_s, goal, speed_m_s))
+            nodes.setdefault(int(node), _Ns2Node()).orders.append(_Statement(at_s, goal, speed_m_s))
         elif not _NO_MOVEMENT.fullmatch(statement):
             raise ValueError(
                 f"line {number}: expected $node_(K) set X_ NUMBER (or Y_, Z_), "
@@ -70,7 +70,7 @@ class _Ns2Node:
     """One node of an ns-2 movement file: a new order replaces the one before."""
 
     start: dict[str, float] = field(default_factory=dict)  # by axis; 0 where a file has none
-    orders: list[_Order] = field(default_factory=list)
+    orders: list[_Statement] = field(default_factory=list)
 
     def knots(self) -> Iterator[Knot]:
         place = {axis: self.start.get(axis, 0.0) for axis in "XYZ"}
