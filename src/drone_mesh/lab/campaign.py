@@ -10,6 +10,7 @@ from typing import Iterator, Mapping, Sequence
 from drone_mesh.lab.engine import run_all
 from drone_mesh.lab.experiment import LoadedExperiment
 from drone_mesh.lab.plan import Plan, PlannedRun
+from drone_mesh.lab.program import PROGRAM
 from drone_mesh.lab.progress import Progress
 from drone_mesh.lab.provenance import code_of, describe_session
 from drone_mesh.lab.store import Store, StoreError, read_runs
@@ -116,7 +117,7 @@ class Campaign:
 
     def show_command(self, run: str) -> str:
         """The command that repeats one run."""
-        return f"python3 -m drone_mesh.lab show {shlex.quote(str(self.folder))} {run}"
+        return f"{PROGRAM} show {shlex.quote(str(self.folder))} {run}"
 
     def _more_seeds(self, plan: Plan, store: Store) -> int | None:
         """The number of seeds for each cell in the next round; None: enough."""

@@ -16,18 +16,18 @@ from drone_mesh.lab.estimate import Estimate, estimate
 from drone_mesh.lab.experiment import load_experiment
 from drone_mesh.lab.merge import merge
 from drone_mesh.lab.plan import Plan
+from drone_mesh.lab.program import PROGRAM
 from drone_mesh.lab.progress import as_duration
 from drone_mesh.lab.store import describe_folder
 from drone_mesh.lab.template import write_template
 from drone_mesh.stopping import ends_as
 from drone_mesh.web.listening import MAX_PORT
 
-PROGRAM = "lab"
 CELLS_SHOWN = 30  # by `lab plan`
 _RESULTS = "results folder of the experiment"
 
 
-@ends_as(PROGRAM)
+@ends_as("lab")
 def main(argv: Sequence[str] | None = None) -> int:
     """Returns the exit status: 0 done, 1 some runs failed or an error, 2 usage, 130 Ctrl-C."""
     given = list(sys.argv[1:] if argv is None else argv)

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import NamedTuple, Sequence
 
 from drone_mesh.errors import ConfigurationError
+from drone_mesh.lab.program import PROGRAM
 from drone_mesh.lab.results import Row, load_results, number
 from drone_mesh.lab.statistics import holm, mean_interval, paired_difference
 
@@ -66,8 +67,8 @@ def _one_code(rows: Sequence[Row]) -> str:
     codes = sorted({row["code"] for row in rows})
     if len(codes) > 1:
         raise ConfigurationError(
-            f"a cell mixes runs of different code ({', '.join(codes)}): `lab run` with --again "
-            "repeats the older"
+            f"a cell mixes runs of different code ({', '.join(codes)}): `{PROGRAM} run` with "
+            "--again repeats the older"
         )
     return codes[0] if codes else "unknown"
 

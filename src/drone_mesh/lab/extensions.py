@@ -15,6 +15,7 @@ from drone_mesh.by_name import in_one_line, load_by_name
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.inprocess import Network
 from drone_mesh.lab.metrics import METRICS
+from drone_mesh.lab.program import PROGRAM
 from drone_mesh.lab.record import RunRecord
 
 _OWN = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
@@ -74,7 +75,7 @@ def check_metric(name: str) -> None:
     """Raise ConfigurationError for a name that is neither a metric nor may be a user's function."""
     if not is_own(name) and name not in METRICS:
         close = difflib.get_close_matches(name, METRICS, n=1)
-        hint = f"did you mean {close[0]}?" if close else "`lab metrics` lists them"
+        hint = f"did you mean {close[0]}?" if close else f"`{PROGRAM} metrics` lists them"
         raise ConfigurationError(f"unknown metric {name}; {hint}")
 
 

@@ -17,6 +17,7 @@ from drone_mesh.lab.healing_figures import (
     survival_drawing,
 )
 from drone_mesh.lab.metrics import METRICS
+from drone_mesh.lab.program import PROGRAM
 from drone_mesh.lab.results import Results, load_results, number
 from drone_mesh.lab.run_report.drawing import in_style, svg_element, svg_of_its_own
 from drone_mesh.lab.show import replay
@@ -53,7 +54,7 @@ def _render(results: Results, tables: Sequence[Table], drawings: Sequence[Drawin
     template = environment.from_string(_TEMPLATE.read_text(encoding="utf-8"))
     experiment = results.loaded.experiment
     done = sum(planned.spec.run in results.rows for planned in results.plan)
-    codes = sorted({row["code"] for row in results.rows.values()})
+    codes = sorted({row["code"].partition(" ")[0] for row in results.rows.values()})
     run, animation = _animation(results)
     return template.render(
         title=experiment.title or experiment.name,
@@ -71,6 +72,8 @@ def _render(results: Results, tables: Sequence[Table], drawings: Sequence[Drawin
         folder=results.folder,
         definitions=[(name, METRICS[name]) for name in results.metrics if name in METRICS],
         codes=codes,
+        mixed=any(len(results.codes(cell)) > 1 for cell in range(len(results.loaded.cells))),
+        program=PROGRAM,
         sessions=results.sessions,
         experiment_text=(results.folder / EXPERIMENT).read_text(encoding="utf-8"),
     )

@@ -150,7 +150,7 @@ def load_results(folder: Path) -> Results:
     """Read a folder written by `lab run`. Raises StoreError or ConfigurationError."""
     sessions = read_provenance(folder)
     if not sessions or not (folder / EXPERIMENT).exists():
-        raise StoreError(f"{folder}: not a results folder of lab run")
+        raise StoreError(f"{folder}: not a results folder of the lab")
     last = sessions[-1]
     loaded = load_experiment(folder / EXPERIMENT, list(last["overrides"]), Path(last["folder"]))
     rows = read_runs(folder)

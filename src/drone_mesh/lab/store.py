@@ -15,6 +15,7 @@ from typing import Any, Iterable, Iterator, Mapping, Sequence
 
 from drone_mesh.errors import MeshError
 from drone_mesh.lab.plan import Plan, flatten
+from drone_mesh.lab.program import PROGRAM
 from drone_mesh.lab.worker import Outcome, as_cell, metric_columns
 
 FIRST_COLUMNS = ("run", "seed", "repetition")
@@ -254,7 +255,10 @@ def describe_folder(folder: Path) -> str:
     elif codes and "+dirty" in codes[0]:
         lines.append(f"warning: run with uncommitted changes ({codes[0]})")
     if mixed:
-        lines.append(f"warning: {len(mixed)} cells mix runs of different code; see run --again")
+        lines.append(
+            f"warning: cells of mixed code: {len(mixed)}; `{PROGRAM} run` with --again repeats the "
+            "older runs"
+        )
     sessions = read_provenance(folder)
     if sessions:
         last = sessions[-1]
@@ -276,7 +280,7 @@ def _reading(folder: Path) -> Iterator[sqlite3.Connection]:
     _refuse_csv_alone(folder)
     path = folder / DATABASE
     if not path.exists() or not path.stat().st_size:  # empty: another process is just making it
-        raise StoreError(f"{folder}: no {DATABASE} there, so it is not a results folder of lab run")
+        raise StoreError(f"{folder}: no {DATABASE} there, so it is not a results folder of the lab")
     with _explained("read", path):
         database = sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)
         with contextlib.closing(database):

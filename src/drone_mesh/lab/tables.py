@@ -10,6 +10,7 @@ from typing import Mapping, Sequence
 
 from drone_mesh.lab.experiment import as_text
 from drone_mesh.lab.metrics.registry import METRICS, is_censored, unit_of
+from drone_mesh.lab.program import PROGRAM
 from drone_mesh.lab.results import Results, Row, is_share, number
 from drone_mesh.lab.statistics import (
     Interval,
@@ -227,8 +228,8 @@ def worst_table(results: Results) -> Table | None:
     ]  # fmt: skip
     header = ["cell", "seed", "healed after", "connected at the end", "run"]
     caption = (
-        "The runs that took longest. To repeat one with all its events: python3 -m drone_mesh.lab "
-        f"show {results.folder} RUN, with --page FILE for a page about it."
+        "The runs that took longest. To repeat one with all its events: "
+        f"{PROGRAM} show {results.folder} RUN, with --page FILE for a page about it."
     )
     return Table("worst", "Worst seeds", caption, header, rows)
 

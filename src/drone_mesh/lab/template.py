@@ -7,6 +7,7 @@ from pathlib import Path
 
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.lab.experiment import NAME_PATTERN
+from drone_mesh.lab.program import PROGRAM
 
 TEMPLATE = Path(__file__).resolve().parent / "experiment.template.yaml"
 
@@ -18,7 +19,8 @@ def write_template(name: str) -> Path:
     path = Path(f"{name}.yaml")
     try:
         with path.open("x", encoding="utf-8") as file:
-            file.write(TEMPLATE.read_text(encoding="utf-8").format(name=name, file=path))
+            text = TEMPLATE.read_text(encoding="utf-8")
+            file.write(text.format(name=name, file=path, program=PROGRAM))
     except FileExistsError:
         raise ConfigurationError(f"{path} already exists; it was not changed") from None
     except OSError as error:

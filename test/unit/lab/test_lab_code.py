@@ -12,6 +12,7 @@ import pytest
 
 from drone_mesh.lab.command import main
 from drone_mesh.lab.own_code import imported_code, own_code
+from drone_mesh.lab.program import _program as typed
 from drone_mesh.lab.store import read_failures, read_runs
 
 EXPERIMENT = """\
@@ -117,12 +118,17 @@ def test_status_tables_and_report_mark_a_cell_of_mixed_code_and_compare_refuses_
     make_older("out", MINE_FIRST)
     capsys.readouterr()
     lab("status", "out")
-    assert "warning: 1 cells mix runs of different code" in capsys.readouterr().out
+    assert (
+        "warning: cells of mixed code: 1; `python3 -m drone_mesh.lab run`"
+        in capsys.readouterr().out
+    )
     lab("tables", "out")
     printed = capsys.readouterr().out
     assert "| edited_repair:Mine | 2 (mixed code) |" in printed
     assert "| stay | 2 |" in printed
     assert "| edited_repair:Mine | packets | 2 (mixed code) |" in printed
+    lab("report", "out")
+    assert "where one cell mixes them" in Path("out/report.html").read_text()
     assert lab("compare", "out", "repair=stay", "repair=edited_repair:Mine") == 1
     assert "a cell mixes runs of different code (" in capsys.readouterr().err
 
@@ -154,6 +160,33 @@ def test_two_folders_are_compared_run_by_run(
     capsys.readouterr()
     assert lab("compare", "old", "other") == 1
     assert "old and other have no run in common" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("started", "environment", "named"),
+    [
+        ("/usr/bin/drone-mesh-lab", {}, "drone-mesh-lab"),
+        ("/src/drone_mesh/lab/__main__.py", {}, "python3 -m drone_mesh.lab"),
+        ("/src/x/__main__.py", {"DRONE_MESH_LAB": "scripts/lab"}, "scripts/lab"),
+    ],
+)
+def test_hints_name_the_command_that_was_typed(
+    monkeypatch: pytest.MonkeyPatch, started: str, environment: dict[str, str], named: str
+) -> None:
+    monkeypatch.setattr(sys, "argv", [started])
+    for name, value in environment.items():
+        monkeypatch.setenv(name, value)
+    assert typed() == named
+
+
+def test_a_new_experiment_names_commands_that_exist(
+    edit: Callable[[str, str], None], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert lab("new", "fresh") == 0
+    assert capsys.readouterr().out.endswith("next: python3 -m drone_mesh.lab plan fresh.yaml\n")
+    text = Path("fresh.yaml").read_text()
+    for command in ("plan fresh.yaml", "run fresh.yaml", "report results/fresh", "metrics"):
+        assert f"python3 -m drone_mesh.lab {command}" in text
 
 
 def test_the_hash_of_a_module_is_of_what_it_imports_from_the_users_folder_alone(

@@ -309,7 +309,7 @@ def test_a_full_disk_ends_the_run_and_loses_nothing(
     )  # fmt: skip
     assert done.returncode == 1
     assert f"cannot write {out / 'runs.sqlite'}: " in done.stderr
-    assert "continue with: lab run" in done.stderr
+    assert "continue with: python3 -m drone_mesh.lab run" in done.stderr
     assert "Traceback" not in done.stderr
     kept = read_runs(out)
     assert 0 < len(kept) < 8
@@ -444,7 +444,7 @@ def test_a_killed_scheduler_loses_nothing(slow: Path, slow_rows: bytes, tmp_path
         scheduler.kill()
         output = finish(process)
         assert process.returncode == 1, output
-        assert "continue with: lab run" in output
+        assert "continue with: python3 -m drone_mesh.lab run" in output
     finally:
         for one in (scheduler, worker):
             one.kill()
@@ -586,7 +586,7 @@ def test_ctrl_c_keeps_everything_and_prints_how_to_continue(
     os.killpg(process.pid, signal.SIGINT)  # a terminal signals the whole group
     output = finish(process)
     assert process.returncode == 130, output
-    assert "continue with: lab run" in output
+    assert "continue with: python3 -m drone_mesh.lab run" in output
     assert "Traceback" not in output
     assert run(slow, out) == 0
     assert measured(out) == slow_rows
