@@ -10,7 +10,7 @@ from drone_mesh.drone.flight_path import FlightPath, Vector
 from drone_mesh.drone.goal import ROUNDING_M
 
 APART_M = 1.0  # least distance between two drones on the way
-SWAY_M = 0.5  # our choice: how far physics may move a drone from its path
+SWAY_M = 0.5  # how far physics may move a drone from its path
 _TOUCH_M = 1e-3  # rounding of positions
 
 

@@ -11,7 +11,7 @@ from drone_mesh.drone.roles import Role
 from drone_mesh.state.condition import Condition, condition_of
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus, another_radio
 
-LOW_BATTERY_PERCENT = 20.0  # our choice
+LOW_BATTERY_PERCENT = 20.0
 _ORDER_FAILURES = {  # the words of the alarm; the reason follows
     MeshEventKind.ORDER_REFUSED.value: "refused an order",
     MeshEventKind.ORDER_LOST_CONTACT.value: "lost contact during an order",

@@ -6,7 +6,7 @@ import enum
 
 from drone_mesh.state.model import NodeStatus
 
-SILENT_AFTER_S = 5.0  # our choice: ten missed reports, since a host reports twice a second
+SILENT_AFTER_S = 5.0  # ten missed reports, since a host reports twice a second
 
 
 class Condition(enum.Enum):

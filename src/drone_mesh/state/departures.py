@@ -23,10 +23,10 @@ from drone_mesh.state.airspace import APART_M, Airspace
 from drone_mesh.state.model import MeshStatus, NodeStatus, position_is_known, waypoints
 from drone_mesh.state.reach import Reach
 
-AT_PLACE_M = 0.5  # our choice: heights are rounded to whole metres, and physics moves drones
+AT_PLACE_M = 0.5  # heights are rounded to whole metres, and physics moves drones
 CONNECTED_SHARE = 0.8  # of the drones stay connected while others fly
 MEMBERS_IN_FLIGHT = "beacon"  # the technique that keeps flying drones connected
-ASIDE_M = (1.5, 3.0, 4.5, 6.0)  # our choice: how far a drone goes to let another one pass
+ASIDE_M = (1.5, 3.0, 4.5, 6.0)  # how far a drone goes to let another one pass
 _ASIDE_WAYS = 8
 
 
@@ -118,7 +118,7 @@ class Departures:
         return choice
 
     def _some_wait(self, left: list[int], choice: Choice) -> bool:
-        """Let those set out that may; returns whether others of them only wait for their turn."""
+        """Let the drones set out that may; returns whether others must wait for their turn."""
         last: tuple[int, int] | None = None
         waiting: dict[int, Location] = {}
         while last != (len(choice.set_out), len(self._keep_away)):
@@ -146,11 +146,11 @@ class Departures:
         return any(drone not in choice.set_out for drone in waiting)
 
     def is_in_reach(self, drone: int) -> bool:
-        """Whether its goal has a path to a gateway over drones that stay, or arrive there."""
+        """Whether the drone's goal is connected by drones that stay or arrive."""
         return self._is_near(self._goals[drone], self._anchors())
 
     def taken_by(self, drone: int) -> str:
-        """Why its goal is not free, and will not be; empty if it may be."""
+        """Why the goal stays occupied: by which drones; empty if it is or may become free."""
         goal, within_m = self._goals[drone], self._rules.clearance_m - ROUNDING_M
         others = self._resting - self._to_go - {drone}
         near = [n for n in sorted(others) if self._is_at(n, goal, within_m)]
@@ -164,7 +164,7 @@ class Departures:
     def _try(
         self, drone: int, to: Location, choice: Choice, whatever_it_cuts: bool = False
     ) -> bool:
-        """Let it set out if it may."""
+        """Let one drone set out if nothing forbids it; returns whether it does."""
         if not (whatever_it_cuts or self._mesh_holds_without(drone)):
             return False
         path = self._path(drone, to)
@@ -182,7 +182,7 @@ class Departures:
         return True
 
     def _may_go_later(self, drone: int, to: Location) -> bool:
-        """Whether it only waits for those that fly now, or for other routes."""
+        """Whether the drone can set out later, when others have landed or routes have changed."""
         path = self._path(drone, to)
         in_the_way = [] if path is None else self._airspace.in_the_way(drone, path)
         if in_the_way:

@@ -13,7 +13,7 @@ _SEVERAL_AT_ONCE = (
     MeshEventKind.NEIGHBOUR_LOST,
     MeshEventKind.NODE_MISSING,
 )
-EVENTS_KEPT = 100_000  # our choice: twice what 254 nodes that find 200 neighbours each produce
+EVENTS_KEPT = 100_000  # twice what 254 nodes that find 200 neighbours each produce
 
 
 class EventBatcher:

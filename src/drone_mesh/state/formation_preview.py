@@ -18,7 +18,7 @@ from drone_mesh.state.model import MeshStatus, NodeStatus, position_is_known
 from drone_mesh.state.observation import path_ahead
 from drone_mesh.state.reach import Reach
 
-STEP_S = 2.0  # our choice: how often the plan looks who may set out; also its time for an order
+STEP_S = 2.0  # how often the plan looks who may set out; also its time for an order
 
 
 @dataclass

@@ -11,11 +11,11 @@ import numpy as np
 from drone_mesh.drone.roles import Role
 from drone_mesh.state.model import NodeStatus, position_is_known
 
-JUST_LOST_S = 6.0  # our choice: long enough to be noticed
+JUST_LOST_S = 6.0  # long enough to be noticed
 
-SOON_S = 5.0  # our choice: a forecast of more than that rarely holds
-VELOCITY_OVER_S = 1.0  # our choice: simulated time over which a velocity is measured
-SLOWEST_M_S = 0.02  # our choice: slower drones count as standing
+SOON_S = 5.0  # a forecast of more than that rarely holds
+VELOCITY_OVER_S = 1.0  # simulated time over which a velocity is measured
+SLOWEST_M_S = 0.02  # slower drones count as standing
 
 Link = Tuple[int, int]  # the lower id first
 

@@ -27,7 +27,7 @@ _DEEDS = {  # of a drone, that explain why it is not where it was ordered to
     MeshEventKind.POWER_OFF.value: "was switched off",
 }
 
-CLOCKS_DIFFER_S = 0.1  # simulated; our choice: between the process that orders and a gateway's
+CLOCKS_DIFFER_S = 0.1  # simulated; between the process that orders and a gateway's
 BEING_SENT = "being sent"  # no gateway has reported the order yet
 _ACROSS_M_S = SPEED_M_S / (1.0 - 2.0 * CLIMB_ENDS_AT)  # over the ground
 _UPRIGHT_M_S = SPEED_M_S / (2.0 * CLIMB_ENDS_AT)  # half of the distance in a tenth of the time
@@ -156,7 +156,7 @@ class OrderWatch:
         return ticket
 
     def forget_expected(self, ticket: int) -> None:
-        """No event of this order is expected any more: it was refused, or no event came."""
+        """Stop expecting events of this order, which was refused or had none in time."""
         self._expected = {
             drone: other for drone, other in self._expected.items() if other != ticket
         }

@@ -16,7 +16,7 @@ _EMERGENCY = MeshEventKind.EMERGENCY.value
 _FLIGHT_DECIDED = MeshEventKind.FLIGHT_DECIDED.value
 _LANDED = MeshEventKind.LANDED.value
 
-CAUSE_WITHIN_S = 60.0  # our choice; noticed within 30 s (docs/protocol.md, "Requirements")
+CAUSE_WITHIN_S = 60.0  # noticed within 30 s (docs/protocol.md, "Requirements")
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from typing import NamedTuple, Sequence
 from drone_mesh.communication.messages import receiver, sender, type_of
 from drone_mesh.communication.packet_types import ABOUT, PacketKind
 
-MOST_SAMPLED = 120  # our choice, for a fifth of a second: more dots cannot be followed
+MOST_SAMPLED = 120  # for a fifth of a second: more dots cannot be followed
 
 
 def kind_of(packet_type: int) -> PacketKind:

@@ -20,8 +20,8 @@ from drone_mesh.state.departures import AT_PLACE_M, Departures, FlightRules
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus, position_is_known
 from drone_mesh.state.orders import CLOCKS_DIFFER_S
 
-FIRST_PAUSE_S = 5.0  # our choice, simulated: an order over 100 nodes takes less than a second
-LONGEST_PAUSE_S = 40.0  # our choice: each try costs a packet per hop
+FIRST_PAUSE_S = 5.0  # simulated: an order over 100 nodes takes less than a second
+LONGEST_PAUSE_S = 40.0  # each try costs a packet per hop
 CUT_OFF = "its place is out of reach"  # it was there, and a repair brought it back
 UNDER_WAY_S = 30.0  # a gateway repeats an order for as long: the drone may still set out
 
@@ -75,13 +75,13 @@ class _Part:
             self.state = PartState.REPLACED
 
     def send(self, to: Location, now_s: float) -> None:
-        """It is being ordered there."""
+        """Note that the drone is being ordered to its goal."""
         self.sent_to, self.sent_s = to, now_s
         self.due_s = now_s + self.pause_s
         self.pause_s = min(2.0 * self.pause_s, LONGEST_PAUSE_S)
 
     def stay(self, state: PartState, reason: str = "") -> None:
-        """It will not follow its latest order."""
+        """Note that the drone will not follow its latest order."""
         self.state, self.reason, self.sent_to = state, reason, None
 
 
@@ -128,7 +128,7 @@ class _StandingOrder:
     at_once: bool
 
     def is_moving(self) -> bool:
-        """Whether a drone is still to come to its place: it may bring the others the mesh."""
+        """Whether a drone has still to arrive: it may then connect others."""
         on_the_way = (PartState.LATER, PartState.FLYING)
         return any(part.state in on_the_way and not part.arrived for part in self.parts.values())
 

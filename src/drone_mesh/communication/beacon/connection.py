@@ -13,7 +13,7 @@ from drone_mesh.communication.observer import MeshEventKind, in_hops
 from drone_mesh.communication.parts import NodeBasics
 from drone_mesh.communication.router_states import RepairState, RouterEvent, RouterStates
 
-CHECK_S = 1.0  # our choice: how often a router without a gateway considers its repair
+CHECK_S = 1.0  # how often a router without a gateway considers its repair
 
 
 class Connection:
@@ -42,7 +42,7 @@ class Connection:
         return self._check_s
 
     def check(self) -> None:
-        """The parent may not have heard this node for too long; the repair may be due."""
+        """Check whether the parent still hears this node, and whether the repair is due."""
         now_s = self._routes.now_s
         if self._was_connected and not self._reaches_gateway:
             self.show()
@@ -52,7 +52,7 @@ class Connection:
                 self._host.on_unconnected_check(now_s)
 
     def has_new_parent(self) -> None:
-        """It shows itself as one once the gateway's next beacon has come through it."""
+        """Begin anew for another parent, which proves itself by the gateway's next beacon."""
         self._unproven = self._routes.newest_number
 
     def show(self) -> bool:
@@ -88,14 +88,14 @@ class Connection:
         return connected
 
     def tell_repair(self) -> None:
-        """Tell the repair of a connection; during some of its flights it wants to hear of none."""
+        """Tell the repair of a connection, unless it does not want to connect now."""
         if self._was_connected and not self._told:
             self._told = self._host.may_connect(self._routes.parent, True)
             if self._told:
                 self._host.on_connected()
 
     def end(self, event: RouterEvent) -> None:
-        """A flight or an election begins or ends: the connection is what the beacons say."""
+        """Called when a flight or an election begins or ends; the beacons decide the connection."""
         self._states.happened(event)
         if self._reaches_gateway and event is not RouterEvent.ANTENNA_OFF:
             self._states.happened(RouterEvent.GATEWAY_ANSWERED)

@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 from drone_mesh.drone.location import Location
 
-WEIGHT = 0.1  # our choice: of one beacon in the moving mean
-LEAST = 0.05  # our choice: of the mean
+WEIGHT = 0.1  # of one beacon in the moving mean
+LEAST = 0.05  # of the mean
 STEP = 0.5  # hops: small differences must not change the parent
 MOST = 3.0  # hops: of the loss of a link, whatever it loses
-FAR = 0.15  # our choice: assumed of a link that is longer than it should reach, until it shows more
+FAR = 0.15  # assumed of a link that is longer than it should reach, until it shows more
 WRONG = 1.15  # of the range: a place further away errs, or fading adds to the power
 LUCKY = 2.3  # of the range: fading that adds 10 dB reaches so far; from further away a place errs
 STOOD = 0.05  # of the range: what both ends moved between two beacons, at most

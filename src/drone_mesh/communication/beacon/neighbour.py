@@ -7,8 +7,8 @@ import math
 from drone_mesh.communication.beacon.packets import Beacon, Motion
 
 FRESH = 2.5  # intervals: a neighbour that was silent for longer is none
-MOST_REFUSED = 3  # our choice: packets that it did not take, since it last proved that it hears
-REFUSED_S = 3.0  # our choice: within which; a burst of losses is shorter
+MOST_REFUSED = 3  # packets that it did not take, since it last proved that it hears
+REFUSED_S = 3.0  # within which; a burst of losses is shorter
 
 
 class Neighbour:
@@ -65,22 +65,22 @@ class Neighbour:
             self.listed_s.update(dict.fromkeys(new, now_s))
 
     def proved(self, now_s: float) -> None:
-        """It took a packet of this node or names it: the link works both ways."""
+        """Note that the link works both ways: it took a packet of this node, or names it."""
         self.proved_s = now_s
         self.hears_perhaps()
 
     def hears_perhaps(self) -> None:
-        """What it did not take before says nothing now."""
+        """Forget the packets that it did not take: it may hear this node again."""
         self.refused, self.refuses_s, self.deaf = 0, math.inf, False
 
     def refuses(self, now_s: float) -> None:
-        """It did not take a packet. Its beacons say only that this node hears it."""
+        """Count a packet that it did not take; after several it is deaf to this node."""
         self.refused += 1
         self.refuses_s = min(self.refuses_s, now_s)
         is_burst = now_s - self.refuses_s < REFUSED_S
         self.deaf = self.deaf or (self.refused >= MOST_REFUSED and not is_burst)
 
     def alive(self, now_s: float) -> None:
-        """A sign of life."""
+        """Note a sign of life."""
         self.alive_s = now_s
         self.until_s = now_s + FRESH * self.beacon.interval_s

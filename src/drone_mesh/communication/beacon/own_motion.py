@@ -9,18 +9,18 @@ from typing import Callable
 from drone_mesh.communication.beacon.packets import Motion
 from drone_mesh.drone.location import Location
 
-OVER_S = 2.0  # our choice: noise of a receiver and turns of a drone cancel out
-TURN_S = 0.5  # our choice: only so long before a turn is noticed count samples for the new velocity
-STANDS_S = 10.0  # our choice: a drone that has not moved for this long stands
-REGION_M = 256.0  # our choice: far less than the distance up to which a beacon tells its place
-AGAIN_S = 0.1  # our choice: a receiver for satellites gives ten positions per second
+OVER_S = 2.0  # noise of a receiver and turns of a drone cancel out
+TURN_S = 0.5  # only so long before a turn is noticed count samples for the new velocity
+STANDS_S = 10.0  # a drone that has not moved for this long stands
+REGION_M = 256.0  # far less than the distance up to which a beacon tells its place
+AGAIN_S = 0.1  # a receiver for satellites gives ten positions per second
 
 
 class OwnMotion:
     """Samples the position of one node whenever it is asked."""
 
     def __init__(self, locate: Callable[[], Location | None], step_m: float) -> None:
-        """`step_m`: less far is not moved, as receivers of satellites err."""
+        """A node that moved less than `step_m` counts as standing: positions have errors."""
         self._locate = locate
         self._step_m = step_m
         self._anchor: Location | None = None
@@ -36,7 +36,7 @@ class OwnMotion:
         return now_s - self._moved_s >= STANDS_S
 
     def has_turned(self, now_s: float) -> None:
-        """It is not where its velocity led: forget the one before."""
+        """Forget the velocity: the node is not where that led."""
         self._least_s = TURN_S
         while self._samples and now_s - self._samples[0][0] > TURN_S:
             self._samples.popleft()

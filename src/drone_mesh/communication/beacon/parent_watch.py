@@ -9,8 +9,8 @@ from drone_mesh.communication.beacon.neighbour import Neighbour
 from drone_mesh.communication.beacon.routes import BeaconRoutes
 
 LATE = 1.25  # intervals, with their jitter: then a beacon of the parent was lost, or it is dead
-LATE_S = 2.0  # our choice: one lost beacon of a frequent sender says little
-PROOF_S = 5.0  # our choice: for so long a parent that names its children in turn is not asked
+LATE_S = 2.0  # one lost beacon of a frequent sender says little
+PROOF_S = 5.0  # for so long a parent that names its children in turn is not asked
 TURN_HOPS = 8  # for each neighbour: children ask one after the other, and the answer is for all
 
 
@@ -24,7 +24,7 @@ class ParentWatch:
         self._turn = rng.random()  # among the children of its parent
 
     def has_new_parent(self) -> None:
-        """The next question is for another node."""
+        """Begin anew for another parent."""
         self._probed_s = -math.inf
 
     def draw_turn(self) -> None:
@@ -32,7 +32,7 @@ class ParentWatch:
         self._turn = self._rng.random()
 
     def is_due(self, parent: Neighbour) -> bool:
-        """Whether it is time to probe the parent, again perhaps. If so, it counts as probed."""
+        """Whether to probe the parent now; if so, it counts as probed."""
         now_s = self._routes.now_s
         again_s = self._probed_s + parent.beacon.interval_s
         if not parent.usable or now_s < self._wanted_s(parent) or now_s <= again_s:
@@ -41,7 +41,7 @@ class ParentWatch:
         return True
 
     def due_s(self, parent: Neighbour) -> float:
-        """When that will be, if it stays silent, or does not name this node."""
+        """When the next probe is due if the parent neither sends nor names this node."""
         again_s = self._probed_s + parent.beacon.interval_s + 1e-3
         return max(self._wanted_s(parent), again_s)
 

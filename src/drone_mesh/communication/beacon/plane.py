@@ -27,12 +27,12 @@ from drone_mesh.communication.parts import NodeBasics
 from drone_mesh.communication.router_states import RouterEvent, RouterStates
 from drone_mesh.drone.location import Location
 
-LOOK_S = 0.2  # our choice: links change that slowly
-BIDS_WITHIN_S = 3.0  # our choice: routers that lose one parent notice it within two intervals
-WITHOUT_BEACONS_S = 5.0  # our choice: 2.5 of the longest intervals, and more
+LOOK_S = 0.2  # links change that slowly
+BIDS_WITHIN_S = 3.0  # routers that lose one parent notice it within two intervals
+WITHOUT_BEACONS_S = 5.0  # 2.5 of the longest intervals, and more
 MOVED = 0.05  # of the range: a drone that is further from where it stood flies; from where the
 # others expect it, it has turned
-DEAF_AGAIN_S = 10.0  # our choice: a neighbour that does not hear this node is asked so often
+DEAF_AGAIN_S = 10.0  # a neighbour that does not hear this node is asked so often
 DRIVER_TRIES = 4  # per hop: more delay the packet, which another neighbour may take at once
 
 
@@ -105,7 +105,7 @@ class BeaconPlane(IControlPlane):
         self._plan()
 
     def check(self, due_s: float) -> None:
-        """Everything is checked at its own time."""
+        """Does nothing: `on_time` checks each thing when it is due."""
 
     def on_power(self, on: bool) -> None:
         """Ask for the beacons of the neighbours; forget them when the antenna is off."""
@@ -125,7 +125,7 @@ class BeaconPlane(IControlPlane):
             self.on_power(True)
 
     def on_internet(self, works: bool) -> None:
-        """The next beacon says so, soon."""
+        """Tell the neighbours soon, in the next beacon."""
         self._set_time()
         before = self._routes.gateway
         self._routes.set_internet(works)
@@ -140,10 +140,10 @@ class BeaconPlane(IControlPlane):
         self._plan()
 
     def neighbour_leaves(self, neighbour: int) -> None:
-        """Its places and velocity show this in time."""
+        """Does nothing: the neighbour's place and velocity, or this node's own, show it in time."""
 
     def gateway_sent_place(self) -> None:
-        """Nothing depends on it."""
+        """Does nothing: no decision here waits for the gateway's place."""
 
     def _look_round(self) -> None:
         """Forget who is silent, choose the parent, tell the node what has changed."""
@@ -191,7 +191,7 @@ class BeaconPlane(IControlPlane):
         self._show()
 
     def _gateway_was(self, before: int) -> None:
-        """If it prefers another one now: report it, and forget where that one was."""
+        """Report another gateway than `before`, and forget the place of that one."""
         gateway = self._routes.gateway
         if before not in (gateway, NO_ROUTE):
             self._basics.report(MeshEventKind.GATEWAY_CHANGED, gateway)
@@ -279,7 +279,7 @@ class BeaconPlane(IControlPlane):
         return own is None or own.place.distance_m(place) <= LUCKY * self._basics.range_m
 
     def _consider(self, creator: int, beacon: Beacon, is_new: bool) -> None:
-        """What a neighbour's beacon changes."""
+        """Update what depends on a neighbour's new beacon."""
         routes, now_s = self._routes, self._routes.now_s
         self._look_s = now_s + LOOK_S
         self._basics.neighbours.named(beacon.named(), now_s)
@@ -305,7 +305,7 @@ class BeaconPlane(IControlPlane):
             neighbours.passes(node, beacon.motion.place, self._routes.now_s)
 
     def _take_gateway_place(self, node: int, beacon: Beacon) -> None:
-        """Where the gateway is, as it says itself or the parent does."""
+        """Store the gateway's place from its own beacon or the parent's."""
         places, now_s, place = self._basics.places, self._routes.now_s, beacon.gateway_place
         is_gateway = node == self._routes.gateway
         if is_gateway:
@@ -324,7 +324,7 @@ class BeaconPlane(IControlPlane):
             self._proofs.ask_soon()
 
     def receive_probe(self, payload: bytes, creator: int, from_: int) -> None:
-        """The radio has acknowledged it; a beacon spares the other children the same question."""
+        """Answer a probe by a beacon, so that the other children need not ask, too."""
         self._set_time()
         self._trickle.answer(self._routes.now_s, alone=True)
         self._plan()
@@ -346,7 +346,7 @@ class BeaconPlane(IControlPlane):
         return True
 
     def own_came_back(self, from_: int) -> None:
-        """The courier sends it another way."""
+        """Note that `from_` is alive; the courier sends the packet another way."""
         self._routes.now_s = self._deadlines.now_s
         self._routes.alive(from_)
 
@@ -355,7 +355,7 @@ class BeaconPlane(IControlPlane):
         return kind == MessageType.BEACON and names_gateway(payload)
 
     def on_delivered(self, neighbour: int, tries: int) -> None:
-        """It is alive, and hears this node."""
+        """Note that the neighbour is alive and hears this node."""
         self._took(neighbour)
 
     def on_undelivered(self, payload: bytes, tries: int) -> None:
@@ -396,11 +396,11 @@ class BeaconPlane(IControlPlane):
     # Searches --------------------------------------------------------------------------------
 
     def search(self, node: int) -> bool:
-        """A packet for a node without a route is held, and searched for by itself."""
+        """Starts nothing: the courier holds a packet without a route and searches by itself."""
         return False
 
     def receive_search(self, payload: bytes, creator: int, from_: int) -> None:
-        """Another node looks for one."""
+        """Answer or repeat another node's search."""
         self._set_time()
         if self._searches.heard(creator, from_, messages.body(payload)):
             me, found = self._me, Found(Search.from_body(messages.body(payload)).node)
@@ -410,7 +410,7 @@ class BeaconPlane(IControlPlane):
             )
 
     def receive_found(self, payload: bytes, creator: int, from_: int) -> None:
-        """A node that was looked for is that way."""
+        """Note that a node that was searched for is reached through `from_`."""
         self._set_time()
         node = Found.from_body(messages.body(payload)).node
         self._searches.found(node)
@@ -427,7 +427,7 @@ class BeaconPlane(IControlPlane):
 
     @property
     def hops(self) -> int:
-        """Hops to it; NO_ROUTE also if it has no internet, or does not hear this node."""
+        """Hops to the gateway; NO_ROUTE if it has no internet or does not hear this node."""
         _gateway, hops, offline = self._routes.shown
         return NO_ROUTE if offline else hops
 
@@ -436,11 +436,11 @@ class BeaconPlane(IControlPlane):
         return self._routes.parent
 
     def heard_s(self, node: int) -> float:
-        """When a packet of it came last over a relay, or a relay named it."""
+        """When a relay last brought a packet of `node` or named it."""
         return max(self._routes.led_s(node), self._below.known_s(node))
 
     def may_use(self, gateway: int) -> bool:
-        """Whether it is the preferred one."""
+        """Whether `gateway` is the preferred one."""
         return gateway == self._routes.gateway
 
     def end(self, event: RouterEvent) -> None:
@@ -449,7 +449,7 @@ class BeaconPlane(IControlPlane):
             self._connection.end(event)
 
     def give_up_routes(self) -> None:
-        """There are none."""
+        """Does nothing: beacons keep no routes that could be given up."""
 
 
 class BeaconTechnique(IControlTechnique):

@@ -16,9 +16,9 @@ from drone_mesh.communication.courier import Courier
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.parts import NodeBasics
 
-ASKS_S = 10.0  # our choice: at most so often for the place of a gateway that moves
-PERIOD_S = 60.0  # our choice: a router and its gateway tell each other the nonces of their seals
-AGAIN_S = 5.0  # our choice: until the gateway has answered twice
+ASKS_S = 10.0  # at most so often for the place of a gateway that moves
+PERIOD_S = 60.0  # a router and its gateway tell each other the nonces of their seals
+AGAIN_S = 5.0  # until the gateway has answered twice
 
 
 class Proofs:
@@ -38,7 +38,7 @@ class Proofs:
         self._proven: int | None = None  # the gateway that answered the last one
 
     def begin(self) -> None:
-        """A new gateway: many find it at the same moment, while handshakes fill the air."""
+        """Begin anew for another gateway, at a random moment: many nodes find it at once."""
         if self.has_key and not self._routes.is_root:
             self.due_s = self._routes.now_s + AGAIN_S * self._basics.rng.random()
 

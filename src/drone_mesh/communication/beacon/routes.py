@@ -32,17 +32,17 @@ _UNTIL_S = attrgetter("until_s")
 
 DUE = 1.2  # intervals, with their jitter: until then a neighbour's next beacon is not late
 BACK = 2  # sequence numbers: a new neighbour that is further behind the others may lead nowhere
-PROVEN_S = 12.0  # our choice: a router is connected for so long after its parent has heard it
+PROVEN_S = 12.0  # a router is connected for so long after its parent has heard it
 STALE = 5.0  # intervals: a neighbour whose number was not a new one for longer leads nowhere
 REACH = 0.97  # of the range: two nodes further apart are expected to lose each other
 NEEDS = 1.05  # of the range: a link that is longer is luck, and places are rounded
 LEAVES, GONE = 1.0, 3.0  # hops that a detour may cost around a link that will break, or should have
 ANOTHER_GATEWAY = 1.5  # hops that another gateway must be nearer
 UNPROVEN = 32.0  # hops: any gateway that proved to be one is nearer than one that did not
-TRIES = 4  # our choice: heartbeats in vain to one that did not, then another one gets its chance
+TRIES = 4  # heartbeats in vain to one that did not, then another one gets its chance
 MOST_DOUBTS = 7  # times UNPROVEN, which is less than OFFLINE
 OFFLINE = 256.0  # hops: any gateway with internet is nearer than one without
-SEEN_S = 10.0  # our choice: an older place of a node does not tell the way to it
+SEEN_S = 10.0  # an older place of a node does not tell the way to it
 NEAR = 2.0  # intervals: an older report that a neighbour hears a node shows no way to it
 HINT_S = 3.0  # a packet that came from a node shows the way to it for this long
 
@@ -233,7 +233,7 @@ class BeaconRoutes(IRoutes):
         return at_s
 
     def expired(self) -> list[int]:
-        """Forget the neighbours that were silent for too long; returns them."""
+        """Forget neighbours that were silent for too long, and return them."""
         if self.now_s <= self.first_end_s():
             return []
         old = [n.node for n in self.neighbours.values() if self.now_s > n.until_s]

@@ -9,13 +9,13 @@ from drone_mesh.communication.beacon.packets import Search
 from drone_mesh.communication.beacon.routes import BeaconRoutes
 from drone_mesh.communication.packet_types import MessageType
 
-AGAIN_S = 0.6  # our choice: broadcasts are not acknowledged
-MOST_HOPS = 12  # our choice
-HOPS_AROUND = 2  # our choice: of a search by a relay, which was near the node a moment ago
-SAME_S = 5.0  # our choice: far longer than a search takes to pass through a mesh
-MOST_IN_VAIN = 5  # our choice: searches in a row for a node
-PAUSE_S = 10.0  # our choice: after them
-GAP_HOPS = 400  # our choice: between two searches; each takes time on the air for every node
+AGAIN_S = 0.6  # broadcasts are not acknowledged
+MOST_HOPS = 12
+HOPS_AROUND = 2  # of a search by a relay, which was near the node a moment ago
+SAME_S = 5.0  # far longer than a search takes to pass through a mesh
+MOST_IN_VAIN = 5  # searches in a row for a node
+PAUSE_S = 10.0  # after them
+GAP_HOPS = 400  # between two searches; each takes time on the air for every node
 
 Broadcast = Callable[[int, int, bytes], None]
 

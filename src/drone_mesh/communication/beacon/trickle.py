@@ -8,12 +8,12 @@ import random
 from drone_mesh.communication.beacon.packets import INTERVAL_S
 from drone_mesh.communication.medium import Medium
 
-HOPS_PER_BEACON = 400  # our choice: a beacon takes half a hop, and ten neighbours send as many
-LEAST_S = 0.5  # our choice: of an interval
-RARER = 1.3  # our choice: factor between one interval and the next
-AT_REST_S = 1.6  # our choice: a dead parent is noticed in 1.3 of it, and another one chosen
-JITTER = 0.2  # our choice: part of an interval by which a beacon may be early or late
-SOON_HOPS = 12  # our choice: an urgent beacon waits for up to so many hops, as others wait too
+HOPS_PER_BEACON = 400  # a beacon takes half a hop, and ten neighbours send as many
+LEAST_S = 0.5  # of an interval
+RARER = 1.3  # factor between one interval and the next
+AT_REST_S = 1.6  # a dead parent is noticed in 1.3 of it, and another one chosen
+JITTER = 0.2  # part of an interval by which a beacon may be early or late
+SOON_HOPS = 12  # an urgent beacon waits for up to so many hops, as others wait too
 
 
 class Trickle:
@@ -51,7 +51,7 @@ class Trickle:
             self.due_s = min(self.due_s, now_s + self._least_s * self._rng.random())
 
     def hurry(self, now_s: float) -> None:
-        """Others must know of a change soon."""
+        """Send the next beacon soon, because others must know of a change."""
         self.reset(now_s)
         not_before_s = max(now_s, self._sent_s + 0.2 * self._least_s)
         self.due_s = min(self.due_s, not_before_s + self._soon_s * self._rng.random())

@@ -13,11 +13,11 @@ from drone_mesh.communication.deadlines import Deadlines, Due
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.packet_types import MessageType
 
-HELD_S = 2.5  # our choice: a packet without a next hop waits this long
-RETRY_S = 0.15  # our choice: so often it asks again, beside each beacon that arrives
-MOST_WAYS = 3  # our choice: to which one node sends a packet down; after that it searches
-SEARCHES_S = 0.6  # our choice: a relay without a way searches for so long, then returns a packet
-SUSPECTED_S = 30.0  # our choice: an order is repeated within 16 s
+HELD_S = 2.5  # a packet without a next hop waits this long
+RETRY_S = 0.15  # so often it asks again, beside each beacon that arrives
+MOST_WAYS = 3  # to which one node sends a packet down; after that it searches
+SEARCHES_S = 0.6  # a relay without a way searches for so long, then returns a packet
+SUSPECTED_S = 30.0  # an order is repeated within 16 s
 NOT_HELD = (MessageType.MOVEMENT_NEGOTIATION, MessageType.FOUND)  # soon sent again
 
 

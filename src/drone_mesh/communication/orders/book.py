@@ -19,13 +19,13 @@ from drone_mesh.communication.parts import NodeParts
 from drone_mesh.communication.text_parts import TextAssembly
 from drone_mesh.drone.location import Location
 
-OLD_ORDERS_KEPT = 100  # our choice: besides the latest of each drone
+OLD_ORDERS_KEPT = 100  # besides the latest of each drone
 HIGHEST_NUMBER = 2**16 - 1
-REPEAT_AFTER_S = (2.0, 4.0, 8.0, 16.0)  # our choice: pauses between tries without a reply
-FOUND_WITHIN_S = 1.0  # our choice: a search passes through 100 nodes within half a second
-MOST_SEARCHES = 3  # our choice: per order; the path that a search found may break at once
-QUERY_PERIOD_S = 15.0  # our choice: period of queries to a drone under way
-MOST_QUERIES = 20  # our choice: without an answer: five minutes
+REPEAT_AFTER_S = (2.0, 4.0, 8.0, 16.0)  # pauses between tries without a reply
+FOUND_WITHIN_S = 1.0  # a search passes through 100 nodes within half a second
+MOST_SEARCHES = 3  # per order; the path that a search found may break at once
+QUERY_PERIOD_S = 15.0  # period of queries to a drone under way
+MOST_QUERIES = 20  # without an answer: five minutes
 
 
 EVENT_OF = {
@@ -242,7 +242,7 @@ class OrderBook:
         self._move(order, OrderState.LOST_CONTACT, f"at {order.heard_s:.0f} s: {why}")
 
     def _replace(self, order: _Order, older: Iterable[_Order], for_good: bool = False) -> None:
-        """These orders for its drone end; `for_good`: whatever the drone still says of them."""
+        """End these older orders for the same drone; `for_good`: ignore later reports on them."""
         for other in older:
             if other is not order:
                 other.settled = for_good

@@ -19,10 +19,10 @@ from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused
 
-ORDERS_KEPT = 8  # our choice: more than the gateways that order one drone
-ARRIVED_WITHIN_M = 1.5  # our choice: a MAVLink drone has arrived within 1 m (drone/route.py)
-REPLY_AGAIN_S = 1.0  # our choice: how often a reply without a route is retried
-REPLY_TRIES = 120  # our choice: then the gateway queries
+ORDERS_KEPT = 8  # more than the gateways that order one drone
+ARRIVED_WITHIN_M = 1.5  # a MAVLink drone has arrived within 1 m (drone/route.py)
+REPLY_AGAIN_S = 1.0  # how often a reply without a route is retried
+REPLY_TRIES = 120  # then the gateway queries
 
 OwnReply = Callable[[int, OrderOutcome, str], None]
 """Receives replies of the gateway's own drone: order number, outcome, reason."""
@@ -109,7 +109,7 @@ class OrderIntake:
             self._send(unknown)
 
     def on_landed(self) -> None:
-        """A flight is over; if it was an ordered one, reply."""
+        """Reply to the order whose flight is over, if there was one."""
         orders = self._under_way()
         if not orders:
             return
@@ -127,7 +127,7 @@ class OrderIntake:
                 self._reply(order, OrderOutcome.GIVEN_UP, f"{why}; {off_m:.1f} m from the goal")
 
     def on_due(self) -> None:
-        """Send replies that had no route until now."""
+        """Send the replies that had no route before."""
         self._parts.deadlines.set(Due.ORDER_REPLIES, math.inf)
         for order in self._known:
             if order.tries_left:
