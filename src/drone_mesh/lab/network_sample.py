@@ -51,7 +51,7 @@ def _leads(network: Network, start: int, leads: dict[int, bool]) -> bool:
         step = nodes[node_id].component.get_route_to_gateway()
         if step == NO_ROUTE or step not in nodes or not nodes[step].antenna.powered:
             return False
-        if not _both_ways(network, node_id, step):
+        if step not in network.air.in_range(node_id) or not _both_ways(network, node_id, step):
             return False
         node_id = step
     result = leads[node_id]
@@ -61,10 +61,8 @@ def _leads(network: Network, start: int, leads: dict[int, bool]) -> bool:
 
 
 def _both_ways(network: Network, one: int, other: int) -> bool:
-    """Whether each of the two nodes could hear the other one."""
+    """Whether two nodes in range of each other are neither deaf nor mute to each other."""
     hears = network.air.hears
-    if other not in network.air.in_range(one):
-        return False
     return hears is None or (hears(one, other) and hears(other, one))
 
 
