@@ -37,7 +37,6 @@ setup(
             "*.csv",
             "*.html",
             "*.lua",
-            "*.pyi",
             "*.service",
             "*.yaml",
             "py.typed",

@@ -169,6 +169,7 @@ prepare_unit_tests() {
 
 prepare_checks() {
   prepare_unit_tests
+  "$venv/bin/python" "$root/scripts/message_stubs"
   pip_install requirements/checks.txt
   npm_install
 }

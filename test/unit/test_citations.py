@@ -94,8 +94,8 @@ def test_each_picture_is_shown_in_a_document():
 
 
 def test_a_citation_of_a_section_that_is_not_there_is_found():
-    assert wrong_citations('# docs/protocol.md, "Flight" and\n# "Landing gear"') == [
-        'docs/protocol.md, "Landing gear"'
+    assert wrong_citations('# docs/repair.md, "Flight" and\n# "Landing gear"') == [
+        'docs/repair.md, "Landing gear"'
     ]
     assert wrong_citations("see docs/nowhere.md") == ["docs/nowhere.md"]
-    assert wrong_citations('docs/protocol.md, "Lost connection", "Negotiation" and "Flight".') == []
+    assert wrong_citations('docs/repair.md, "Lost connection", "Negotiation" and "Flight".') == []

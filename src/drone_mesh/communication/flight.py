@@ -1,4 +1,4 @@
-"""The drone as the mesh sees it: its position and its flight (docs/protocol.md, "Flight")."""
+"""The drone as the mesh sees it: its position and its flight (docs/repair.md, "Flight")."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Requests for places, and what a drone in flight is told of others in answer to them.
 
 A REQUESTLOCATION, which its addressee answers with a LOCATION; and LAST_PLACE: where another node
-was last heard, for a drone that is about to land near there (docs/protocol.md, "Places of silent
+was last heard, for a drone that is about to land near there (docs/repair.md, "Places of silent
 drones").
 """
 

@@ -14,7 +14,7 @@ WRONG_FOR_S = 30.0
 
 
 class KnownPlaces:
-    """The places that a node might fly to (docs/protocol.md, "Places to step back to")."""
+    """The places that a node might fly to (docs/repair.md, "Places to step back to")."""
 
     def __init__(self) -> None:
         self.gateway: Location | None = None  # of the preferred gateway

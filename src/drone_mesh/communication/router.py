@@ -1,6 +1,6 @@
 """MeshnetworkRouter: keeps a connection to a gateway, and flies back if it is lost for too long.
 
-docs/protocol.md, "Connection" to "Flight". Its states and transitions are in `router_states`.
+docs/protocol.md, "Connection", and docs/repair.md. `router_states` has its states and transitions.
 """
 
 from __future__ import annotations

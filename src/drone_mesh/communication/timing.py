@@ -10,7 +10,7 @@ HEARTBEAT_ANSWER_S = 0.5  # at most one heartbeat to the gateway within this tim
 CIRCULATION_S = 0.5  # the same packet from another neighbour within this time circulates
 FLIGHT_POSITION_PERIOD_S = 1.0  # how often a flying node requests its position
 MIN_REPORT_PERIOD_S = 30.0  # docs/protocol.md, "Node reports"
-LANDED_WITHIN_M = 0.1  # docs/protocol.md, "Flight"
+LANDED_WITHIN_M = 0.1  # docs/repair.md, "Flight"
 
 
 @dataclass(frozen=True)

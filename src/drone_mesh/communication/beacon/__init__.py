@@ -1,5 +1,5 @@
 """Beacon: one broadcast per node and period decides neighbours, connection and routes.
 
-For drones that move (docs/protocol.md, "Beacons"). It needs no heartbeats, PRESENT and MISSING. It
+For drones that move (docs/beacons.md, "Beacons"). It needs no heartbeats, PRESENT and MISSING. It
 may call the node's parts, and implements `IControlPlane`.
 """

@@ -1,4 +1,4 @@
-"""OwnBeacons: what the next beacon of this node says (docs/protocol.md, "Beacons")."""
+"""OwnBeacons: what the next beacon of this node says (docs/beacons.md, "Beacons")."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The packets of the technique `beacon` (docs/protocol.md, "Beacons")."""
+"""The packets of the technique `beacon` (docs/beacons.md, "Beacons")."""
 
 from __future__ import annotations
 

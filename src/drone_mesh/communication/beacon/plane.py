@@ -1,4 +1,4 @@
-"""BeaconPlane: the control plane of one node by beacons (docs/protocol.md, "Beacons")."""
+"""BeaconPlane: the control plane of one node by beacons (docs/beacons.md, "Beacons")."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """BeaconRoutes: the neighbours of one node, its parent, and its ways to the others.
 
-docs/protocol.md, "Beacons", describes the rules.
+docs/beacons.md, "Beacons", describes the rules.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """GatewayConnection: how a router finds, keeps and assesses its gateway.
 
-docs/protocol.md, "Connection" and "Places to step back to".
+docs/protocol.md, "Connection"; docs/repair.md, "Places to step back to".
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from drone_mesh.communication.router_states import ConnectionState, RouterEvent,
 _HOPS_UNTIL_KNOWN = 10  # the number of hops for which to wait for the first answer
 RESIGNED_PERIODS = 2.5  # a gateway without internet that is silent for longer is lost
 NONCE_PERIODS = 5.0  # a gateway's nonce is valid for two minutes after it was told
-MAX_AGE_PERIODS = 3  # docs/protocol.md, "Places to step back to": of the gateway's place
+MAX_AGE_PERIODS = 3  # docs/repair.md, "Places to step back to": of the gateway's place
 
 
 class Shortcut(NamedTuple):

@@ -2,7 +2,7 @@
 
 On a shared channel, for its orders: a relay that loses a neighbour loses the routes to all nodes
 behind it, and learns new ones only from packets of those nodes. On a busy channel such a node may
-be silent for 25 s, so the gateway requests a packet from it (docs/protocol.md, "Shared channel").
+be silent for 25 s, so the gateway requests a packet from it (docs/shared-channel.md).
 On every medium, for users' data: the node may use another gateway (docs/protocol.md, "Users' data
 for unknown nodes").
 """

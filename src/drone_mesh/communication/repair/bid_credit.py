@@ -1,4 +1,4 @@
-"""BidCredit: decides which bids to trust (docs/protocol.md, "Negotiation").
+"""BidCredit: decides which bids to trust (docs/repair.md, "Negotiation").
 
 A key proves that a bid comes from the mesh, not that its creator exists or intends to fly: a
 captured node can relay bids of any number of others.

@@ -1,7 +1,7 @@
 """ConnectionRepair: repairs a router's connection by a strategy, once it is lost for too long.
 
 It notices the loss, waits, flies for the strategy, and keeps clear of other drones.
-docs/protocol.md, "Lost connection" and "Flight".
+docs/repair.md, "Lost connection" and "Flight".
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Elects the drone that flies, in a group without a gateway (docs/protocol.md, "Negotiation")."""
+"""Elects the drone that flies, in a group without a gateway (docs/repair.md, "Negotiation")."""
 
 from __future__ import annotations
 

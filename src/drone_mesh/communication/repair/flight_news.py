@@ -1,4 +1,4 @@
-"""FlightNews: flights of a node's group, as announced (docs/protocol.md, "Negotiation")."""
+"""FlightNews: flights of a node's group, as announced (docs/repair.md, "Negotiation")."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """GroupRepair: the drones of a group elect one that flies one step back.
 
-docs/protocol.md, "Negotiation". The score, defined by each derived strategy, decides which one.
+docs/repair.md, "Negotiation". The score, defined by each derived strategy, decides which one.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from drone_mesh.communication.repair.spots import NEAR, PITCH
 from drone_mesh.communication.router_states import RepairState, RouterEvent
 from drone_mesh.drone.location import Location
 
-PLACES_WITHIN_S = 1.0  # docs/protocol.md, "Negotiation": how long to wait for places
+PLACES_WITHIN_S = 1.0  # docs/repair.md, "Negotiation": how long to wait for places
 SETTLE_S = 0.5  # a bid takes some milliseconds per hop; enough for 50 hops
-TAKE_OFF_WITHIN_S = 5.0  # docs/protocol.md, "Negotiation": then the winner is passed over
-ROUNDS_WITHOUT_FLIER = 2  # docs/protocol.md, "Negotiation": then the second choice counts
+TAKE_OFF_WITHIN_S = 5.0  # docs/repair.md, "Negotiation": then the winner is passed over
+ROUNDS_WITHOUT_FLIER = 2  # docs/repair.md, "Negotiation": then the second choice counts
 LATER_ROUNDS = 1.0 / 3.0  # of the patience: a step back takes about 5 s
 HOME_FAILED_ROUNDS = 20  # then another drone tries; its radio may hear the gateway
-HOME_AGAIN_S = 60.0  # docs/protocol.md, "Negotiation": between flights of a group to a gateway
+HOME_AGAIN_S = 60.0  # docs/repair.md, "Negotiation": between flights of a group to a gateway
 
 IN_A_ROUND = (RepairState.ASKING, RepairState.NEGOTIATING, RepairState.WATCHING)
 

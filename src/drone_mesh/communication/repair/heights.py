@@ -1,4 +1,4 @@
-"""The heights at which repairs end (docs/protocol.md, "Places of silent drones")."""
+"""The heights at which repairs end (docs/repair.md, "Places of silent drones")."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """LoneRepair: a drone that hears no node flies one step, and back if it hears none there either.
 
-docs/protocol.md, "Lost connection". A drone whose neighbours all fell silent together cannot know
+docs/repair.md, "Lost connection". A drone whose neighbours all fell silent together cannot know
 whether they died or its medium is down. A radio that measures power in its channel knows more: it
 is being jammed, and a flight would not help.
 """

@@ -1,6 +1,6 @@
 """TakenPlaces: where other drones stand, or may still hang in the air without a radio.
 
-docs/protocol.md, "Places of silent drones".
+docs/repair.md, "Places of silent drones".
 """
 
 from __future__ import annotations

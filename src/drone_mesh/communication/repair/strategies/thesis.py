@@ -1,6 +1,6 @@
 """Thesis: the group elects the drone that is farthest from the gateway, and it flies one step back.
 
-The rule of the Software Design Document of 2019, corrected; docs/protocol.md, "Negotiation".
+The rule of the Software Design Document of 2019, corrected; docs/repair.md, "Negotiation".
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ class Thesis(GroupRepair):
     bid_unit = "m"
 
     def _score(self, step: Step) -> float:
-        """Distance to the gateway's place in metres, or NO_BID (docs/protocol.md, "Negotiation").
+        """Distance to the gateway's place in metres, or NO_BID (docs/repair.md, "Negotiation").
 
         Without one, as while its mesh passes from one gateway to another: to where it would fly.
         For the second choice the nearest drone flies, unless another one has a first choice.
