@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Iterable, NamedTuple
+from typing import Iterable, Iterator, NamedTuple
 
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.seen_motion import FLIGHT_S, SeenMotion
@@ -44,6 +44,7 @@ class Neighbours:
         self._hops: dict[int, int] = {}
         self._places: dict[int, HeardPlace] = {}
         self._goals_s: dict[int, float] = {}  # when those in flight told their goal, their place
+        self._seen: dict[int, HeardPlace] = {}  # where these were seen since, perhaps for good
         self.silent = False  # all neighbours (2 or more) fell silent together; none heard since
 
     def heard(self, node: int, now_s: float) -> bool:
@@ -160,6 +161,7 @@ class Neighbours:
         known = self._places.get(node)
         if known is None or heard_s >= known.heard_s:
             self._goals_s.pop(node, None)
+            self._seen.pop(node, None)
             if is_goal:
                 self._goals_s[node] = heard_s
             self._places[node] = HeardPlace(place, heard_s)
@@ -167,13 +169,23 @@ class Neighbours:
                 self.motion.reported(node, place, heard_s)
 
     def passes(self, node: int, place: Location, heard_s: float) -> None:
-        """Note that `node` was at `place`; while it flies, its announced goal counts instead."""
+        """Note that `node` was at `place`; while it flies, its announced goal counts, too.
+
+        It may have ended its flight there, and fallen silent.
+        """
         if heard_s - self._goals_s.get(node, -math.inf) > FLIGHT_S:
             self.set_place(node, place, heard_s)
+        elif node in self._goals_s and heard_s > self._goals_s[node]:
+            self._seen[node] = HeardPlace(place, heard_s)
 
     def place_of(self, node: int) -> HeardPlace | None:
         """The last reported place of `node`."""
         return self._places.get(node)
+
+    def taken(self) -> Iterator[tuple[int, HeardPlace]]:
+        """Where each node may be: its reported place, and where it was seen on the way there."""
+        yield from self._places.items()
+        yield from self._seen.items()
 
     def places(self) -> dict[int, HeardPlace]:
         """All reported places, by node. Do not modify."""

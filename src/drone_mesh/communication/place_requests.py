@@ -64,12 +64,11 @@ class LastPlace(NamedTuple):
 def tell_last_places(parts: NodeParts, asker: int, goal: Location, clearance_m: float) -> None:
     """Tell a drone in flight which nodes were last heard near its goal: it may not hear them."""
     near = sorted(
-        (heard.place.distance_m(goal), node)
-        for node, heard in parts.neighbours.places().items()
+        (heard.place.distance_m(goal), node, heard)
+        for node, heard in parts.neighbours.taken()
         if node not in (asker, parts.node_id)
     )
-    for away_m, node in near[:MOST_TOLD]:
-        heard = parts.neighbours.place_of(node)
-        if heard is not None and away_m < NEAR_CLEARANCES * clearance_m:
+    for away_m, node, heard in near[:MOST_TOLD]:
+        if away_m < NEAR_CLEARANCES * clearance_m:
             last = LastPlace(node, heard.place, parts.now_s - heard.heard_s)
             parts.delivery.send_own(last.packet(parts.node_id, asker))

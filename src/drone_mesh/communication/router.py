@@ -156,6 +156,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
         heard = self._neighbours.place_of(last.node)
         if heard is not None:
             self._repair.on_taken(heard.place)
+        self._repair.on_taken(last.place)
 
     def receive_gateway_place(self, payload: bytes, _creator: int, _from: int) -> None:
         """Where a gateway was, in a mesh with a key."""

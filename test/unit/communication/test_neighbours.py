@@ -54,6 +54,15 @@ def test_the_goal_of_a_drone_in_flight_counts_although_it_is_seen_on_the_way(nei
     assert neighbours.place_of(2).place == GOAL
 
 
+def test_where_it_was_seen_on_the_way_counts_beside_its_goal(neighbours):
+    """It may have stopped there, and fallen silent."""
+    neighbours.set_place(2, GOAL, 101.0, is_goal=True)
+    neighbours.passes(2, ON_THE_WAY, 102.0)
+    assert [heard.place for _node, heard in neighbours.taken()] == [GOAL, ON_THE_WAY]
+    neighbours.set_place(2, GOAL, 103.0)
+    assert [heard.place for _node, heard in neighbours.taken()] == [GOAL]
+
+
 def test_where_it_is_seen_counts_once_it_tells_no_goal_any_more(neighbours):
     neighbours.set_place(2, GOAL, 101.0, is_goal=True)
     neighbours.passes(2, ON_THE_WAY, 112.0)

@@ -32,7 +32,7 @@ class TakenPlaces:
         exact = self._options.lost_place is LostPlace.EXACT
         return kept_free + [
             above_ground(heard.place)
-            for node, heard in self._parts.neighbours.places().items()
+            for node, heard in self._parts.neighbours.taken()
             if node != me and not (exact and now_s - heard.heard_s > FRESH_S)
         ]
 
