@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGES = {name: (ROOT / "docs" / name).read_text("utf-8") for name in ("protocol.md", "wire.md")}
+PAGES = {name: (ROOT / "docs" / name).read_text("utf-8") for name in ("protocol.md", "repair.md", "wire.md")}
 
 
 @pytest.mark.slow
@@ -29,7 +29,7 @@ def test_the_diagrams_are_those_of_the_code():
         ("protocol.md", "    searching --> awaiting_the_first_answer: heartbeat sent"),
         ("protocol.md", "    2->>1: PRESENT to all"),
         ("protocol.md", "    Note over 2: connected"),
-        ("protocol.md", "    Note over 2: flight decided"),
+        ("repair.md", "    Note over 2: flight decided"),
         ("wire.md", "| creator | from | type | to | forward | latitude |"),
     ],
 )
