@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGES = {name: (ROOT / "docs" / name).read_text("utf-8") for name in ("protocol.md", "repair.md", "wire.md")}
+NAMES = ("protocol.md", "repair.md", "wire.md")
+PAGES = {name: (ROOT / "docs" / name).read_text("utf-8") for name in NAMES}
 
 
 @pytest.mark.slow
