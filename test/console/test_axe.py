@@ -58,6 +58,7 @@ def test_axe_finds_no_violation(start_console, visit, size):
     check(page, "the question before a long flight")
     page.page.evaluate(KEEP_HELD)
     page.page.click("#confirm >> text=Send")
+    page.page.click("#confirm:has-text('gateway') >> text=Send")
     page.wait_for("a held order", lambda: page.page.is_visible("#held"))
     check(page, "a held order")
     page.page.click("#held-undo")
