@@ -37,7 +37,7 @@ class InstallSpaceTest(unittest.TestCase):
         }
         found = self.output("rospack find drone_mesh; rosrun drone_mesh lab --help")
         self.assertIn(str(self.setup.parent / "share" / "drone_mesh"), found)
-        self.assertIn("usage: lab", found)
+        self.assertIn("usage: rosrun drone_mesh lab", found)
         launch = self.start("roslaunch drone_mesh factory.launch routers:=2 spacing:=6")
         try:
             connected = "2 of 2 routers connected"

@@ -48,6 +48,7 @@ class WorldRestartTest(unittest.TestCase):
                 [1, 3],
                 [Location(5.0, 5.0, 0), Location(8.0, 8.0, 0)],
                 False,
+                [],
             )
             mesh.wait_at(1, 5.0, 5.0, within_s=60)
             mesh.pass_time(40)

@@ -6,13 +6,13 @@ import os
 import sys
 from pathlib import Path
 
-_INSTALLED = "drone-mesh-lab"
+_BY_FILE = {"drone-mesh-lab": "drone-mesh-lab", "lab": "rosrun drone_mesh lab"}
 
 
 def _program() -> str:
     if "DRONE_MESH_LAB" in os.environ:  # by scripts/lab, which needs no installed package
         return os.environ["DRONE_MESH_LAB"]
-    return _INSTALLED if Path(sys.argv[0]).name == _INSTALLED else "python3 -m drone_mesh.lab"
+    return _BY_FILE.get(Path(sys.argv[0]).name, "python3 -m drone_mesh.lab")
 
 
 PROGRAM = _program()
