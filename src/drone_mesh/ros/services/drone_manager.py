@@ -325,10 +325,10 @@ def _check_apart(orders: Sequence[Order]) -> None:
 
 def main() -> None:
     """Run the node."""
-    start_node(DroneManager.__doc__, "DroneManager", disable_signals=True)
-    show_library_logs_on_rosout()
-    layouts = or_exit(lambda: manager_layouts("~casus"))
-    with OrderlyStop() as stop:
+    with OrderlyStop() as stop:  # first: rospy may swallow the KeyboardInterrupt of a Ctrl-C
+        start_node(DroneManager.__doc__, "DroneManager", disable_signals=True)
+        show_library_logs_on_rosout()
+        layouts = or_exit(lambda: manager_layouts("~casus"))
         DroneManager(layouts, stop.begin_anew)
         file = rospy.get_param("~casus", "") or "config/casus.yaml of this package"
         _log.info("%d layouts: built-in ones, and those of %s", len(layouts.cases), file)
