@@ -41,7 +41,7 @@ def _end_without_dead_master() -> None:
 
 
 class OrderlyStop:
-    """Context manager around a node's work, after init_node(..., disable_signals=True).
+    """Context manager around a node's work; its init_node needs disable_signals=True.
 
     rospy would close all topics as soon as Ctrl-C is pressed, while threads still publish. Instead,
     SIGINT, SIGTERM and `rosnode kill` only ask the main thread to leave the `with` block, in which
