@@ -1,47 +1,82 @@
-"""Builds a mesh component, in the same way for every host."""
+"""Builds a node of the mesh, in the same way for every host."""
 
 from __future__ import annotations
 
 import random
-from typing import TYPE_CHECKING
+from typing import Callable, NamedTuple
 
 from drone_mesh.communication.component import MeshnetworkComponent
 from drone_mesh.communication.gateway import MeshnetworkGateway
-from drone_mesh.communication.interfaces import IInternetConnection, IWirelessCommunication
-from drone_mesh.communication.mesh_node import NodeSettings
-from drone_mesh.communication.named_techniques import (
-    DEFAULT_ROUTING,
-    create_routing_technique,
+from drone_mesh.communication.interfaces import (
+    IInternetConnection,
+    IMeshNetwork,
+    IWirelessCommunication,
 )
-from drone_mesh.communication.repair.interfaces import IRepairStrategy
+from drone_mesh.communication.mesh_node import NodeSettings
+from drone_mesh.communication.named_techniques import create_routing_technique
+from drone_mesh.communication.node_configuration import NodeConfiguration
+from drone_mesh.communication.observer import MeshObserver, ignore_events
 from drone_mesh.communication.repair.named_strategies import create_repair_strategy
-from drone_mesh.communication.repair.options import DEFAULT_REPAIR
 from drone_mesh.communication.router import MeshnetworkRouter
-from drone_mesh.communication.ways import ITechnique
+from drone_mesh.communication.seals.keys import Keys
+from drone_mesh.communication.seals.sealed_antenna import SealedAntenna
 from drone_mesh.drone.interfaces import IDroneEngine
 
-if TYPE_CHECKING:
-    from typing_extensions import Unpack
+AS_IN_THE_DOCUMENT = NodeConfiguration()
 
 
-def assemble_component(
+class Security(NamedTuple):
+    """What the seals of a node need (docs/security.md)."""
+
+    keys: Keys
+    clock: Callable[[], float]  # seconds, of the thread that drives the component
+    rng: random.Random = random.SystemRandom()  # draws epochs and nonces
+
+
+class AssembledNode(NamedTuple):
+    """A node that is not started yet."""
+
+    component: MeshnetworkComponent
+    receiver: IMeshNetwork  # takes what the antenna receives: the component, or its seals
+
+
+def assemble_node(
     node_id: int,
     antenna: IWirelessCommunication,
     engine: IDroneEngine,
     rng: random.Random,
+    configuration: NodeConfiguration = AS_IN_THE_DOCUMENT,
     *,
     internet: IInternetConnection | None = None,
-    routing: str | ITechnique = DEFAULT_ROUTING,
-    repair: str | IRepairStrategy = DEFAULT_REPAIR,
-    **settings: Unpack[NodeSettings],
-) -> MeshnetworkComponent:
-    """A gateway if `internet` is given, otherwise a router; not started yet.
+    security: Security | None = None,
+    observer: MeshObserver = ignore_events,
+    debug: bool = True,
+) -> AssembledNode:
+    """A gateway if `internet` is given, otherwise a router; sealed if `security` is given.
 
-    `routing` is a routing technique or its name, `repair` a repair strategy or its name. Raises
-    ConfigurationError for an unknown name and ValueError for a node id outside 0..253.
+    `rng`, `observer` and `debug` as for MeshNode. Raises ValueError for a node id outside 0..253.
     """
-    technique = create_routing_technique(routing) if isinstance(routing, str) else routing
+    seals = None
+    if security is not None:
+        keys, clock, seal_rng = security
+        antenna = seals = SealedAntenna(
+            antenna, node_id, keys, seal_rng, clock, configuration.timing
+        )
+    settings: NodeSettings = {
+        "timing": configuration.timing,
+        "options": configuration.repair_options,
+        "observer": observer,
+        "debug": debug,
+    }
+    technique = create_routing_technique(configuration.routing)
+    component: MeshnetworkComponent
     if internet is None:
-        strategy = create_repair_strategy(repair) if isinstance(repair, str) else repair
-        return MeshnetworkRouter(node_id, antenna, engine, technique, rng, strategy, **settings)
-    return MeshnetworkGateway(node_id, antenna, engine, technique, internet, rng, **settings)
+        strategy = create_repair_strategy(configuration.repair)
+        component = MeshnetworkRouter(
+            node_id, antenna, engine, technique, rng, strategy, **settings
+        )
+    else:
+        component = MeshnetworkGateway(
+            node_id, antenna, engine, technique, internet, rng, **settings
+        )
+    return AssembledNode(component, seals or component)

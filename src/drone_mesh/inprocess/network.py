@@ -9,25 +9,18 @@ from typing import Callable, Iterable, Mapping
 
 from drone_mesh.air.graph import hops_from
 from drone_mesh.air.reach import MAX_DISTANCE_M
-from drone_mesh.communication.assembly import assemble_component
+from drone_mesh.communication.assembly import Security, assemble_node
 from drone_mesh.communication.data.echo import OnEchoAnswer
 from drone_mesh.communication.data.ticket import Ticket
 from drone_mesh.communication.data.transport import ReceivedMessage
 from drone_mesh.communication.gateway import MeshnetworkGateway
-from drone_mesh.communication.interfaces import (
-    NO_ROUTE,
-    IWirelessCommunication,
-)
-from drone_mesh.communication.named_techniques import (
-    DEFAULT_ROUTING,
-    create_routing_technique,
-)
+from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.named_techniques import DEFAULT_ROUTING
+from drone_mesh.communication.node_configuration import NodeConfiguration
 from drone_mesh.communication.observer import MeshEvent
 from drone_mesh.communication.repair.interfaces import IRepairStrategy
-from drone_mesh.communication.repair.named_strategies import create_repair_strategy
 from drone_mesh.communication.repair.options import DEFAULT_REPAIR, RepairOptions
 from drone_mesh.communication.seals.keys import Keys
-from drone_mesh.communication.seals.sealed_antenna import SealedAntenna
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.communication.ways import ITechnique
 from drone_mesh.drone.fleet import (
@@ -102,14 +95,14 @@ class Network:
         """
         self._seed = seed
         self._rng = random.Random(seed)
-        self._timing = timing
         self._routing = routing
         self._repair = repair
-        if repair != ORACLE:
-            create_repair_strategy(repair)  # raises here, not per node
-        if routing != SHORTEST_PATH:
-            create_routing_technique(routing)
-        self._repair_options = repair_options
+        self._configuration = NodeConfiguration(
+            DEFAULT_ROUTING if routing == SHORTEST_PATH else routing,
+            DEFAULT_REPAIR if repair == ORACLE else repair,
+            timing or MeshTiming(),
+            repair_options or RepairOptions(),
+        )
         self._key = key
         self._positions = positions or PositionErrors()
         self.air: IInProcessAir
@@ -187,40 +180,42 @@ class Network:
 
     def _install(self, node: InProcessNode, node_id: int) -> None:
         """The mesh software of one node."""
-        antenna: IWirelessCommunication = node.antenna
-        keys = self._key(node_id) if callable(self._key) else self._key
-        if keys is not None:
-            antenna = self._sealed(node.antenna, node_id, keys)
-        node.component = assemble_component(
+        node.component, node.receiver = assemble_node(
             node_id,
-            antenna,
+            node.antenna,
             self._engine(node, node_id),
             random.Random(self._rng.random()),
+            self._configuration_of(node_id),
             internet=NoInternet() if node.is_gateway else None,
-            routing=self._technique(node_id),
-            timing=self._timing,
+            security=self._security(node_id),
             observer=self._observe,
-            repair=self._make_repair(),
-            options=self._repair_options,
         )
         node.component.data.on_received(functools.partial(self._receive, node_id))
         node.deadlines = node.component.deadlines
-        node.receiver = antenna if isinstance(antenna, SealedAntenna) else node.component
 
-    def _sealed(self, antenna: IWirelessCommunication, node_id: int, keys: Keys) -> SealedAntenna:
+    def _security(self, node_id: int) -> Security | None:
+        keys = self._key(node_id) if callable(self._key) else self._key
+        if keys is None:
+            return None
         rng = random.Random(f"{self._seed} seal {node_id} {self.now_s()}")  # new at each start
-        return SealedAntenna(antenna, node_id, keys, rng, self.now_s, self._timing)
+        return Security(keys, self.now_s, rng)
+
+    def _configuration_of(self, node_id: int) -> NodeConfiguration:
+        """That of all nodes, except for the bounds, which know the whole network."""
+        configuration = self._configuration
+        if self._routing == SHORTEST_PATH:
+            path = functools.partial(ShortestPath, self._link_map, node_id)
+            configuration = replace(configuration, routing=path)
+        if self._repair == ORACLE:
+            oracle = functools.partial(Oracle, self._places_of_connected)
+            configuration = replace(configuration, repair=oracle)
+        return configuration
 
     def _engine(self, node: InProcessNode, node_id: int) -> IDroneEngine:
         if self._positions.none:
             return node.drone
         rng = random.Random(f"{self._seed} position {node_id}")
         return PositionReceiver(node.drone, self.clock, self._positions, rng)
-
-    def _technique(self, node_id: int) -> ITechnique:
-        if self._routing == SHORTEST_PATH:
-            return ShortestPath(self._link_map, node_id)
-        return create_routing_technique(self._routing)
 
     @property
     def sealed(self) -> bool:
@@ -385,11 +380,6 @@ class Network:
                 return None
             path.append(step)
         return path
-
-    def _make_repair(self) -> IRepairStrategy:
-        if self._repair == ORACLE:
-            return Oracle(self._places_of_connected)
-        return create_repair_strategy(self._repair)
 
     def _places_of_connected(self) -> dict[int, Location]:
         return {

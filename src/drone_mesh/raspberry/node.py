@@ -10,10 +10,9 @@ import time
 from typing import Any, Callable
 
 from drone_mesh.channel.antenna import DEBUG_PERIOD_S
-from drone_mesh.communication.assembly import assemble_component
+from drone_mesh.communication.assembly import Security, assemble_node
 from drone_mesh.communication.gateway import MeshnetworkGateway
-from drone_mesh.communication.interfaces import IInternetConnection, IWirelessCommunication
-from drone_mesh.communication.seals.sealed_antenna import SealedAntenna
+from drone_mesh.communication.interfaces import IInternetConnection
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError, LocationUnknown
@@ -70,7 +69,7 @@ class RadioNode:
         self.events = EventHistory() if events is None else events
         self._changes: NodeChanges | None = None
         if make_internet is not None and events is None:  # the others run in other programs
-            check_s = options.timing.check_period_s
+            check_s = options.mesh.timing.check_period_s
             self._changes = NodeChanges(radio.node_id, check_s, self.events.observe)
         self.users = UsersDesk(radio.node_id, self._slot.submit)
         self._socket: LocalSocket | None = None
@@ -80,26 +79,14 @@ class RadioNode:
         except ConfigurationError as error:
             self.why_no_socket = str(error)
         self._internet = None if make_internet is None else make_internet(self)
-        antenna: IWirelessCommunication = self._antenna
-        if options.keys is not None:
-            antenna = SealedAntenna(
-                antenna,
-                radio.node_id,
-                options.keys,
-                random.SystemRandom(),
-                time.monotonic,
-                options.timing,
-            )
-        self.component = assemble_component(
+        self.component, _receiver = assemble_node(
             radio.node_id,
-            antenna,
+            self._antenna,
             engine,
             random.Random(),
+            options.mesh,
             internet=self._internet,
-            routing=options.routing,
-            repair=options.repair,
-            options=options.repair_options,
-            timing=options.timing,
+            security=None if options.keys is None else Security(options.keys, time.monotonic),
             observer=self.events.observe,
             debug=options.debug_period_s > 0.0,
         )

@@ -11,14 +11,9 @@ from typing import Mapping, Sequence
 from drone_mesh.arguments import decimal, whole
 from drone_mesh.channel.antenna import DEBUG_PERIOD_S
 from drone_mesh.communication.interfaces import MAX_NODE_ID
-from drone_mesh.communication.named_techniques import (
-    ROUTING_TECHNIQUES,
-    create_routing_technique,
-)
-from drone_mesh.communication.repair.named_strategies import (
-    REPAIR_STRATEGIES,
-    create_repair_strategy,
-)
+from drone_mesh.communication.named_techniques import DEFAULT_ROUTING, ROUTING_TECHNIQUES
+from drone_mesh.communication.node_configuration import NodeConfiguration
+from drone_mesh.communication.repair.named_strategies import REPAIR_STRATEGIES
 from drone_mesh.communication.repair.options import DEFAULT_REPAIR, LostPlace, RepairOptions
 from drone_mesh.communication.seals.key_file import read_key_file
 from drone_mesh.communication.seals.keys import MeshKey, NodeKeys
@@ -57,10 +52,7 @@ class Options:
     node_id: int
     hardware: Hardware
     radio: RadioSettings
-    timing: MeshTiming
-    routing: str
-    repair: str
-    repair_options: RepairOptions
+    mesh: NodeConfiguration
     location: Location | None  # None: not known
     flight: FlightOptions
     air: AirOptions  # an emulated air that several processes share
@@ -188,7 +180,7 @@ def _parser(program: str, description: str) -> argparse.ArgumentParser:
     )
     mesh.add_argument(
         "--routing",
-        default="child_table_tree",
+        default=DEFAULT_ROUTING,
         help=f"routing technique: {', '.join(sorted(ROUTING_TECHNIQUES))}, or package.module:Class "
         "(default: %(default)s)",
     )
@@ -295,8 +287,6 @@ def _options(
     try:
         if location is not None:
             check_goal(*location)
-        create_routing_technique(parsed.routing)
-        create_repair_strategy(parsed.repair)
         return Options(
             node_id=parsed.id or 0,
             hardware=wired_hardware(parsed),
@@ -307,17 +297,19 @@ def _options(
                 crc_bytes=parsed.crc // 8,
                 broadcast_mode=_BROADCASTS[parsed.broadcast],
             ),
-            timing=MeshTiming(
-                parsed.check_period,
-                parsed.connection_lost_after,
-                report_period_s=parsed.report_period,
-            ),
-            routing=parsed.routing,
-            repair=parsed.repair,
-            repair_options=RepairOptions(
-                clearance_m=parsed.clearance,
-                range_m=parsed.range,
-                lost_place=LostPlace(parsed.lost_place),
+            mesh=NodeConfiguration(
+                parsed.routing,
+                parsed.repair,
+                MeshTiming(
+                    parsed.check_period,
+                    parsed.connection_lost_after,
+                    report_period_s=parsed.report_period,
+                ),
+                RepairOptions(
+                    clearance_m=parsed.clearance,
+                    range_m=parsed.range,
+                    lost_place=LostPlace(parsed.lost_place),
+                ),
             ),
             location=location,
             flight=flight_options(parsed),

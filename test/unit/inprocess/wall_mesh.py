@@ -6,7 +6,7 @@ import random
 import time
 from typing import Callable
 
-from drone_mesh.communication.assembly import assemble_component
+from drone_mesh.communication.assembly import assemble_node
 from drone_mesh.communication.component import MeshnetworkComponent
 from drone_mesh.drone.ground import GroundEngine
 from drone_mesh.drone.location import Location
@@ -44,7 +44,7 @@ class WallMesh:
         )
         slot = self._executor.slot()
         antenna = NRF24HighLevelInterface(radio, slot.submit)
-        component = assemble_component(
+        component, _receiver = assemble_node(
             node_id,
             antenna,
             GroundEngine(node_id, Location.from_vector((x, y, 0.0))),

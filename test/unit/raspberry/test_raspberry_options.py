@@ -6,6 +6,7 @@ import re
 
 import pytest
 
+from drone_mesh.communication.node_configuration import NodeConfiguration
 from drone_mesh.communication.repair.options import LostPlace, RepairOptions
 from drone_mesh.communication.seals.key_file import write_key_file
 from drone_mesh.communication.seals.keys import MeshKey
@@ -28,10 +29,12 @@ def test_a_router_needs_only_its_id_and_has_the_documented_settings():
         node_id=3,
         hardware=Hardware((0, 0), ce_gpio=25, irq_gpio=None),
         radio=RadioSettings(),
-        timing=MeshTiming(report_period_s=30.0),
-        routing="child_table_tree",
-        repair="thesis",
-        repair_options=RepairOptions(clearance_m=5.0, range_m=100.0),
+        mesh=NodeConfiguration(
+            "child_table_tree",
+            "thesis",
+            MeshTiming(report_period_s=30.0),
+            RepairOptions(clearance_m=5.0, range_m=100.0),
+        ),
         location=None,
         flight=FlightOptions(),
         air=AirOptions(),
@@ -126,10 +129,12 @@ def test_each_option_reaches_what_it_is_for():
             crc_bytes=1,
             broadcast_mode=BroadcastMode.SHOCKBURST,
         ),
-        timing=MeshTiming(5.0, 60.0, report_period_s=45.0),
-        routing="drone_mesh.communication.routing.child_table_tree:ChildTableTree",
-        repair="home",
-        repair_options=RepairOptions(3.0, 40.0, LostPlace.ABOVE),
+        mesh=NodeConfiguration(
+            "drone_mesh.communication.routing.child_table_tree:ChildTableTree",
+            "home",
+            MeshTiming(5.0, 60.0, report_period_s=45.0),
+            RepairOptions(3.0, 40.0, LostPlace.ABOVE),
+        ),
         location=Location(latitude=10.0, longitude=-20.5, height=3.0),
         flight=FlightOptions(
             "mavlink:/dev/serial0,921600",

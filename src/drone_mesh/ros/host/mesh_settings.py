@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from drone_mesh.air.obstacles import Obstacles
-from drone_mesh.communication.named_techniques import create_routing_technique
-from drone_mesh.communication.repair.named_strategies import create_repair_strategy
+from drone_mesh.communication.node_configuration import NodeConfiguration
 from drone_mesh.communication.repair.options import LostPlace, RepairOptions
 from drone_mesh.communication.seals.key_file import read_key_file
 from drone_mesh.communication.seals.keys import MeshKey
@@ -25,8 +24,7 @@ class MeshSettings:
 
     configuration: FactoryConfiguration
     run: Run
-    repair_options: RepairOptions
-    timing: MeshTiming
+    node: NodeConfiguration
     obstacles: Obstacles | None
     broker: Broker  # with "mqtt"
     key: MeshKey | None  # None: packets are not sealed
@@ -39,20 +37,22 @@ class MeshSettings:
 
         `obstacles`: nodes refuse orders to places that these make unreachable.
         """
-        create_routing_technique(configuration.routing)  # fail once here instead of once per node
-        create_repair_strategy(configuration.repair)
         return cls(
             configuration,
             run,
-            repair_options=RepairOptions(
-                clearance_m=configuration.clearance,
-                range_m=configuration.max_distance,
-                lost_place=LostPlace(configuration.lost_place),
-            ),
-            timing=MeshTiming(
-                configuration.check_period,
-                configuration.connection_lost_after,
-                report_period_s=configuration.report_period,
+            NodeConfiguration(
+                configuration.routing,
+                configuration.repair,
+                MeshTiming(
+                    configuration.check_period,
+                    configuration.connection_lost_after,
+                    report_period_s=configuration.report_period,
+                ),
+                RepairOptions(
+                    clearance_m=configuration.clearance,
+                    range_m=configuration.max_distance,
+                    lost_place=LostPlace(configuration.lost_place),
+                ),
             ),
             obstacles=obstacles,
             key=_mesh_key(configuration.key),

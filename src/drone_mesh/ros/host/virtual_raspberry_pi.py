@@ -6,10 +6,9 @@ import abc
 import random
 from typing import Callable, ClassVar
 
-from drone_mesh.communication.assembly import assemble_component
+from drone_mesh.communication.assembly import Security, assemble_node
 from drone_mesh.communication.interfaces import IInternetConnection, IWirelessCommunication
 from drone_mesh.communication.observer import MeshObserver, Observers
-from drone_mesh.communication.seals.sealed_antenna import SealedAntenna
 from drone_mesh.drone.roles import Role
 from drone_mesh.execution import ExecutorSlot
 from drone_mesh.internet import DEFAULT_PORT
@@ -45,7 +44,6 @@ class VirtualRaspberryPi(abc.ABC):
         """`why_not_fly` and `silent` as for RosDroneEngineConnector.
 
         Raises ConfigurationError for a routing technique that does not exist."""
-        configuration = settings.configuration
         self.node_id = node_id
         self.engine = RosDroneEngineConnector(
             node_id, settings.run, why_not_fly, silent, settings.obstacles
@@ -54,27 +52,19 @@ class VirtualRaspberryPi(abc.ABC):
         self.users = UsersDesk(node_id, slot.submit)
         self._users_of_node = UsersOfNode(self.users)
         self._observers = Observers(observer)
+        security = None
         if settings.key is not None:
-            antenna = SealedAntenna(
-                antenna,
-                node_id,
-                settings.key,
-                random.SystemRandom(),
-                lambda: self.component.deadlines.now_s,
-                settings.timing,
-            )
-        self.component = assemble_component(
+            security = Security(settings.key, lambda: self.component.deadlines.now_s)
+        self.component, _receiver = assemble_node(
             node_id,
             antenna,
             self.engine,
-            random.Random(f"{configuration.seed}/{node_id}"),
+            random.Random(f"{settings.configuration.seed}/{node_id}"),
+            settings.node,
             internet=self._make_internet(settings),
-            routing=configuration.routing,
-            repair=configuration.repair,
-            options=settings.repair_options,
-            timing=settings.timing,
+            security=security,
             observer=self._observers,
-            debug=configuration.debug,
+            debug=settings.configuration.debug,
         )
 
     def start(self, now_s: float) -> None:
