@@ -1,4 +1,7 @@
-"""scripts/proofs: attack meshes, and send them mutated packets (docs/security.md, "Attacks")."""
+"""scripts/proofs: attack meshes, send them mutated packets, and count warnings without a reason.
+
+docs/security.md, "Attacks".
+"""
 
 from __future__ import annotations
 
@@ -14,6 +17,7 @@ from drone_mesh.stopping import ends_as
 from proofs.attacks import ATTACKS
 from proofs.damage import KEY, TABLE_HEAD, damage_row, keys_of, with_row
 from proofs.fuzz import NODES, crowd, fuzz
+from proofs.quiet import runs, warnings_of
 
 PROGRAM = "scripts/proofs"
 
@@ -22,7 +26,9 @@ PROGRAM = "scripts/proofs"
 def main(argv: Sequence[str] | None = None) -> int:
     """Returns the exit status: 0 done, 1 an error, 2 usage, 130 Ctrl-C."""
     parser = argparse.ArgumentParser(
-        prog=PROGRAM, description="Prove what strangers can do to a mesh (docs/security.md)."
+        prog=PROGRAM,
+        description="Prove what strangers can do to a mesh, and that a mesh without them warns of "
+        "nothing (docs/security.md).",
     )
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
@@ -59,6 +65,19 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     fuzzing.set_defaults(run=_fuzz)
 
+    quiet = commands.add_parser(
+        "quiet",
+        help="fly fleets to all layouts; print what nodes warn of although nothing is wrong",
+    )
+    quiet.add_argument(
+        "--runs",
+        type=whole(1, MOST),
+        default=10,
+        metavar="N",
+        help="number of seeds (default %(default)s)",
+    )
+    quiet.set_defaults(run=_quiet)
+
     options = parser.parse_args(argv)
     run: Callable[[argparse.Namespace], int] = options.run
     return run(options)
@@ -76,6 +95,18 @@ def _attack(options: argparse.Namespace) -> int:
         if options.page is not None:
             options.page.write_text(with_row(options.page.read_text("utf-8"), row), "utf-8")
     return 0
+
+
+def _quiet(options: argparse.Namespace) -> int:
+    """Returns 1 if a node warned of anything."""
+    all_runs, noisy = list(runs(options.runs)), 0
+    for run in all_runs:
+        lines = warnings_of(run)
+        if lines:
+            noisy += 1
+            print(run, *lines, sep="\n  ", flush=True)
+    print(f"{len(all_runs)} runs, {noisy} with a warning")
+    return int(noisy > 0)
 
 
 def _fuzz(options: argparse.Namespace) -> int:

@@ -51,6 +51,7 @@ SENTENCES = [
     f"remembers the last {seal.NONCES_KEPT} nonces",
     f"at most every {end_to_end.NEW_NONCE_AFTER_S:g} s",
     f"Its last {WORDS[end_to_end.NONCES]} nonces are valid",
+    f"(one of the {WORDS[end_to_end.EXPIRED]} before the last {WORDS[end_to_end.NONCES]})",
     f"in the {message_seal.ACK_TAG_BYTES} bytes that are left",
     f"every {WORDS[int(relay_check.ASK_PERIODS)]} check periods",
     f"(at least {WORDS[relay_check.LEAST_UNANSWERED]}) bring no answer",

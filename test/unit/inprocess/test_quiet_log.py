@@ -5,52 +5,50 @@ from __future__ import annotations
 import logging
 
 import pytest
-from scenarios import LAYOUTS
+from proofs import quiet
+from proofs.quiet import CASES, LAYOUTS, RADIOS, TECHNIQUES, Run, runs, warnings_of
 
-from drone_mesh.communication.seals.keys import MeshKey
-from drone_mesh.inprocess import Network
-from drone_mesh.layouts import GRID_CASE, Layouts
+from drone_mesh.layouts import GRID_CASE
 
-KEY = MeshKey(bytes(range(16)))
-ALL = sorted({*LAYOUTS.cases, *Layouts({}).cases})
-LARGE = [case for case in ALL if len(LAYOUTS.orders(case)) > 1]
+LARGE = [case for case in CASES if len(LAYOUTS.orders(case)) > 1]
 
 
-def fly_to(layout, seed, **options):
-    """The factory's fleet, as the default run starts it, flies to a layout."""
-    network = Network(seed=seed, **options)
-    orders = LAYOUTS.orders(layout)
-    network.add_fleet(1, max(17, *(order.node_id for order in orders)), 6, 1.0)
-    network.run_for(20.0)
-    for drone, goal in orders:
-        network.order(
-            drone, goal.longitude, goal.latitude, int(goal.height), allow_shared_place=True
-        )
-    network.run_for(100.0)
+@pytest.mark.parametrize("has_key", [False, True], ids=["no key", "key"])
+@pytest.mark.parametrize("routing", TECHNIQUES)
+@pytest.mark.parametrize("radio", RADIOS)
+def test_the_default_run_has_a_quiet_log(radio, routing, has_key):
+    assert warnings_of(Run(0, radio, routing, has_key, seed=2)) == []
 
 
-def assert_quiet(caplog):
-    lines = [record.getMessage() for record in caplog.records if record.levelno >= logging.WARNING]
-    assert lines == []
-
-
-@pytest.mark.parametrize("key", [None, KEY], ids=["no key", "key"])
-@pytest.mark.parametrize("routing", ["child_table_tree", "beacon"])
-@pytest.mark.parametrize("radio", ["disc", "shared"])
-def test_the_default_run_has_a_quiet_log(radio, routing, key, caplog):
-    fly_to(0, seed=2, radio=radio, routing=routing, key=key)
-    assert_quiet(caplog)
-
-
-def test_no_relay_is_suspected_because_the_gateway_answers_along_an_old_way(caplog):
-    fly_to(0, seed=9, radio="shared", key=KEY)
-    assert_quiet(caplog)
+@pytest.mark.parametrize(
+    ("seed", "what"),
+    [
+        (6, "an order that waited until its nonce had expired is not forged"),
+        (9, "the gateway answers along an old way"),
+        (11, "challenges that nobody took say nothing about a key"),
+        (26, "the only reply is lost, and the drone is in flight when a try is due"),
+    ],
+)
+def test_no_wrong_suspicion_on_a_busy_channel_with_a_key(seed, what):
+    assert warnings_of(Run(0, "shared", "child_table_tree", True, seed)) == [], what
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("layout", [case for case in ALL if case != GRID_CASE])
-@pytest.mark.parametrize(("radio", "key"), [("disc", None), ("disc", KEY), ("shared", None)])
-def test_every_layout_has_a_quiet_log(radio, key, layout, caplog):
+@pytest.mark.parametrize("layout", [case for case in CASES if case != GRID_CASE])
+@pytest.mark.parametrize("has_key", [False, True], ids=["no key", "key"])
+@pytest.mark.parametrize("routing", TECHNIQUES)
+@pytest.mark.parametrize("radio", RADIOS)
+def test_every_layout_has_a_quiet_log(radio, routing, has_key, layout):
     for seed in range(4 if layout in LARGE else 1):
-        fly_to(layout, seed=seed, radio=radio, key=key)
-    assert_quiet(caplog)
+        assert warnings_of(Run(layout, radio, routing, has_key, seed)) == []
+
+
+def test_what_a_node_warns_of_is_counted(monkeypatch):
+    logger = logging.getLogger("drone_mesh.communication")
+    monkeypatch.setattr(quiet, "_fly_to", lambda run: logger.warning("node %d", run.seed))
+    assert warnings_of(Run(0, "disc", "beacon", False, seed=7)) == ["node 7"]
+
+
+def test_the_command_has_all_layouts_radios_and_techniques_with_and_without_a_key():
+    first = [run for run in runs(2) if run.seed == 0]
+    assert len(set(first)) == len(CASES) * len(RADIOS) * len(TECHNIQUES) * 2

@@ -23,6 +23,7 @@ OLD_ORDERS_KEPT = 100  # besides the latest of each drone
 HIGHEST_NUMBER = 2**16 - 1
 REPEAT_AFTER_S = (2.0, 4.0, 8.0, 16.0)  # pauses between tries without a reply
 FOUND_WITHIN_S = 1.0  # a search passes through 100 nodes within half a second
+MOST_WAITS = 4  # of an order without a route: its drone may be in flight, out of reach
 MOST_SEARCHES = 3  # per order; the path that a search found may break at once
 QUERY_PERIOD_S = 15.0  # period of queries to a drone under way
 MOST_QUERIES = 20  # without an answer: five minutes
@@ -64,6 +65,7 @@ class _Order:
     searches: int = 0  # number of searches for the drone without a route
     seeking: bool = False  # a search for it is running or about to start
     copies: int = 0  # that left and that no relay said to have dropped: the drone may have one
+    waits: int = 0  # for a route, instead of a try
     unanswered: int = 0  # packets since the drone's last reply about it
     heard_s: float = 0.0  # when the drone last reported about it, or when it was ordered
     settled: bool = False  # the drone itself has reported the outcome
@@ -206,12 +208,17 @@ class OrderBook:
             if not self._seek(order):
                 self._move(order, OrderState.NO_ROUTE)
             return
+        has_route = self._has_route(order)
+        if order.state is OrderState.SENT and not has_route and order.waits < MOST_WAITS:
+            order.waits += 1
+            self._wait(order, REPEAT_AFTER_S[order.unanswered])
+            return
         order.unanswered += 1
         if order.state is OrderState.SENT:
             if order.unanswered >= len(REPEAT_AFTER_S):
                 self._lost(order, order.dropped or "it did not reply")
                 return
-            if self._has_route(order):
+            if has_route:
                 self._send(order)
             self._wait(order, REPEAT_AFTER_S[order.unanswered])
         elif order.state is OrderState.ACCEPTED:
@@ -219,7 +226,7 @@ class OrderBook:
                 self._lost(order, "it fell silent on its way")
                 return
             query = OrderQuery.packet(order.number, self._parts.node_id, order.drone)
-            if self._has_route(order):
+            if has_route:
                 self._parts.delivery.send_own(query)
             self._wait(order, QUERY_PERIOD_S)
 

@@ -34,6 +34,7 @@ NEW_NONCE_AFTER_S = 5.0  # with the next heartbeat to a gateway
 # gateway's nonce once a minute only.
 NEW_GATEWAY_NONCE_AFTER_S = 60.0
 NONCES = 3  # two heartbeats may be lost
+EXPIRED = 3  # nonces before those: a packet for one of them was long on its way
 SAME_PACKET_S = 0.1  # retransmissions and copies follow at once
 ORDER_TAG_BYTES = 6
 TAG_BYTES = 4
@@ -126,6 +127,10 @@ class Replayed(NotProven):
     """A proven packet that was received before: mostly a copy that took another way."""
 
 
+class Expired(NotProven):
+    """A proven packet for a nonce that was valid a moment ago: it waited for a busy channel."""
+
+
 class EndToEnd:
     """Seals the packets that one node creates, and checks those for it. Component's thread only."""
 
@@ -135,6 +140,7 @@ class EndToEnd:
         self._keys = keys
         self._rng = rng
         self._nonces = deque([_Nonce(rng.getrandbits(32))], maxlen=NONCES)
+        self._expired: deque[int] = deque(maxlen=EXPIRED)
         self._changed_s = 0.0
         self._heard: dict[int, int] = {}  # the nonces of others; any node can claim one
         self._proved: dict[int, int] = {}  # those that came with a proof
@@ -163,6 +169,8 @@ class EndToEnd:
             is_gateway = gateway == self._node_id
             lasts_s = NEW_GATEWAY_NONCE_AFTER_S if is_gateway else NEW_NONCE_AFTER_S
             if (is_gateway or forward == gateway) and now_s - self._changed_s >= lasts_s:
+                if len(self._nonces) == NONCES:
+                    self._expired.append(self._nonces[-1].value)
                 self._nonces.appendleft(_Nonce(self._rng.getrandbits(32)))
                 self._changed_s = now_s
             payload = _with_nonce(payload, self._nonces[0].value)
@@ -302,6 +310,8 @@ class EndToEnd:
                 elif not window.use(window.expand(sequence)):
                     raise Replayed("a replayed packet")
                 return
+        if any(compare_digest(_tag(state, old, sequence, what), tag) for old in self._expired):
+            raise Expired("a packet that came late")
         kind = payload[TYPE_AT]
         if kind == _HEARTBEAT:
             raise NotProven("a heartbeat without the proof of a gateway")

@@ -23,7 +23,13 @@ from drone_mesh.communication.interfaces import (
 from drone_mesh.communication.medium import ChannelUse, Medium
 from drone_mesh.communication.messages import CREATOR_AT, FORWARD_AT, TO_AT, TYPE_AT
 from drone_mesh.communication.packet_types import MessageType
-from drone_mesh.communication.seals.end_to_end import EndToEnd, NotProven, Replayed, reserved_bytes
+from drone_mesh.communication.seals.end_to_end import (
+    EndToEnd,
+    Expired,
+    NotProven,
+    Replayed,
+    reserved_bytes,
+)
 from drone_mesh.communication.seals.keys import Keys
 from drone_mesh.communication.seals.message_seal import MessageSeal
 from drone_mesh.communication.seals.seal import SEAL_AT, SEAL_BYTES, HopSeal, NotOpened
@@ -208,6 +214,8 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
 
     def on_undelivered(self, payload: bytes, tries: int, now_s: float) -> None:
         kind = payload[TYPE_AT]
+        if kind == _CHALLENGE:
+            self._unopened.pop(payload[TO_AT], None)  # without an answer for another reason
         if self._mesh is not None and kind not in (_CHALLENGE, _ANSWER, *_INTRODUCTIONS):
             self._mesh.on_undelivered(payload[:SEAL_AT] + _NO_SEAL, tries, now_s)
 
@@ -296,7 +304,7 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
 
     def _not_proven(self, error: NotProven, payload: bytes, now_s: float) -> None:
         """Copies, and packets for an old nonce, are normal; forged orders are not."""
-        if payload[TYPE_AT] == _ORDER and not isinstance(error, Replayed):
+        if payload[TYPE_AT] == _ORDER and not isinstance(error, (Replayed, Expired)):
             self.complaints.dropped(str(error), payload, now_s)
         else:
             self.complaints.counts[f"dropped {error}"] += 1

@@ -322,6 +322,30 @@ def test_an_order_without_a_reply_is_repeated_and_then_contact_is_lost():
     assert state(rig) == (OrderState.LOST_CONTACT, "at 0 s: it did not reply")
 
 
+def test_while_there_is_no_route_a_try_waits_four_times_as_its_drone_may_be_in_flight():
+    rig = gateway_rig()
+    rig.wait(10.0)
+    rig.routing.cant_communicate_with_node(5)
+    rig.forget()
+    rig.wait(8.0 * 3)
+    assert (rig.sent(6), state(rig)[0]) == ([], OrderState.SENT)
+    rig.know_neighbour(5)
+    rig.wait(8.0)
+    assert len(rig.sent(6)) == 1
+    rig.wait(11.0)
+    assert state(rig)[0] is OrderState.SENT
+    rig.wait(2.0)
+    assert state(rig)[0] is OrderState.LOST_CONTACT
+
+
+def test_contact_is_lost_all_the_same_if_the_route_does_not_come_back():
+    rig = gateway_rig()
+    rig.wait(10.0)
+    rig.routing.cant_communicate_with_node(5)
+    rig.wait(60.0)
+    assert state(rig)[0] is OrderState.LOST_CONTACT
+
+
 def test_a_late_reply_of_a_drone_counts_although_contact_was_lost():
     rig = gateway_rig()
     rig.wait(60.0)

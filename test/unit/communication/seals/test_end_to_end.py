@@ -5,7 +5,7 @@ import random
 import pytest
 from seal_rig import KEY, packet
 
-from drone_mesh.communication.seals.end_to_end import EndToEnd, NotProven
+from drone_mesh.communication.seals.end_to_end import EndToEnd, Expired, NotProven
 
 ORDER = packet("00 00 06 01 05 00 00 80 3f 00 00 00 40 03 00 2a 00")  # numbered 42, to drone 5
 PRESENT = packet("05 05 03 fe fe ff 00")
@@ -116,6 +116,19 @@ def test_an_order_outlives_only_the_next_two_nonces(pair):
     drone.seal(heartbeat, 30.0)
     with pytest.raises(NotProven):
         drone.open(kept[1])
+
+
+def test_an_order_that_was_long_on_its_way_is_late_and_not_forged(pair):
+    """On a busy channel a drone may announce some nonces while the order waits."""
+    gateway, drone = pair
+    late = gateway.seal(ORDER, 0.0)
+    heartbeat = packet("05 05 04 00 00 01 00 00")
+    for turn in range(6):
+        drone.seal(heartbeat, 10.0 + 10.0 * turn)
+        if turn >= 2:
+            with pytest.raises(Expired if turn < 5 else NotProven) as error:
+                drone.open(late)
+    assert not isinstance(error.value, Expired)
 
 
 def test_tries_and_copies_of_a_packet_count_as_one(pair):

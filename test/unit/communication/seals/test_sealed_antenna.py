@@ -368,6 +368,21 @@ def test_a_neighbour_that_has_answered_gets_the_same_time_again_before_it_is_nam
     assert "node 7, sends packets without a seal" in next(iter(layer.complaints.counts))
 
 
+def test_a_challenge_that_nobody_took_says_nothing_about_a_neighbours_key():
+    """While a mesh starts, a shared channel may take seconds and lose it."""
+    layer, rig = layer_of_1()
+    heard = HopSeal(7, KEY, random.Random(7), 30.0).seal(packet("07 07 03 01 fe 00 01"))
+    for now_s in (0.0, 4.0):
+        layer.on_msg(heard, now_s)
+        challenge = rig.antenna.taken.pop()
+        layer.on_undelivered(challenge, 18, now_s + 1.0)
+    layer.on_msg(heard, 21.0)
+    assert not layer.complaints.counts
+    for now_s in (30.0, 42.0):
+        layer.on_msg(heard, now_s)
+    assert "node 7, sends packets that this node's key" in next(iter(layer.complaints.counts))
+
+
 def test_another_radio_with_this_nodes_id_and_no_key_is_named_and_challenged_by_a_broadcast():
     layer, rig = layer_of_1()
     layer.on_msg(packet("01 01 03 01 fe 00 01"), 0.0)
