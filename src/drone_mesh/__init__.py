@@ -5,14 +5,14 @@ package (docs/architecture.md, "What users may import").
 """
 
 from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE
-from drone_mesh.communication.messages import type_of
-from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.repair.actions import Step
 from drone_mesh.communication.repair.interfaces import IRepairStrategy
 from drone_mesh.communication.repair.strategies.thesis import Thesis
 from drone_mesh.communication.routing.child_table_tree import ChildTableTree
 from drone_mesh.communication.routing.interfaces import IRoutingTechnique
-from drone_mesh.communication.timing import MeshTiming
+from drone_mesh.communication.timing.mesh_timing import MeshTiming
+from drone_mesh.communication.wire.messages import type_of
+from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.drone.fleet import plan_fleet
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine

@@ -15,9 +15,9 @@ from pydantic.fields import FieldInfo
 from typing_extensions import Annotated
 
 from drone_mesh.air.reach import MAX_DISTANCE_M
-from drone_mesh.communication.named_techniques import DEFAULT_ROUTING
+from drone_mesh.communication.node.named_techniques import DEFAULT_ROUTING
 from drone_mesh.communication.repair.options import CLEARANCE_M, DEFAULT_REPAIR
-from drone_mesh.communication.timing import MIN_REPORT_PERIOD_S, MeshTiming
+from drone_mesh.communication.timing.mesh_timing import MIN_REPORT_PERIOD_S, MeshTiming
 from drone_mesh.drone.fleet import (
     DEFAULT_GRIDSIZE,
     DEFAULT_ROUTERS,

@@ -11,7 +11,7 @@ import time
 from inprocess_mesh import InProcessMesh
 
 from drone_mesh.console.dots import RecordedDots
-from drone_mesh.console.frames import FrameStore
+from drone_mesh.console.frame_store import FrameStore
 from drone_mesh.console.gateway_client import GatewayControls
 from drone_mesh.console.history import History
 from drone_mesh.console.orders import LayoutOffer, places_of
@@ -19,7 +19,7 @@ from drone_mesh.console.runner import ConsoleRunner
 from drone_mesh.console.server import ALL_ACTIONS, FRAME_PERIOD_S, ConsoleServer
 from drone_mesh.console.tiles import open_tiles
 from drone_mesh.drone.geodesy import Origin
-from drone_mesh.layouts import Layouts
+from drone_mesh.formations.layouts import Layouts
 from drone_mesh.web.access import access_for
 
 LAYOUTS = [

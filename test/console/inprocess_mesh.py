@@ -12,12 +12,12 @@ from drone_mesh.console.controls import OrderRefused
 from drone_mesh.console.dots import Dot
 from drone_mesh.drone.fleet import MAX_DRONES
 from drone_mesh.errors import PlaceTaken
+from drone_mesh.formations.layouts import Layouts, Order, UnknownCase
+from drone_mesh.formations.missions import Mission
+from drone_mesh.formations.preview import FormationPreview, preview
 from drone_mesh.inprocess.network import Network
-from drone_mesh.layouts import Layouts, Order, UnknownCase
-from drone_mesh.missions import Mission
 from drone_mesh.mobility.pilot import along
 from drone_mesh.state.events import EventBatcher
-from drone_mesh.state.formation_preview import FormationPreview, preview
 from drone_mesh.state.model import EventRecord, MeshStatus
 from drone_mesh.state.packets import PacketSampler
 

@@ -10,7 +10,7 @@ import random
 from typing import Callable, Mapping
 
 from drone_mesh.communication.interfaces import BROADCAST
-from drone_mesh.communication.messages import (
+from drone_mesh.communication.wire.messages import (
     TYPE_AT,
     GatewayPlace,
     GoToLocationMessage,
@@ -21,7 +21,7 @@ from drone_mesh.communication.messages import (
     packet,
     readdressed,
 )
-from drone_mesh.communication.packet_types import MessageType
+from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.drone.location import Location
 from drone_mesh.inprocess.radio import InProcessAir
 from proofs import claims

@@ -10,7 +10,6 @@ import itertools
 import random
 from typing import Callable, Iterable, Iterator, Sequence
 
-from drone_mesh.communication import messages
 from drone_mesh.communication.beacon.packets import (
     NO_ANCESTORS,
     NONE_BELOW,
@@ -20,7 +19,8 @@ from drone_mesh.communication.beacon.packets import (
     newer,
 )
 from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE
-from drone_mesh.communication.packet_types import MessageType
+from drone_mesh.communication.wire import messages
+from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.drone.location import Location
 from drone_mesh.inprocess.radio import InProcessAir
 from proofs.stranger import Stranger

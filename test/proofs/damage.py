@@ -9,9 +9,9 @@ import statistics
 from typing import AbstractSet, NamedTuple, Sequence
 
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.messages import present
-from drone_mesh.communication.named_techniques import DEFAULT_ROUTING
+from drone_mesh.communication.node.named_techniques import DEFAULT_ROUTING
 from drone_mesh.communication.seals.keys import Keys, MeshKey
+from drone_mesh.communication.wire.messages import present
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import MeshError
 from drone_mesh.inprocess.network import Network

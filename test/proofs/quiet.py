@@ -6,8 +6,8 @@ import logging
 from typing import Iterator, NamedTuple
 
 from drone_mesh.communication.seals.keys import MeshKey
+from drone_mesh.formations.layouts import GRID_CASE, Layouts
 from drone_mesh.inprocess.network import Network
-from drone_mesh.layouts import GRID_CASE, Layouts
 
 KEY = MeshKey(bytes(range(16)))
 RADIOS = ("disc", "shared")

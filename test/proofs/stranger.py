@@ -8,12 +8,12 @@ import struct
 from collections import Counter
 from typing import Callable, Iterator, NamedTuple
 
-from drone_mesh.communication import messages
 from drone_mesh.communication.interfaces import BROADCAST, IMeshNetwork, IWirelessCommunication
-from drone_mesh.communication.messages import header
-from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.seals.keys import Keys
 from drone_mesh.communication.seals.sealed_antenna import SealedAntenna
+from drone_mesh.communication.wire import messages
+from drone_mesh.communication.wire.messages import header
+from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.drone.location import Location
 from drone_mesh.inprocess.drone import InProcessDrone
 from drone_mesh.inprocess.network import Network

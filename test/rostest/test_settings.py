@@ -10,7 +10,7 @@ import rospy
 import rostest
 from rostest_support import LogWatch, MeshWatch, call
 
-from drone_mesh.communication.packet_types import MessageType
+from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.msg import Location, MeshState, PacketSample
 from drone_mesh.srv import AreaScan, OrderFlight, OrderFormation
 

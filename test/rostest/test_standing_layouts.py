@@ -19,7 +19,7 @@ import rostest
 from actionlib_msgs.msg import GoalStatus
 from rostest_support import LogWatch, MeshWatch, call, pid_of, wait_for
 
-from drone_mesh.layouts import Layouts
+from drone_mesh.formations.layouts import Layouts
 from drone_mesh.msg import LayoutAction, LayoutFeedback, LayoutGoal, LayoutProgress, MeshState
 from drone_mesh.srv import OrderLayout, WithdrawLayout
 

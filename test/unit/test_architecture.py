@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -84,10 +85,12 @@ def test_each_room_of_the_mesh_says_what_it_decides():
 
 
 def test_the_tests_of_a_room_of_the_mesh_lie_in_its_folder():
-    of_modules = {
-        path.stem: path.parent.name
-        for path in (ROOT / "src" / "drone_mesh" / "communication").glob("*/*.py")
-        if path.stem not in ("__init__", "interfaces", "messages", "flight", "status")
-    }
-    for path in (ROOT / "test" / "unit" / "communication").glob("test_*.py"):
-        assert path.stem[len("test_") :] not in of_modules, path
+    mesh = ROOT / "src" / "drone_mesh" / "communication"
+    modules = [path for path in mesh.glob("*/*.py") if path.stem != "__init__"]
+    names = Counter(path.stem for path in modules)
+    room_of = {path.stem: path.parent.name for path in modules if names[path.stem] == 1}
+    tests = ROOT / "test" / "unit" / "communication"
+    for path in tests.rglob("test_*.py"):
+        room = path.relative_to(tests).parts[0]
+        assert (mesh / room).is_dir(), path
+        assert room_of.get(path.stem[len("test_") :], room) == room, path

@@ -21,10 +21,10 @@ from drone_mesh.console import tiles
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.earth_files import read_placemarks
 from drone_mesh.errors import ConfigurationError
+from drone_mesh.formations.layouts import Layouts
+from drone_mesh.formations.missions import read_missions
 from drone_mesh.lab.experiment import load_experiment
 from drone_mesh.lab.places import rows_of_file
-from drone_mesh.layouts import Layouts
-from drone_mesh.missions import read_missions
 from drone_mesh.mobility import Mobility
 from drone_mesh.mobility.limits import check
 from drone_mesh.mobility.trace_files import read_trace

@@ -9,17 +9,18 @@ from pathlib import Path
 import pytest
 from proofs import attacks, claims, damage
 
-from drone_mesh.communication import complaints, limits
 from drone_mesh.communication.beacon import proofs, trickle
 from drone_mesh.communication.data import packets as data
+from drone_mesh.communication.events import complaints
 from drone_mesh.communication.heartbeats import detours, node_search, relay_check
 from drone_mesh.communication.interfaces import BROADCAST, MAX_NODE_ID, PAYLOAD_BYTES
-from drone_mesh.communication.messages import TO_AT
-from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.repair import bid_credit
 from drone_mesh.communication.seals import end_to_end, keys, message_seal, replay, seal
 from drone_mesh.communication.seals import sealed_antenna as antenna
-from drone_mesh.communication.timing import MeshTiming
+from drone_mesh.communication.timing import limits
+from drone_mesh.communication.timing.mesh_timing import MeshTiming
+from drone_mesh.communication.wire.messages import TO_AT
+from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.internet import guarded_app
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs/security.md").read_text(encoding="utf-8")

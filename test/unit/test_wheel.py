@@ -53,7 +53,7 @@ def installed(tmp_path):
 def test_in_an_empty_environment_the_programs_of_a_pi_start_and_all_files_are_there(installed):
     for program in ("raspberry_router", "raspberry_gateway"):
         assert f"usage: {program}" in run(installed / "bin" / program, "--help", cwd=installed)
-    mesh_and_radio = "import drone_mesh.communication.assembly, drone_mesh.nrf24.high_level"
+    mesh_and_radio = "import drone_mesh.communication.node.assembly, drone_mesh.nrf24.high_level"
     run(installed / "bin/python", "-c", mesh_and_radio, cwd=installed)
     (package,) = installed.glob("lib/python3*/site-packages/drone_mesh")
     for name in ("py.typed", "console/static/index.html", "nrf24/emulator/nrf24_range.csv"):

@@ -22,8 +22,8 @@ from drone_mesh.communication.interfaces import (
     IMeshNetwork,
     IWirelessCommunication,
 )
-from drone_mesh.communication.medium import ChannelUse, Medium
-from drone_mesh.communication.messages import (
+from drone_mesh.communication.timing.medium import ChannelUse, Medium
+from drone_mesh.communication.wire.messages import (
     is_answered,
     is_jittered,
     priority,

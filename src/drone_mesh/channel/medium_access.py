@@ -38,7 +38,7 @@ from drone_mesh.channel.access_rules import AccessRules
 from drone_mesh.channel.packet_queue import ALL_NODES, OutgoingPacket, PacketQueue
 from drone_mesh.channel.statistics import RadioStatistics
 from drone_mesh.channel.trains import InTrain, Yielding
-from drone_mesh.communication.packet_types import Priority
+from drone_mesh.communication.wire.packet_types import Priority
 
 
 class Fate(enum.Enum):

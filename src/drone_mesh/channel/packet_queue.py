@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import deque
 
-from drone_mesh.communication.packet_types import Priority
+from drone_mesh.communication.wire.packet_types import Priority
 
 ALL_NODES = -1  # receiver of a broadcast
 

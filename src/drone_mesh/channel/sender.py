@@ -9,7 +9,7 @@ from drone_mesh.channel.packet_queue import ALL_NODES, OutgoingPacket
 from drone_mesh.channel.radio import PacketRadio, Try
 from drone_mesh.channel.runtime import Runtime, Task
 from drone_mesh.channel.trains import InTrain
-from drone_mesh.communication.packet_types import Priority
+from drone_mesh.communication.wire.packet_types import Priority
 
 
 class Sender:

@@ -6,9 +6,9 @@ import enum
 import math
 
 from drone_mesh.channel.access_rules import AccessRules
-from drone_mesh.communication import messages
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.interfaces import BROADCAST
+from drone_mesh.communication.wire import messages
 
 _NO_SENDER = -1
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 import abc
 from typing import NamedTuple, Sequence
 
-from drone_mesh.communication.medium import UNDISTURBED, ChannelUse, Medium
 from drone_mesh.communication.order_record import OrderRecord
+from drone_mesh.communication.timing.medium import UNDISTURBED, ChannelUse, Medium
 from drone_mesh.drone.fleet import MAX_DRONES
 
 PAYLOAD_BYTES = 32  # nRF24L01+ Product Specification 1.0, 7.3.4: a payload is 0..32 bytes

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import ClassVar, Mapping, Sequence
 
 from drone_mesh.errors import MeshError
-from drone_mesh.layouts import Order
-from drone_mesh.missions import Mission
-from drone_mesh.state.formation_preview import FormationPreview
+from drone_mesh.formations.layouts import Order
+from drone_mesh.formations.missions import Mission
+from drone_mesh.formations.preview import FormationPreview
 
 
 class OrderRefused(MeshError):

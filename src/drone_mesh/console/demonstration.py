@@ -12,8 +12,8 @@ import math
 from dataclasses import dataclass
 from typing import Callable, Dict, Generator, List, Sequence, Tuple
 
+from drone_mesh.communication.control.router_states import RepairState
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.router_states import RepairState
 from drone_mesh.console.controls import MeshControls, OrderRefused
 from drone_mesh.drone.roles import Role
 from drone_mesh.state.model import REPAIR_STATES, MeshStatus, NodeStatus, position_is_known

@@ -12,7 +12,7 @@ from typing import Mapping, Sequence
 
 from drone_mesh.arguments import whole
 from drone_mesh.console import DEFAULT_PORT
-from drone_mesh.console.frames import FrameStore
+from drone_mesh.console.frame_store import FrameStore
 from drone_mesh.console.gateway_client import GatewayClient, GatewayControls
 from drone_mesh.console.history import History
 from drone_mesh.console.page_token import PageToken

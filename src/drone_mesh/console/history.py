@@ -8,7 +8,7 @@ import pickle
 import zlib
 from typing import Any, Iterable, Sequence
 
-from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.console.dots import RecordedDots
 from drone_mesh.state.model import EventRecord, MeshStatus
 from drone_mesh.state.outages import MeshSample, take_sample

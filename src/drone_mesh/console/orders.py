@@ -18,8 +18,8 @@ from drone_mesh.drone.goal import MAX_COORDINATE_M, MAX_HEIGHT_M
 from drone_mesh.drone.location import Location
 from drone_mesh.earth_files import MAX_CHARACTERS, Placemarks, is_earth_file, read_placemarks
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.layouts import MAX_CASE, MAX_NAME, Order, read_layout
-from drone_mesh.missions import MAX_SPEED_M_S, MOST_WAYPOINTS, Mission
+from drone_mesh.formations.layouts import MAX_CASE, MAX_NAME, Order, read_layout
+from drone_mesh.formations.missions import MAX_SPEED_M_S, MOST_WAYPOINTS, Mission
 
 MAX_LAYOUT_CHARACTERS = 30_000  # three times what 254 drones need
 MAX_ORDER_NUMBER = 2**53  # JavaScript integers are exact up to here

@@ -9,7 +9,7 @@ from typing import Any, Iterator, Sequence
 from starlette.websockets import WebSocket
 
 from drone_mesh.console.dots import Dot, PacketDots
-from drone_mesh.console.frames import FrameStore
+from drone_mesh.console.frame_store import FrameStore
 from drone_mesh.console.history import History
 from drone_mesh.console.orders import TimeLine
 from drone_mesh.console.player import Player

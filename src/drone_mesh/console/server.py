@@ -29,12 +29,12 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from drone_mesh.communication.packet_types import PacketKind
-from drone_mesh.communication.throttle import Throttle
+from drone_mesh.communication.timing.throttle import Throttle
+from drone_mesh.communication.wire.packet_types import PacketKind
 from drone_mesh.console.controls import MeshControls, OrderRefused
 from drone_mesh.console.dots import Dot
 from drone_mesh.console.earth import EarthFiles
-from drone_mesh.console.frames import EVENTS_KEPT, SAMPLES_KEPT, FrameStore
+from drone_mesh.console.frame_store import EVENTS_KEPT, SAMPLES_KEPT, FrameStore
 from drone_mesh.console.history import History
 from drone_mesh.console.orders import (
     LIMITS,

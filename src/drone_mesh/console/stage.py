@@ -10,7 +10,7 @@ from typing import Any, Mapping, Sequence
 
 from drone_mesh.console.controls import MeshControls, OrderRefused
 from drone_mesh.console.demonstration import Casting, Order, RepairDemonstration
-from drone_mesh.console.frames import FrameStore
+from drone_mesh.console.frame_store import FrameStore
 from drone_mesh.state.model import MeshStatus
 
 POLL_PERIOD_S = 0.1  # wall time

@@ -9,20 +9,20 @@ from typing import Callable, Iterable, Mapping
 
 from drone_mesh.air.graph import hops_from
 from drone_mesh.air.reach import MAX_DISTANCE_M
-from drone_mesh.communication.assembly import Security, assemble_node
+from drone_mesh.communication.control.delivery import ITechnique
 from drone_mesh.communication.data.echo import OnEchoAnswer
 from drone_mesh.communication.data.ticket import Ticket
 from drone_mesh.communication.data.transport import ReceivedMessage
-from drone_mesh.communication.gateway import MeshnetworkGateway
+from drone_mesh.communication.events.observer import MeshEvent
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.named_techniques import DEFAULT_ROUTING
-from drone_mesh.communication.node_configuration import NodeConfiguration
-from drone_mesh.communication.observer import MeshEvent
+from drone_mesh.communication.node.assembly import Security, assemble_node
+from drone_mesh.communication.node.gateway import MeshnetworkGateway
+from drone_mesh.communication.node.named_techniques import DEFAULT_ROUTING
+from drone_mesh.communication.node.node_configuration import NodeConfiguration
 from drone_mesh.communication.repair.interfaces import IRepairStrategy
 from drone_mesh.communication.repair.options import DEFAULT_REPAIR, RepairOptions
 from drone_mesh.communication.seals.keys import Keys
-from drone_mesh.communication.timing import MeshTiming
-from drone_mesh.communication.ways import ITechnique
+from drone_mesh.communication.timing.mesh_timing import MeshTiming
 from drone_mesh.drone.fleet import (
     DEFAULT_GRIDSIZE,
     DEFAULT_ROUTERS,

@@ -10,7 +10,7 @@ import numpy as np
 
 from drone_mesh.air.reach import MAX_DISTANCE_M
 from drone_mesh.communication.interfaces import IMeshDebugInfo, IMeshNetwork
-from drone_mesh.communication.messages import copies_for, hop
+from drone_mesh.communication.wire.messages import copies_for, hop
 from drone_mesh.drone.location import Location
 from drone_mesh.inprocess.clock import VirtualClock
 from drone_mesh.inprocess.interfaces import Host, IInProcessAir, IInProcessAntenna

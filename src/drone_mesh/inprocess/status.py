@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Iterable, Mapping
 
-from drone_mesh.communication.observer import MeshEvent
+from drone_mesh.communication.events.observer import MeshEvent
 from drone_mesh.drone.roles import Role
 from drone_mesh.inprocess.node import InProcessNode
 from drone_mesh.state.events import EventBatcher

@@ -24,6 +24,7 @@ from paho.mqtt.reasoncodes import ReasonCode
 
 from drone_mesh.communication.data.ticket import Ticket
 from drone_mesh.communication.data.transport import ReceivedMessage
+from drone_mesh.communication.events.observer import MeshEvent
 from drone_mesh.communication.interfaces import (
     MAX_NODE_ID,
     NO_ROUTE,
@@ -31,7 +32,6 @@ from drone_mesh.communication.interfaces import (
     IInternetConnection,
     KnownNode,
 )
-from drone_mesh.communication.observer import MeshEvent
 from drone_mesh.errors import ConfigurationError, MessageRefused, QueueFull
 from drone_mesh.execution import Submit
 from drone_mesh.internet.mqtt_topics import Broker, Topics

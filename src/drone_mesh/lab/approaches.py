@@ -9,7 +9,7 @@ import itertools
 import math
 from typing import Iterator, NamedTuple, Sequence
 
-from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.drone.flight_path import CLIMB_ENDS_AT, DESCENT_STARTS_AT, between
 from drone_mesh.lab.flights import Leg
 from drone_mesh.lab.record import Place, RunRecord

@@ -306,7 +306,7 @@ def _compare(options: argparse.Namespace) -> int:
 
 
 def _metrics(_options: argparse.Namespace) -> int:
-    from drone_mesh.communication.packet_types import MessageType
+    from drone_mesh.communication.wire.packet_types import MessageType
     from drone_mesh.lab.metrics import listed
 
     width = max(map(len, listed()))

@@ -15,10 +15,10 @@ from drone_mesh.air import obstacle_file
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.lab import extensions, movement, places
 from drone_mesh.lab.dotted_path import NoSuchPlace, put
+from drone_mesh.lab.experiment_parts import Part
 from drone_mesh.lab.experiment_source import Source, nearest_name
 from drone_mesh.lab.expression import ExpressionError, Where
 from drone_mesh.lab.metrics import METRICS
-from drone_mesh.lab.parts import Part
 from drone_mesh.lab.scenario import Scenario
 from drone_mesh.lab.scenario_checks import check_scenario
 from drone_mesh.yaml_file import KeyPath, read_mapping, read_value

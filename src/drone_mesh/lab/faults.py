@@ -10,7 +10,7 @@ from typing_extensions import Annotated, Literal
 
 from drone_mesh.communication.data.packets import MAX_MESSAGE_BYTES
 from drone_mesh.drone.fleet import MAX_DRONES
-from drone_mesh.lab.parts import Above0, AtLeast0, NodeId, Part, Point, Share
+from drone_mesh.lab.experiment_parts import Above0, AtLeast0, NodeId, Part, Point, Share
 
 EVENTS = ("all connected", "the first flight", "the first landing", "the first loss", "healed")
 

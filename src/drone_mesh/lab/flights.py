@@ -6,7 +6,7 @@ import functools
 from dataclasses import dataclass
 from typing import Callable
 
-from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.drone.flight_path import CLIMB_ENDS_AT, DESCENT_STARTS_AT, FlightPath
 from drone_mesh.inprocess import Network
 from drone_mesh.lab.network_sample import gateways_of, physical_graph

@@ -6,13 +6,13 @@ import math
 from typing import Callable, Collection, Sequence
 
 from drone_mesh.drone.location import Location
+from drone_mesh.formations.layouts import Layouts
+from drone_mesh.formations.preview import preview
+from drone_mesh.formations.standing_orders import PartState, StandingOrders
 from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.status import event_records
 from drone_mesh.lab.network_sample import gateways_of, physical_graph
-from drone_mesh.layouts import Layouts
-from drone_mesh.state.formation_preview import preview
 from drone_mesh.state.model import MeshStatus
-from drone_mesh.state.standing_orders import PartState, StandingOrders
 
 LOOK_S = 1.0  # /mesh/state comes at least as often at real time
 

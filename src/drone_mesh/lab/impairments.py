@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Callable
 
 from drone_mesh.channel.packet_queue import OutgoingPacket
-from drone_mesh.communication import messages
+from drone_mesh.communication.wire import messages
 from drone_mesh.drone.location import Location
 from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.radio import InProcessAir

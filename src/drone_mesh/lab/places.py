@@ -14,8 +14,8 @@ from drone_mesh.arguments import finite, is_up_to
 from drone_mesh.drone.fleet import MAX_DRONES, plan_fleet
 from drone_mesh.drone.roles import Role
 from drone_mesh.errors import ConfigurationError
+from drone_mesh.formations.layouts import Layouts, UnknownCase
 from drone_mesh.lab.scenario import Layout
-from drone_mesh.layouts import Layouts, UnknownCase
 from drone_mesh.yaml_file import read_text
 
 MEAN_DEGREE = 8.0  # the published layouts have 7.3..8.8

@@ -6,7 +6,7 @@ import time
 from typing import Sequence
 
 from drone_mesh.console.controls import RecordingControls
-from drone_mesh.console.frames import FrameStore
+from drone_mesh.console.frame_store import FrameStore
 from drone_mesh.console.history import History
 from drone_mesh.console.runner import ConsoleRunner
 from drone_mesh.console.server import ConsoleServer

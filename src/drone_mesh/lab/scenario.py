@@ -8,14 +8,14 @@ from typing_extensions import Annotated, Literal
 
 from drone_mesh.air.obstacle_file import BoxRow
 from drone_mesh.air.reach import MAX_DISTANCE_M
-from drone_mesh.communication.named_techniques import DEFAULT_ROUTING
+from drone_mesh.communication.node.named_techniques import DEFAULT_ROUTING
 from drone_mesh.communication.repair.options import CLEARANCE_M, DEFAULT_REPAIR
-from drone_mesh.communication.timing import MeshTiming
+from drone_mesh.communication.timing.mesh_timing import MeshTiming
 from drone_mesh.drone.fleet import MAX_DRONES
 from drone_mesh.drone.goal import MAX_HEIGHT_M
 from drone_mesh.errors import ConfigurationError
+from drone_mesh.lab.experiment_parts import Above0, AtLeast0, NodeId, Part, PartOfKind, Point, Share
 from drone_mesh.lab.faults import Fault
-from drone_mesh.lab.parts import Above0, AtLeast0, NodeId, Part, PartOfKind, Point, Share
 from drone_mesh.mobility import Mobility
 from drone_mesh.mobility.limits import check as check_mobility
 from drone_mesh.mobility.settings import Knot

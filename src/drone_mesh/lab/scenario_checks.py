@@ -7,11 +7,11 @@ from typing import Iterable
 
 from drone_mesh.drone.goal import check_apart
 from drone_mesh.errors import GoalRefused
+from drone_mesh.formations.layouts import Layouts, UnknownCase
 from drone_mesh.lab import places
 from drone_mesh.lab.experiment_source import Source
 from drone_mesh.lab.faults import Fault
 from drone_mesh.lab.scenario import Layout, Scenario
-from drone_mesh.layouts import Layouts, UnknownCase
 from drone_mesh.yaml_file import KeyPath
 
 

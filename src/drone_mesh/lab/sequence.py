@@ -6,7 +6,7 @@ import math
 import random
 from typing import Iterator
 
-from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.communication.repair.options import DEFAULT_REPAIR
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.inprocess.radio import InProcessAir

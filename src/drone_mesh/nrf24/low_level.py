@@ -14,7 +14,7 @@ from drone_mesh.channel.radio import Try
 from drone_mesh.channel.runtime import Runtime, SystemRuntime
 from drone_mesh.channel.statistics import RadioStatistics
 from drone_mesh.communication.interfaces import PAYLOAD_BYTES
-from drone_mesh.communication.packet_types import Priority
+from drone_mesh.communication.wire.packet_types import Priority
 from drone_mesh.nrf24.errors import RadioError
 from drone_mesh.nrf24.gpio import CePin, IrqPin
 from drone_mesh.nrf24.settings import RadioSettings

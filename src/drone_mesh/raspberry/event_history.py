@@ -7,8 +7,8 @@ import threading
 from collections import deque
 from typing import Any
 
+from drone_mesh.communication.events.observer import MeshEvent, MeshEventKind, Observers
 from drone_mesh.communication.interfaces import MAX_NODE_ID
-from drone_mesh.communication.observer import MeshEvent, MeshEventKind, Observers
 
 EVENTS_KEPT = 500  # an hour of a mesh with frequent changes
 

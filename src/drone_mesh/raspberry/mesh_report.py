@@ -6,8 +6,8 @@ import dataclasses
 import math
 from typing import Any
 
-from drone_mesh.communication.gateway import MeshnetworkGateway
 from drone_mesh.communication.interfaces import NO_ROUTE, KnownNode
+from drone_mesh.communication.node.gateway import MeshnetworkGateway
 from drone_mesh.communication.reports.node_reports import ReportedNode
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.interfaces import IDroneEngine

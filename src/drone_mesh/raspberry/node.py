@@ -10,9 +10,9 @@ import time
 from typing import Any, Callable
 
 from drone_mesh.channel.antenna import DEBUG_PERIOD_S
-from drone_mesh.communication.assembly import Security, assemble_node
-from drone_mesh.communication.gateway import MeshnetworkGateway
 from drone_mesh.communication.interfaces import IInternetConnection
+from drone_mesh.communication.node.assembly import Security, assemble_node
+from drone_mesh.communication.node.gateway import MeshnetworkGateway
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError, LocationUnknown

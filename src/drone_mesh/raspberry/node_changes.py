@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Sequence
 
+from drone_mesh.communication.events.observer import MeshEvent, MeshEventKind, MeshObserver
 from drone_mesh.communication.interfaces import NO_ROUTE, KnownNode
-from drone_mesh.communication.observer import MeshEvent, MeshEventKind, MeshObserver
 from drone_mesh.communication.reports.node_reports import ReportedNode
 
 LOST_AFTER_CHECKS = 3  # a route that is missing for a moment is not an event

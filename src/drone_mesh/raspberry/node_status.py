@@ -5,9 +5,9 @@ from __future__ import annotations
 from importlib import metadata
 from typing import Any
 
-from drone_mesh.communication.component import MeshnetworkComponent
+from drone_mesh.communication.events.observer import in_hops
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.observer import in_hops
+from drone_mesh.communication.node.component import MeshnetworkComponent
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.errors import LocationUnknown
 from drone_mesh.nrf24.high_level import NRF24HighLevelInterface

@@ -5,9 +5,9 @@ from __future__ import annotations
 import contextlib
 from typing import Callable, Iterator
 
-from drone_mesh.communication import messages
 from drone_mesh.communication.interfaces import BROADCAST, MAX_NODE_ID
-from drone_mesh.communication.packet_types import MessageType
+from drone_mesh.communication.wire import messages
+from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.nrf24.errors import RadioError
 from drone_mesh.nrf24.gpio import IrqPin
 from drone_mesh.nrf24.registers import Register

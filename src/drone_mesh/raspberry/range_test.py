@@ -11,8 +11,8 @@ import dataclasses
 import struct
 from typing import Callable, Iterator, NamedTuple, Sequence
 
-from drone_mesh.communication import messages
 from drone_mesh.communication.interfaces import PAYLOAD_BYTES
+from drone_mesh.communication.wire import messages
 from drone_mesh.nrf24.emulator.measured import measured_losses
 from drone_mesh.nrf24.errors import RadioError
 from drone_mesh.nrf24.settings import DataRate, RadioSettings, TxPower

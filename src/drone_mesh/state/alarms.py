@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any, Iterable
 
-from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.drone.roles import Role
 from drone_mesh.state.condition import Condition, condition_of
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus, another_radio

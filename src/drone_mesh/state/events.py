@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections import deque
 
+from drone_mesh.communication.events.observer import MeshEvent, MeshEventKind
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.observer import MeshEvent, MeshEventKind
 from drone_mesh.state.model import EventRecord
 
 _SEVERAL_AT_ONCE = (

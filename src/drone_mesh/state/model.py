@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from typing import Iterable, Iterator, Sequence
 
 from drone_mesh.air.reach import MAX_DISTANCE_M
+from drone_mesh.communication.control.router_states import RepairState
+from drone_mesh.communication.events.observer import explanation
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.observer import explanation
 from drone_mesh.communication.repair.election import NO_BID
-from drone_mesh.communication.router_states import RepairState
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
 

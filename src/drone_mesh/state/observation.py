@@ -8,10 +8,10 @@ from typing import Iterable
 import numpy as np
 
 from drone_mesh.air.box import Box
-from drone_mesh.communication.component import MeshnetworkComponent
+from drone_mesh.communication.control.router_states import RepairState
 from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.node.component import MeshnetworkComponent
 from drone_mesh.communication.repair.status import NOTHING_TO_REPAIR
-from drone_mesh.communication.router_states import RepairState
 from drone_mesh.drone.flight_path import FlightPath, Vector
 from drone_mesh.drone.roles import Role
 from drone_mesh.state.model import REPAIR_STATES, NodeStatus, ObstacleStatus

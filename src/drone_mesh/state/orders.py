@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass
 from typing import Iterable
 
-from drone_mesh.communication.observer import MeshEventKind, explanation
+from drone_mesh.communication.events.observer import MeshEventKind, explanation
 from drone_mesh.communication.order_record import OrderState
 from drone_mesh.communication.orders.book import EVENT_OF
 from drone_mesh.communication.orders.intake import ARRIVED_WITHIN_M

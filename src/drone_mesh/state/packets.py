@@ -5,8 +5,8 @@ from __future__ import annotations
 import random
 from typing import NamedTuple, Sequence
 
-from drone_mesh.communication.messages import receiver, sender, type_of
-from drone_mesh.communication.packet_types import ABOUT, PacketKind
+from drone_mesh.communication.wire.messages import receiver, sender, type_of
+from drone_mesh.communication.wire.packet_types import ABOUT, PacketKind
 
 MOST_SAMPLED = 120  # for a fifth of a second: more dots cannot be followed
 

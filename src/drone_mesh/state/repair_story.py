@@ -9,8 +9,8 @@ import math
 from dataclasses import dataclass, replace
 from typing import Iterable, Sequence
 
+from drone_mesh.communication.control.router_states import RepairState
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.router_states import RepairState
 from drone_mesh.drone.roles import Role
 from drone_mesh.state.model import REPAIR_STATES, MeshStatus, NodeStatus
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import Mapping
 
-from drone_mesh.communication.packet_types import PacketKind
+from drone_mesh.communication.wire.packet_types import PacketKind
 from drone_mesh.drone.roles import Role
 from drone_mesh.state.condition import Condition
 from drone_mesh.state.links import LinkUse

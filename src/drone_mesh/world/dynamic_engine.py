@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 
-from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath, PlanFlight, Vector
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.route import Route

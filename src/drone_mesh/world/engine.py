@@ -8,7 +8,7 @@ from collections import deque
 from typing import Callable, NamedTuple
 
 from drone_mesh.air.obstacles import NO_PATH
-from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath, PlanFlight, Vector
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine

@@ -14,7 +14,7 @@ from drone_mesh.channel.access_rules import AccessRules
 from drone_mesh.channel.medium_access import Fate, MediumAccess
 from drone_mesh.channel.packet_queue import ALL_NODES
 from drone_mesh.channel.trains import InTrain
-from drone_mesh.communication.packet_types import Priority
+from drone_mesh.communication.wire.packet_types import Priority
 from drone_mesh.errors import ConfigurationError
 
 CYCLE_S = 0.0026

@@ -9,8 +9,8 @@ import pytest
 
 from drone_mesh.console.controls import OrderRefused
 from drone_mesh.console.demonstration import Casting, RepairDemonstration
+from drone_mesh.formations.layouts import Layouts
 from drone_mesh.inprocess import Network
-from drone_mesh.layouts import Layouts
 
 STATE_PERIOD_S = 0.2  # wall time between two states
 

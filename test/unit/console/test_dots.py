@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 from drone_mesh.console.dots import MOST_WAITING, Dot, PacketDots, RecordedDots
-from drone_mesh.console.frames import FrameStore
+from drone_mesh.console.frame_store import FrameStore
 from drone_mesh.console.history import History
 from drone_mesh.console.orders import TimeLine
 from drone_mesh.console.page import Page

@@ -12,7 +12,7 @@ from http.server import BaseHTTPRequestHandler, HTTPServer
 import pytest
 
 from drone_mesh.console.controls import OrderRefused
-from drone_mesh.console.frames import FrameStore
+from drone_mesh.console.frame_store import FrameStore
 from drone_mesh.console.gateway_client import GatewayClient, GatewayControls
 from drone_mesh.console.gateway_command import GatewayFeed, main
 from drone_mesh.console.real_mesh import origin_of

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 
-from drone_mesh.console.frames import FrameStore
+from drone_mesh.console.frame_store import FrameStore
 from drone_mesh.console.history import History
 from drone_mesh.console.player import Player
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus

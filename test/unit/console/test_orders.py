@@ -17,8 +17,8 @@ from drone_mesh.console.orders import (
 )
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.location import Location
-from drone_mesh.layouts import Order
-from drone_mesh.missions import Mission
+from drone_mesh.formations.layouts import Order
+from drone_mesh.formations.missions import Mission
 
 
 class Notebook:

@@ -11,11 +11,11 @@ import pytest
 from drone_mesh.console import server as server_module
 from drone_mesh.console.controls import OrderRefused
 from drone_mesh.console.dots import Dot
-from drone_mesh.console.frames import FrameStore
+from drone_mesh.console.frame_store import FrameStore
 from drone_mesh.console.orders import LayoutOffer
 from drone_mesh.console.server import MOST_PAGES, ConsoleServer
 from drone_mesh.drone.location import Location
-from drone_mesh.state.formation_preview import FormationPreview
+from drone_mesh.formations.preview import FormationPreview
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
 from drone_mesh.web import access
 from drone_mesh.web.access import Access

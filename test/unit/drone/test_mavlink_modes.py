@@ -573,4 +573,4 @@ def test_every_reason_of_the_pilot_fits_into_a_reply_of_the_drone() -> None:
     rig.shown_mode = next(n for n, name in ARDUPILOT.mode_names.items() if name == longest)
     reason = f"drone 100 cannot fly: {rig.ready().status().why_not_fly}"
     assert longest in reason
-    assert len(reason) <= 80  # communication/text_parts.py: 8 parts of 10 bytes
+    assert len(reason) <= 80  # communication/wire/text_parts.py: 8 parts of 10 bytes

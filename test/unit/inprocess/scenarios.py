@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from drone_mesh.formations.layouts import Layouts
 from drone_mesh.inprocess import Network
-from drone_mesh.layouts import Layouts
 
 LAYOUTS = Layouts.load(Path(__file__).parents[3] / "config" / "casus.yaml")
 

@@ -7,7 +7,6 @@ import math
 
 import pytest
 
-from drone_mesh.communication import messages
 from drone_mesh.communication.beacon.packets import (
     NO_ANCESTORS,
     Beacon,
@@ -15,11 +14,12 @@ from drone_mesh.communication.beacon.packets import (
     Motion,
     Search,
 )
-from drone_mesh.communication.deadlines import Due
+from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE
-from drone_mesh.communication.observer import MeshEventKind
-from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.seals.keys import MeshKey
+from drone_mesh.communication.timing.deadlines import Due
+from drone_mesh.communication.wire import messages
+from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.drone.location import Location
 from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.drone import InProcessDrone

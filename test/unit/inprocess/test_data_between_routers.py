@@ -8,9 +8,9 @@ import random
 import pytest
 import scenarios
 
-from drone_mesh.communication.messages import is_data
-from drone_mesh.communication.named_techniques import ROUTING_TECHNIQUES
+from drone_mesh.communication.node.named_techniques import ROUTING_TECHNIQUES
 from drone_mesh.communication.seals.keys import MeshKey
+from drone_mesh.communication.wire.messages import is_data
 from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.bounds import SHORTEST_PATH
 

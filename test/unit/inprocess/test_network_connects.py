@@ -19,8 +19,8 @@ from scenarios import (
 )
 
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.routing.child_table_tree import ChildTableTree
+from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.inprocess import Network

@@ -7,10 +7,10 @@ import logging
 import pytest
 from scenarios import line
 
-from drone_mesh.communication.frames import CommonFrame
-from drone_mesh.communication.messages import IntroduceMessage, frame_digest, with_frame_digest
+from drone_mesh.communication.neighbours.common_frame import CommonFrame
 from drone_mesh.communication.order_record import OrderState
-from drone_mesh.communication.packet_types import TYPES_WITH_PLACES
+from drone_mesh.communication.wire.messages import IntroduceMessage, frame_digest, with_frame_digest
+from drone_mesh.communication.wire.packet_types import TYPES_WITH_PLACES
 from drone_mesh.inprocess.drone import InProcessDrone
 
 ONE, OTHER = 0x1234, 0x4321

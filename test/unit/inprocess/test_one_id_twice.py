@@ -6,7 +6,7 @@ import random
 
 import pytest
 
-from drone_mesh.communication.own_id import OwnId
+from drone_mesh.communication.node.own_id import OwnId
 from drone_mesh.communication.seals.keys import MeshKey
 from drone_mesh.inprocess import Network
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from drone_mesh.communication.data.ticket import TicketState
-from drone_mesh.communication.named_techniques import ROUTING_TECHNIQUES
-from drone_mesh.communication.observer import MeshEventKind
-from drone_mesh.communication.packet_types import MessageType
+from drone_mesh.communication.events.observer import MeshEventKind
+from drone_mesh.communication.node.named_techniques import ROUTING_TECHNIQUES
+from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.inprocess import Network
 from drone_mesh.nrf24.emulator.links import IdealDisc, ScriptedLoss
 

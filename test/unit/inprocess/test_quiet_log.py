@@ -8,7 +8,7 @@ import pytest
 from proofs import quiet
 from proofs.quiet import CASES, LAYOUTS, RADIOS, TECHNIQUES, Run, runs, warnings_of
 
-from drone_mesh.layouts import GRID_CASE
+from drone_mesh.formations.layouts import GRID_CASE
 
 LARGE = [case for case in CASES if len(LAYOUTS.orders(case)) > 1]
 

@@ -7,7 +7,6 @@ import random
 import pytest
 from scenarios import LAYOUTS, events, fleet, flown, layout, line, outage, run_until
 
-from drone_mesh.communication.messages import GoToLocationMessage
 from drone_mesh.communication.repair.interfaces import IRepairStrategy
 from drone_mesh.communication.repair.named_strategies import (
     REPAIR_STRATEGIES,
@@ -15,6 +14,7 @@ from drone_mesh.communication.repair.named_strategies import (
 )
 from drone_mesh.communication.repair.strategies.stay import Stay
 from drone_mesh.communication.routing.child_table_tree import ChildTableTree
+from drone_mesh.communication.wire.messages import GoToLocationMessage
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.network import ORACLE

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import pytest
 
-from drone_mesh.communication.router_states import ConnectionState, RepairState
+from drone_mesh.communication.control.router_states import ConnectionState, RepairState
 from drone_mesh.errors import GoalRefused
 from drone_mesh.inprocess import Network
 

@@ -6,8 +6,8 @@ import random
 import time
 from typing import Callable
 
-from drone_mesh.communication.assembly import assemble_node
-from drone_mesh.communication.component import MeshnetworkComponent
+from drone_mesh.communication.node.assembly import assemble_node
+from drone_mesh.communication.node.component import MeshnetworkComponent
 from drone_mesh.drone.ground import GroundEngine
 from drone_mesh.drone.location import Location
 from drone_mesh.execution import MeshExecutor

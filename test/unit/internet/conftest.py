@@ -7,7 +7,7 @@ from typing import Any, Callable, Iterator
 import httpx
 import pytest
 
-from drone_mesh.communication.gateway import MeshnetworkGateway
+from drone_mesh.communication.node.gateway import MeshnetworkGateway
 from drone_mesh.execution import MeshExecutor
 from drone_mesh.inprocess import Network
 from drone_mesh.internet.http_internet import HttpInternet

@@ -16,8 +16,8 @@ import paho.mqtt.client as mqtt
 import pytest
 from paho.mqtt.enums import CallbackAPIVersion
 
-from drone_mesh.communication.gateway import MeshnetworkGateway
-from drone_mesh.communication.observer import MeshEvent, MeshEventKind
+from drone_mesh.communication.events.observer import MeshEvent, MeshEventKind
+from drone_mesh.communication.node.gateway import MeshnetworkGateway
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.execution import MeshExecutor

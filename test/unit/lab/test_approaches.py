@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.drone.flight_path import FlightPath
 from drone_mesh.lab.approaches import approaches
 from drone_mesh.lab.flights import Leg

@@ -7,18 +7,18 @@ import subprocess
 
 import pytest
 
-from drone_mesh.communication import messages
 from drone_mesh.communication.beacon.packets import Beacon, Below, Motion
-from drone_mesh.communication.messages import (
+from drone_mesh.communication.orders.messages import OrderOutcome, reply_packets
+from drone_mesh.communication.reports.node_report import NodeReport
+from drone_mesh.communication.wire import messages
+from drone_mesh.communication.wire.messages import (
     GoToLocationMessage,
     HeartbeatMessage,
     IntroduceMessage,
     LocationMessage,
     with_order_number,
 )
-from drone_mesh.communication.orders.messages import OrderOutcome, reply_packets
-from drone_mesh.communication.packet_types import MessageType
-from drone_mesh.communication.reports.node_report import NodeReport
+from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.drone.location import Location
 from drone_mesh.nrf24.emulator.frames import Frame, FrameFormat
 from drone_mesh.nrf24.emulator.pcapng import (

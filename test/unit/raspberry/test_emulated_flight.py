@@ -17,7 +17,7 @@ from mavlink_vehicle.modes import Mode
 from mavlink_vehicle.vehicle import MavlinkVehicle
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from drone_mesh.communication.timing import MeshTiming
+from drone_mesh.communication.timing.mesh_timing import MeshTiming
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
@@ -25,9 +25,9 @@ from drone_mesh.drone.mavlink.autopilots import ARDUPILOT, OUR_SYSTEM_ID, PX4, A
 from drone_mesh.drone.mavlink.limits import FlightLimits
 from drone_mesh.drone.mavlink.pilot import MavlinkPilot
 from drone_mesh.errors import LocationUnknown
+from drone_mesh.formations.layouts import Layouts
 from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.node import InProcessNode
-from drone_mesh.layouts import Layouts
 
 STEP_S = 0.05
 LIMITS = FlightLimits(speed_m_s=4.0, cruise_height_m=3.0, layer_m=0.5)

@@ -9,7 +9,7 @@ from typing import Iterator
 import pytest
 
 from drone_mesh.channel.runtime import Runtime
-from drone_mesh.communication.messages import IntroduceMessage
+from drone_mesh.communication.wire.messages import IntroduceMessage
 from drone_mesh.nrf24.emulator.air import Air
 from drone_mesh.nrf24.emulator.chip import EmulatedChip
 from drone_mesh.nrf24.emulator.links import LogDistance

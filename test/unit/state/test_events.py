@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from drone_mesh.communication.observer import MeshEvent, MeshEventKind
+from drone_mesh.communication.events.observer import MeshEvent, MeshEventKind
 from drone_mesh.state.events import EventBatcher
 
 FOUND, LOST = MeshEventKind.NEIGHBOUR_FOUND, MeshEventKind.NEIGHBOUR_LOST

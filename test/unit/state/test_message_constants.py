@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.state.model import REPAIR_STATES
 
 MESSAGES = Path(__file__).resolve().parents[3] / "msg"

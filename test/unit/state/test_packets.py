@@ -7,7 +7,7 @@ from collections import Counter
 
 import pytest
 
-from drone_mesh.communication.packet_types import PacketKind
+from drone_mesh.communication.wire.packet_types import PacketKind
 from drone_mesh.state.packets import PacketSampler, SampledPacket, kind_of
 
 

@@ -7,7 +7,7 @@ from typing import Iterator
 
 import pytest
 
-from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused
 from drone_mesh.world.body import BodyLimits, controller_force

@@ -8,8 +8,8 @@ import pytest
 
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
-from drone_mesh.state.airspace import APART_M, SWAY_M
-from drone_mesh.state.departures import AT_PLACE_M, Departures, FlightRules
+from drone_mesh.formations.airspace import APART_M, SWAY_M
+from drone_mesh.formations.departures import AT_PLACE_M, Departures, FlightRules
 from drone_mesh.state.model import MeshStatus, NodeStatus
 from drone_mesh.state.observation import describe_drone
 from drone_mesh.world.body import BodyLimits

@@ -7,11 +7,11 @@ import math
 from drone_mesh.communication.beacon.own_motion import OwnMotion
 from drone_mesh.communication.beacon.packets import newer
 from drone_mesh.communication.beacon.routes import PROVEN_S, BeaconRoutes
-from drone_mesh.communication.control_plane import IControlHost
+from drone_mesh.communication.control.control_plane import IControlHost
+from drone_mesh.communication.control.parts import NodeBasics
+from drone_mesh.communication.control.router_states import RepairState, RouterEvent, RouterStates
+from drone_mesh.communication.events.observer import MeshEventKind, in_hops
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.observer import MeshEventKind, in_hops
-from drone_mesh.communication.parts import NodeBasics
-from drone_mesh.communication.router_states import RepairState, RouterEvent, RouterStates
 
 CHECK_S = 1.0  # how often a router without a gateway considers its repair
 

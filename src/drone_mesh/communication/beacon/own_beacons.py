@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from drone_mesh.communication import messages
 from drone_mesh.communication.beacon.nodes_below import NodesBelow
 from drone_mesh.communication.beacon.packets import Beacon, Motion
 from drone_mesh.communication.beacon.routes import BeaconRoutes
+from drone_mesh.communication.control.parts import NodeBasics
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.packet_types import MessageType
-from drone_mesh.communication.parts import NodeBasics
+from drone_mesh.communication.wire import messages
+from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.drone.location import Location
 
 GATEWAY_PLACE_EVERY = 4  # beacons: one of so many carries the gateway's place

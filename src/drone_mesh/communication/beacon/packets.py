@@ -8,7 +8,7 @@ import struct
 from typing import NamedTuple, Sequence, Tuple
 
 from drone_mesh.communication.interfaces import MAX_NODE_ID, NO_ROUTE
-from drone_mesh.communication.messages import HEADER_BYTES
+from drone_mesh.communication.wire.messages import HEADER_BYTES
 from drone_mesh.drone.location import Location
 
 Velocity = Tuple[float, float, float]  # m/s: north, east, up, as in a Location

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from drone_mesh.communication import messages
 from drone_mesh.communication.beacon.connection import Connection
+from drone_mesh.communication.beacon.courier import Courier
 from drone_mesh.communication.beacon.losses import LUCKY
 from drone_mesh.communication.beacon.nodes_below import NodesBelow
 from drone_mesh.communication.beacon.own_beacons import OwnBeacons
@@ -17,14 +17,18 @@ from drone_mesh.communication.beacon.routes import BeaconRoutes
 from drone_mesh.communication.beacon.search import Searches
 from drone_mesh.communication.beacon.trickle import Trickle
 from drone_mesh.communication.beacon.verdicts import Verdicts
-from drone_mesh.communication.control_plane import IControlHost, IControlPlane, IControlTechnique
-from drone_mesh.communication.courier import Courier
-from drone_mesh.communication.deadlines import Due
+from drone_mesh.communication.control.control_plane import (
+    IControlHost,
+    IControlPlane,
+    IControlTechnique,
+)
+from drone_mesh.communication.control.parts import NodeBasics
+from drone_mesh.communication.control.router_states import RouterEvent, RouterStates
+from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.communication.interfaces import BROADCAST, MAX_NODE_ID, NO_ROUTE
-from drone_mesh.communication.observer import MeshEventKind
-from drone_mesh.communication.packet_types import MessageType
-from drone_mesh.communication.parts import NodeBasics
-from drone_mesh.communication.router_states import RouterEvent, RouterStates
+from drone_mesh.communication.timing.deadlines import Due
+from drone_mesh.communication.wire import messages
+from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.drone.location import Location
 
 LOOK_S = 0.2  # links change that slowly

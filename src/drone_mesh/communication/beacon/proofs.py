@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import math
 
-from drone_mesh.communication import messages, place_requests
+from drone_mesh.communication.beacon.courier import Courier
 from drone_mesh.communication.beacon.routes import BeaconRoutes
 from drone_mesh.communication.beacon.trickle import JITTER
-from drone_mesh.communication.courier import Courier
+from drone_mesh.communication.control import place_requests
+from drone_mesh.communication.control.parts import NodeBasics
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.parts import NodeBasics
+from drone_mesh.communication.wire import messages
 
 ASKS_S = 10.0  # at most so often for the place of a gateway that moves
 PERIOD_S = 60.0  # a router and its gateway tell each other the nonces of their seals

@@ -19,9 +19,9 @@ from drone_mesh.communication.beacon.packets import (
     Motion,
     newer,
 )
+from drone_mesh.communication.control.delivery import IRoutes
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.neighbours import HeardPlace
-from drone_mesh.communication.ways import IRoutes
+from drone_mesh.communication.neighbours.neighbour_table import HeardPlace
 from drone_mesh.drone.location import Location
 
 _WAY_UP = itemgetter(

@@ -7,7 +7,7 @@ from typing import Callable
 
 from drone_mesh.communication.beacon.packets import Search
 from drone_mesh.communication.beacon.routes import BeaconRoutes
-from drone_mesh.communication.packet_types import MessageType
+from drone_mesh.communication.wire.packet_types import MessageType
 
 AGAIN_S = 0.6  # broadcasts are not acknowledged
 MOST_HOPS = 12

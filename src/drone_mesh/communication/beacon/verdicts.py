@@ -6,12 +6,12 @@ import itertools
 import math
 from typing import Iterator
 
+from drone_mesh.communication.beacon.courier import DROP, HOLD, Transit
 from drone_mesh.communication.beacon.routes import BeaconRoutes, Way
 from drone_mesh.communication.beacon.search import HOPS_AROUND, MOST_HOPS, Searches
-from drone_mesh.communication.courier import DROP, HOLD, Transit
-from drone_mesh.communication.deadlines import Deadlines, Due
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.packet_types import MessageType
+from drone_mesh.communication.timing.deadlines import Deadlines, Due
+from drone_mesh.communication.wire.packet_types import MessageType
 
 HELD_S = 2.5  # a packet without a next hop waits this long
 RETRY_S = 0.15  # so often it asks again, beside each beacon that arrives

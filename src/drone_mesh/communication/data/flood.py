@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections import OrderedDict
 from typing import NamedTuple
 
-from drone_mesh.communication import messages
+from drone_mesh.communication.control.parts import NodeParts
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.ticket import TO_ALL
-from drone_mesh.communication.parts import NodeParts
+from drone_mesh.communication.wire import messages
 
 REMEMBERED_S = 5.0  # longer than a fragment takes through the mesh
 MOST_REMEMBERED = 1024  # numbers of all senders together

@@ -7,6 +7,7 @@ import math
 from collections import OrderedDict
 from typing import Callable
 
+from drone_mesh.communication.control.parts import NodeParts
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.ack_turns import AckTurns
 from drone_mesh.communication.data.echo import SendPacket
@@ -15,7 +16,6 @@ from drone_mesh.communication.data.packets import Ack, Poll
 from drone_mesh.communication.data.reassembly import Whole
 from drone_mesh.communication.data.ticket import TO_ALL
 from drone_mesh.communication.interfaces import MAX_NODE_ID
-from drone_mesh.communication.parts import NodeParts
 
 TIDY_PERIOD_S = 5.0  # how often old fragments are dropped
 MOST_INBOXES = 2 * MAX_NODE_ID  # every other node, with its messages to this one and to all

@@ -12,6 +12,7 @@ import math
 from collections import OrderedDict
 from typing import Callable
 
+from drone_mesh.communication.control.parts import NodeParts
 from drone_mesh.communication.data.echo import SendPacket
 from drone_mesh.communication.data.outbox import Outbox
 from drone_mesh.communication.data.outgoing import OutgoingMessage
@@ -23,7 +24,6 @@ from drone_mesh.communication.data.ticket import (
     destination_in_words,
 )
 from drone_mesh.communication.interfaces import NO_ROUTE, IMeshDebugInfo
-from drone_mesh.communication.parts import NodeParts
 
 BURST = 8  # packets sent before others get their turn
 FOUND_WITHIN_S = 0.5  # a gateway's search passes through 100 nodes

@@ -12,7 +12,7 @@ import math
 import struct
 from typing import NamedTuple
 
-from drone_mesh.communication.messages import BODY_BYTES, ROUTE_RECORD, ROUTE_RECORD_AT
+from drone_mesh.communication.wire.messages import BODY_BYTES, ROUTE_RECORD, ROUTE_RECORD_AT
 from drone_mesh.errors import MessageRefused, PacketError
 
 MAX_MESSAGE_BYTES = 1024

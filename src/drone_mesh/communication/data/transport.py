@@ -10,7 +10,7 @@ from __future__ import annotations
 import hmac
 from typing import Callable, NamedTuple
 
-from drone_mesh.communication import messages
+from drone_mesh.communication.control.parts import NodeParts
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.echo import Echoes, OnEchoAnswer
 from drone_mesh.communication.data.flood import Flood
@@ -19,9 +19,9 @@ from drone_mesh.communication.data.outboxes import Outboxes
 from drone_mesh.communication.data.outgoing import OutgoingMessage
 from drone_mesh.communication.data.reassembly import Whole
 from drone_mesh.communication.data.ticket import TO_ALL, TO_GATEWAY, Ticket, TicketState
-from drone_mesh.communication.deadlines import Due
 from drone_mesh.communication.interfaces import MAX_NODE_ID, IMeshDebugInfo
-from drone_mesh.communication.parts import NodeParts
+from drone_mesh.communication.timing.deadlines import Due
+from drone_mesh.communication.wire import messages
 from drone_mesh.errors import MessageRefused, PacketError, QueueFull
 
 MOST_QUEUED = 64  # messages waiting or under way, in total

@@ -8,14 +8,18 @@ from __future__ import annotations
 import math
 from typing import Callable, NamedTuple
 
-from drone_mesh.communication.deadlines import Due
+from drone_mesh.communication.control.place_requests import ask_for_place
+from drone_mesh.communication.control.router_states import (
+    ConnectionState,
+    RouterEvent,
+    RouterStates,
+)
+from drone_mesh.communication.events.observer import MeshEventKind, in_hops
 from drone_mesh.communication.heartbeats.detours import AVOIDED_S, Detours
 from drone_mesh.communication.heartbeats.parts import HeartbeatParts
 from drone_mesh.communication.heartbeats.relay_check import RelayCheck
 from drone_mesh.communication.interfaces import MAX_NODE_ID, NO_ROUTE
-from drone_mesh.communication.observer import MeshEventKind, in_hops
-from drone_mesh.communication.place_requests import ask_for_place
-from drone_mesh.communication.router_states import ConnectionState, RouterEvent, RouterStates
+from drone_mesh.communication.timing.deadlines import Due
 
 _HOPS_UNTIL_KNOWN = 10  # the number of hops for which to wait for the first answer
 RESIGNED_PERIODS = 2.5  # a gateway without internet that is silent for longer is lost

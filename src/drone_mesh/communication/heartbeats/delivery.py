@@ -9,15 +9,15 @@ import math
 from collections import deque
 from typing import Callable, Sequence
 
-from drone_mesh.communication import messages
+from drone_mesh.communication.control.delivery import IDelivery
+from drone_mesh.communication.control.parts import NodeBasics
+from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.communication.heartbeats.circulation import CirculationGuard, Passage
 from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE
-from drone_mesh.communication.limits import REPEATS, RateLimit, Strangers
-from drone_mesh.communication.messages import CREATOR_AT, FORWARD_AT
-from drone_mesh.communication.observer import MeshEventKind
-from drone_mesh.communication.parts import NodeBasics
 from drone_mesh.communication.routing.interfaces import IRoutingTechnique
-from drone_mesh.communication.ways import IDelivery
+from drone_mesh.communication.timing.limits import REPEATS, RateLimit, Strangers
+from drone_mesh.communication.wire import messages
+from drone_mesh.communication.wire.messages import CREATOR_AT, FORWARD_AT
 
 DATA_PERSISTENCE = 3  # users' packets are many, so a chain of losses is more likely
 SENT_KEPT_S = 30.0  # on a busy channel a packet is under way for seconds

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.neighbours import Neighbours
+from drone_mesh.communication.neighbours.neighbour_table import Neighbours
 
 AVOIDED_S = 60.0  # for a neighbour through which no answer came
 SWALLOWER_AVOIDED_S = 600.0  # for a neighbour that seems to swallow packets

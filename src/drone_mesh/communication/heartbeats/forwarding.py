@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from typing import Hashable, Sequence
 
-from drone_mesh.communication import messages
+from drone_mesh.communication.control.parts import NodeBasics
+from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.communication.heartbeats.circulation import CirculationGuard, came_round
 from drone_mesh.communication.heartbeats.delivery import Delivery
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.limits import RateLimit
-from drone_mesh.communication.observer import MeshEventKind
-from drone_mesh.communication.packet_types import MessageType
-from drone_mesh.communication.parts import NodeBasics
 from drone_mesh.communication.routing.interfaces import IRoutingTechnique
-from drone_mesh.communication.timing import CIRCULATION_S
+from drone_mesh.communication.timing.limits import RateLimit
+from drone_mesh.communication.timing.mesh_timing import CIRCULATION_S
+from drone_mesh.communication.wire import messages
+from drone_mesh.communication.wire.packet_types import MessageType
 
 _HEARTBEAT = int(MessageType.HEARTBEAT)
 CREATORS_TOLD = 8  # MISSING to one creator of users' data, per limits.LIMIT_PERIOD_S

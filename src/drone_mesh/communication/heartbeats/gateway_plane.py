@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import Sequence
 
-from drone_mesh.communication import messages
-from drone_mesh.communication.control_plane import IControlHost
+from drone_mesh.communication.control.control_plane import IControlHost
+from drone_mesh.communication.control.parts import NodeBasics
+from drone_mesh.communication.control.router_states import RouterEvent, RouterStates
 from drone_mesh.communication.heartbeats.plane import HeartbeatPlane
 from drone_mesh.communication.heartbeats.router_plane import RouterHeartbeats
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.parts import NodeBasics
-from drone_mesh.communication.router_states import RouterEvent, RouterStates
 from drone_mesh.communication.routing.interfaces import IRoutingTechnique
+from drone_mesh.communication.wire import messages
 
 
 class GatewayHeartbeats(RouterHeartbeats):

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from typing import Callable
 
-from drone_mesh.communication import messages
-from drone_mesh.communication.control_plane import IControlHost
-from drone_mesh.communication.deadlines import Due
+from drone_mesh.communication.control.control_plane import IControlHost
 from drone_mesh.communication.heartbeats.parts import HeartbeatParts
-from drone_mesh.communication.packet_types import MessageType
+from drone_mesh.communication.timing.deadlines import Due
+from drone_mesh.communication.wire import messages
+from drone_mesh.communication.wire.packet_types import MessageType
 
 AFTER_POWER_S = 0.2  # the medium must register the antenna first
 SPREAD_S = 1.0  # spreads the nodes' packets after an outage

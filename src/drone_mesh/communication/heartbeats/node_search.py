@@ -12,10 +12,10 @@ from __future__ import annotations
 import math
 from typing import Callable
 
-from drone_mesh.communication import messages
+from drone_mesh.communication.control.parts import NodeParts
 from drone_mesh.communication.interfaces import BROADCAST
-from drone_mesh.communication.packet_types import MessageType
-from drone_mesh.communication.parts import NodeParts
+from drone_mesh.communication.wire import messages
+from drone_mesh.communication.wire.packet_types import MessageType
 
 BODY = MessageType.NODE_SEARCH.about.layout
 SEARCH_EVERY_S = 0.3  # each search is one broadcast by every node

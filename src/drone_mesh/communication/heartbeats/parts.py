@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from drone_mesh.communication import messages
+from drone_mesh.communication.control.parts import NodeParts
 from drone_mesh.communication.heartbeats.delivery import Delivery
-from drone_mesh.communication.packet_types import MessageType
-from drone_mesh.communication.parts import NodeParts
 from drone_mesh.communication.routing.interfaces import IRoutingTechnique
+from drone_mesh.communication.wire import messages
+from drone_mesh.communication.wire.packet_types import MessageType
 
 _HEARTBEAT = int(MessageType.HEARTBEAT)
 

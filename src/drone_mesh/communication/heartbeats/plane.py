@@ -5,19 +5,19 @@ from __future__ import annotations
 import math
 from typing import Sequence
 
-from drone_mesh.communication import messages
-from drone_mesh.communication.control_plane import IControlHost, IControlPlane
-from drone_mesh.communication.deadlines import Due
+from drone_mesh.communication.control.control_plane import IControlHost, IControlPlane
+from drone_mesh.communication.control.parts import NodeBasics
 from drone_mesh.communication.heartbeats.delivery import Delivery
 from drone_mesh.communication.heartbeats.forwarding import Forwarding
 from drone_mesh.communication.heartbeats.introduction import Introduction
 from drone_mesh.communication.heartbeats.node_search import NodeSearch
 from drone_mesh.communication.heartbeats.parts import HeartbeatParts
 from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE
-from drone_mesh.communication.medium import Medium
-from drone_mesh.communication.packet_types import MessageType
-from drone_mesh.communication.parts import NodeBasics
 from drone_mesh.communication.routing.interfaces import IRoutingEssentials, IRoutingTechnique
+from drone_mesh.communication.timing.deadlines import Due
+from drone_mesh.communication.timing.medium import Medium
+from drone_mesh.communication.wire import messages
+from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.drone.location import Location
 
 

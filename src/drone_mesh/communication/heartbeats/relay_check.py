@@ -11,10 +11,10 @@ from __future__ import annotations
 import logging
 import math
 
+from drone_mesh.communication.control.place_requests import ask_for_place
 from drone_mesh.communication.heartbeats.detours import SWALLOWER_AVOIDED_S, Detours
 from drone_mesh.communication.heartbeats.parts import HeartbeatParts
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.place_requests import ask_for_place
 
 ASK_PERIODS = 3.0  # in check periods: one packet and its answer in half a minute
 WAIT_PERIODS = 0.9  # in check periods: a question that is younger may be answered yet

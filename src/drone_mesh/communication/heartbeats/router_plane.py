@@ -4,21 +4,21 @@ from __future__ import annotations
 
 from typing import Sequence
 
-from drone_mesh.communication import messages
-from drone_mesh.communication.control_plane import IControlHost
-from drone_mesh.communication.deadlines import Due
-from drone_mesh.communication.heartbeats.connection import GatewayConnection
-from drone_mesh.communication.heartbeats.plane import HeartbeatPlane
-from drone_mesh.communication.interfaces import MAX_NODE_ID, NO_ROUTE
-from drone_mesh.communication.packet_types import MessageType
-from drone_mesh.communication.parts import NodeBasics
-from drone_mesh.communication.router_states import (
+from drone_mesh.communication.control.control_plane import IControlHost
+from drone_mesh.communication.control.parts import NodeBasics
+from drone_mesh.communication.control.router_states import (
     ConnectionState,
     RepairState,
     RouterEvent,
     RouterStates,
 )
+from drone_mesh.communication.heartbeats.connection import GatewayConnection
+from drone_mesh.communication.heartbeats.plane import HeartbeatPlane
+from drone_mesh.communication.interfaces import MAX_NODE_ID, NO_ROUTE
 from drone_mesh.communication.routing.interfaces import IRoutingTechnique
+from drone_mesh.communication.timing.deadlines import Due
+from drone_mesh.communication.wire import messages
+from drone_mesh.communication.wire.packet_types import MessageType
 
 _HEARTBEAT = int(MessageType.HEARTBEAT)
 CHANGE_PERIODS = 0.3  # until the check after a neighbour was lost, on average

@@ -9,14 +9,14 @@ import math
 from dataclasses import dataclass, field
 from typing import Callable, Iterable
 
-from drone_mesh.communication.deadlines import Due
+from drone_mesh.communication.control.parts import NodeParts
+from drone_mesh.communication.events.observer import MeshEventKind, explanation
 from drone_mesh.communication.heartbeats.node_search import NUMBERS_PER_S, SEARCH_EVERY_S
-from drone_mesh.communication.messages import GoToLocationMessage, with_order_number
-from drone_mesh.communication.observer import MeshEventKind, explanation
 from drone_mesh.communication.order_record import OrderRecord, OrderState
 from drone_mesh.communication.orders.messages import OrderOutcome, OrderQuery, OrderReply
-from drone_mesh.communication.parts import NodeParts
-from drone_mesh.communication.text_parts import TextAssembly
+from drone_mesh.communication.timing.deadlines import Due
+from drone_mesh.communication.wire.messages import GoToLocationMessage, with_order_number
+from drone_mesh.communication.wire.text_parts import TextAssembly
 from drone_mesh.drone.location import Location
 
 OLD_ORDERS_KEPT = 100  # besides the latest of each drone

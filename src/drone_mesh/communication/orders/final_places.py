@@ -8,9 +8,9 @@ from __future__ import annotations
 import math
 from typing import Iterable, NamedTuple
 
+from drone_mesh.communication.control.parts import NodeParts
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.order_record import OrderRecord, OrderState
-from drone_mesh.communication.parts import NodeParts
 from drone_mesh.communication.reports.node_reports import ReportedNode
 from drone_mesh.drone.goal import ROUNDING_M
 from drone_mesh.drone.location import Location

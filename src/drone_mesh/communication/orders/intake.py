@@ -10,11 +10,11 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Callable
 
-from drone_mesh.communication.deadlines import Due
-from drone_mesh.communication.messages import GoToLocationMessage, order_number
-from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.communication.control.parts import NodeParts
+from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.communication.orders.messages import OrderOutcome, OrderQuery, reply_packets
-from drone_mesh.communication.parts import NodeParts
+from drone_mesh.communication.timing.deadlines import Due
+from drone_mesh.communication.wire.messages import GoToLocationMessage, order_number
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused

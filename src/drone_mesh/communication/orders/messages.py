@@ -10,10 +10,10 @@ import struct
 from dataclasses import dataclass
 from typing import ClassVar
 
-from drone_mesh.communication import messages
-from drone_mesh.communication.messages import HEADER_BYTES
-from drone_mesh.communication.packet_types import MessageType
-from drone_mesh.communication.text_parts import is_valid, split
+from drone_mesh.communication.wire import messages
+from drone_mesh.communication.wire.messages import HEADER_BYTES
+from drone_mesh.communication.wire.packet_types import MessageType
+from drone_mesh.communication.wire.text_parts import is_valid, split
 
 TEXT_BYTES = 10  # of a reason, in one packet
 

@@ -7,22 +7,22 @@ import math
 from collections import deque
 from typing import Mapping, NamedTuple
 
-from drone_mesh.communication.control_plane import IControlPlane
-from drone_mesh.communication.deadlines import Due
+from drone_mesh.communication.control.control_plane import IControlPlane
+from drone_mesh.communication.control.parts import NodeParts
+from drone_mesh.communication.control.place_requests import ask_all_for_places, ask_for_place
+from drone_mesh.communication.control.router_states import RepairState, RouterEvent, RouterStates
+from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE
-from drone_mesh.communication.messages import (
+from drone_mesh.communication.repair.heights import may_be_flown_to
+from drone_mesh.communication.repair.options import RepairOptions
+from drone_mesh.communication.repair.spots import NEAR, PITCH
+from drone_mesh.communication.timing.deadlines import Due
+from drone_mesh.communication.wire.messages import (
     GatewayPlace,
     MovementNegotiationMessage,
     addressed,
     own_location,
 )
-from drone_mesh.communication.observer import MeshEventKind
-from drone_mesh.communication.parts import NodeParts
-from drone_mesh.communication.place_requests import ask_all_for_places, ask_for_place
-from drone_mesh.communication.repair.heights import may_be_flown_to
-from drone_mesh.communication.repair.options import RepairOptions
-from drone_mesh.communication.repair.spots import NEAR, PITCH
-from drone_mesh.communication.router_states import RepairState, RouterEvent, RouterStates
 from drone_mesh.drone.location import Location
 
 RADIO_FAILED = "its radio does not work"

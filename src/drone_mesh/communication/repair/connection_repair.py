@@ -8,20 +8,20 @@ from __future__ import annotations
 
 import math
 
-from drone_mesh.communication.control_plane import IControlPlane
+from drone_mesh.communication.control.control_plane import IControlPlane
+from drone_mesh.communication.control.parts import NodeParts
+from drone_mesh.communication.control.router_states import RepairState, RouterEvent, RouterStates
+from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.observer import MeshEventKind
-from drone_mesh.communication.parts import NodeParts
 from drone_mesh.communication.repair.actions import RADIO_FAILED, RepairActions, Step
 from drone_mesh.communication.repair.election import NO_BID, TOOK_OFF, TOOK_OFF_HOME
-from drone_mesh.communication.repair.flight import ASK_AGAIN_S, ASK_SEALED_S, RepairFlight
 from drone_mesh.communication.repair.heights import above_ground, at_whole_metres
 from drone_mesh.communication.repair.interfaces import IRepairStrategy
 from drone_mesh.communication.repair.options import RepairOptions
+from drone_mesh.communication.repair.repair_flight import ASK_AGAIN_S, ASK_SEALED_S, RepairFlight
 from drone_mesh.communication.repair.spots import PITCH, Landing, own_spot, spot_beside_rivals
 from drone_mesh.communication.repair.status import NOTHING_TO_REPAIR, RepairStatus
 from drone_mesh.communication.repair.taken_places import TakenPlaces
-from drone_mesh.communication.router_states import RepairState, RouterEvent, RouterStates
 from drone_mesh.drone.location import Location
 
 MOVING_PATIENCE = 3.0  # while drones move by themselves, a lost link may come back

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import AbstractSet, NamedTuple
 
-from drone_mesh.communication.messages import MovementNegotiationMessage
+from drone_mesh.communication.wire.messages import MovementNegotiationMessage
 
 NO_BID = -1.0  # the score of a node that does not fly
 MAX_SCORE_M = 1e9  # beyond every possible place, and it fits a float32

@@ -8,8 +8,9 @@ from __future__ import annotations
 import abc
 import math
 
+from drone_mesh.communication.control.router_states import RepairState, RouterEvent
+from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.repair.actions import RepairActions, Step
 from drone_mesh.communication.repair.bid_credit import BidCredit, highest_plausible
 from drone_mesh.communication.repair.election import (
@@ -23,7 +24,6 @@ from drone_mesh.communication.repair.election import (
 from drone_mesh.communication.repair.flight_news import FlightNews
 from drone_mesh.communication.repair.lone_repair import LoneRepair
 from drone_mesh.communication.repair.spots import NEAR, PITCH
-from drone_mesh.communication.router_states import RepairState, RouterEvent
 from drone_mesh.drone.location import Location
 
 PLACES_WITHIN_S = 1.0  # docs/repair.md, "Negotiation": how long to wait for places

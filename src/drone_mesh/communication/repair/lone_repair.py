@@ -10,10 +10,10 @@ from __future__ import annotations
 import abc
 import math
 
-from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.communication.control.router_states import RepairState
+from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.communication.repair.actions import RepairActions, Step
 from drone_mesh.communication.repair.interfaces import SILENCE_PATIENCE, IRepairStrategy
-from drone_mesh.communication.router_states import RepairState
 from drone_mesh.drone.location import Location
 
 LISTENS_S = 1.0  # an answer takes some milliseconds

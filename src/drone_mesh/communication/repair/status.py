@@ -8,9 +8,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from drone_mesh.communication.control.router_states import RepairState
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.repair.election import NO_BID
-from drone_mesh.communication.router_states import RepairState
 from drone_mesh.drone.location import Location
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Sequence
 
-from drone_mesh.communication.parts import NodeParts
+from drone_mesh.communication.control.parts import NodeParts
 from drone_mesh.communication.repair.heights import above_ground
 from drone_mesh.communication.repair.options import LostPlace, RepairOptions
 from drone_mesh.communication.repair.spots import Landing, free_spot

@@ -9,11 +9,11 @@ import struct
 from dataclasses import dataclass
 from typing import ClassVar
 
-from drone_mesh.communication import messages
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.messages import HEADER_BYTES
-from drone_mesh.communication.packet_types import MessageType
-from drone_mesh.communication.text_parts import split
+from drone_mesh.communication.wire import messages
+from drone_mesh.communication.wire.messages import HEADER_BYTES
+from drone_mesh.communication.wire.packet_types import MessageType
+from drone_mesh.communication.wire.text_parts import split
 from drone_mesh.drone.location import Location
 
 STEPS_PER_M = 5  # places are encoded in steps of 0.2 m: 5000 m fit into an int16

@@ -8,16 +8,16 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from drone_mesh.communication.deadlines import Due
+from drone_mesh.communication.control.parts import NodeParts
 from drone_mesh.communication.interfaces import MAX_NODE_ID, IMeshDebugInfo
-from drone_mesh.communication.packet_types import MessageType
-from drone_mesh.communication.parts import NodeParts
 from drone_mesh.communication.reports.node_report import (
     NOTHING_REPORTED,
     NodeReport,
     NodeWords,
 )
-from drone_mesh.communication.text_parts import TextAssembly
+from drone_mesh.communication.timing.deadlines import Due
+from drone_mesh.communication.wire.packet_types import MessageType
+from drone_mesh.communication.wire.text_parts import TextAssembly
 
 WORDS_AGAIN_REPORTS = 10  # unchanged words are repeated for a new gateway
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.routing.interfaces import IRoutingEssentials, IRoutingTechnique
+from drone_mesh.communication.wire.packet_types import MessageType
 
 _HEARTBEAT = int(MessageType.HEARTBEAT)
 

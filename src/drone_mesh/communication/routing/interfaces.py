@@ -9,10 +9,10 @@ from __future__ import annotations
 import abc
 from typing import ClassVar, Sequence
 
+from drone_mesh.communication.control.delivery import IRoutes, ITechnique
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.medium import UNDISTURBED, Medium
-from drone_mesh.communication.packet_types import MessageType
-from drone_mesh.communication.ways import IRoutes, ITechnique
+from drone_mesh.communication.timing.medium import UNDISTURBED, Medium
+from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.drone.location import Location
 
 _HEARTBEAT = int(MessageType.HEARTBEAT)

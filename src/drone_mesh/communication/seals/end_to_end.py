@@ -15,18 +15,18 @@ from collections import deque
 from hmac import compare_digest
 from typing import Callable, NamedTuple
 
-from drone_mesh.communication import messages
 from drone_mesh.communication.interfaces import MAX_NODE_ID, PAYLOAD_BYTES
-from drone_mesh.communication.messages import (
+from drone_mesh.communication.seals.keys import Keys
+from drone_mesh.communication.seals.replay import ReplayWindow
+from drone_mesh.communication.seals.seal import SEAL_AT, SEAL_BYTES
+from drone_mesh.communication.wire import messages
+from drone_mesh.communication.wire.messages import (
     CREATOR_AT,
     FORWARD_AT,
     FROM_AT,
     TYPE_AT,
 )
-from drone_mesh.communication.packet_types import MessageType
-from drone_mesh.communication.seals.keys import Keys
-from drone_mesh.communication.seals.replay import ReplayWindow
-from drone_mesh.communication.seals.seal import SEAL_AT, SEAL_BYTES
+from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.errors import PacketError
 
 NEW_NONCE_AFTER_S = 5.0  # with the next heartbeat to a gateway

@@ -19,13 +19,13 @@ from collections import OrderedDict, deque
 from hmac import compare_digest
 from typing import NamedTuple
 
-from drone_mesh.communication import messages
 from drone_mesh.communication.interfaces import BROADCAST, PAYLOAD_BYTES
-from drone_mesh.communication.limits import RateLimit
-from drone_mesh.communication.messages import FORWARD_AT, FROM_AT, TO_AT
-from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.seals.keys import Keys
 from drone_mesh.communication.seals.replay import AgedWindow
+from drone_mesh.communication.timing.limits import RateLimit
+from drone_mesh.communication.wire import messages
+from drone_mesh.communication.wire.messages import FORWARD_AT, FROM_AT, TO_AT
+from drone_mesh.communication.wire.packet_types import MessageType
 
 TAG_BYTES = 5
 SEAL_BYTES = 2 + TAG_BYTES

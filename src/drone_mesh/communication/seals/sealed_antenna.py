@@ -9,8 +9,7 @@ from __future__ import annotations
 import random
 from typing import Callable, Sequence
 
-from drone_mesh.communication import messages
-from drone_mesh.communication.complaints import Complaints
+from drone_mesh.communication.events.complaints import Complaints
 from drone_mesh.communication.interfaces import (
     BROADCAST,
     MAX_NODE_ID,
@@ -20,9 +19,6 @@ from drone_mesh.communication.interfaces import (
     IMeshSeals,
     IWirelessCommunication,
 )
-from drone_mesh.communication.medium import ChannelUse, Medium
-from drone_mesh.communication.messages import CREATOR_AT, FORWARD_AT, TO_AT, TYPE_AT
-from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.seals.end_to_end import (
     EndToEnd,
     Expired,
@@ -33,7 +29,11 @@ from drone_mesh.communication.seals.end_to_end import (
 from drone_mesh.communication.seals.keys import Keys
 from drone_mesh.communication.seals.message_seal import MessageSeal
 from drone_mesh.communication.seals.seal import SEAL_AT, SEAL_BYTES, HopSeal, NotOpened
-from drone_mesh.communication.timing import MeshTiming
+from drone_mesh.communication.timing.medium import ChannelUse, Medium
+from drone_mesh.communication.timing.mesh_timing import MeshTiming
+from drone_mesh.communication.wire import messages
+from drone_mesh.communication.wire.messages import CREATOR_AT, FORWARD_AT, TO_AT, TYPE_AT
+from drone_mesh.communication.wire.packet_types import MessageType
 
 FRESH_PERIODS = 3.0  # a neighbour sends something once per check period
 FOREIGN_AFTER_S = 20.0  # two check periods; a restarted neighbour answers by then

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 
-from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.communication.repair.options import CLEARANCE_M
 from drone_mesh.lab.approaches import approaches
 from drone_mesh.lab.metrics.registry import NAN, metric, metrics

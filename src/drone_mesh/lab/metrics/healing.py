@@ -6,7 +6,7 @@ import math
 import statistics
 from typing import Iterable
 
-from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.lab.metrics.registry import NAN, metric, metrics
 from drone_mesh.lab.record import RunRecord
 from drone_mesh.state.model import EventRecord

@@ -8,8 +8,8 @@ from collections import Counter, defaultdict
 from typing import Sequence
 
 from drone_mesh.communication.data.ticket import TicketState
-from drone_mesh.communication.observer import MeshEventKind
-from drone_mesh.communication.packet_types import MessageType
+from drone_mesh.communication.events.observer import MeshEventKind
+from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.lab.impairments import Traffic
 from drone_mesh.lab.metrics.registry import (
     METRICS,

@@ -8,7 +8,7 @@ from typing import Iterable, Iterator, Sequence
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
-from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.drone.roles import Role
 from drone_mesh.lab.run_report.drawing import figure_with_rows, svg_of
 from drone_mesh.lab.run_report.story import RunStory

@@ -6,7 +6,7 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Iterable, Mapping, Sequence
 
-from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.errors import MeshError
 from drone_mesh.state.links import Link, LinkForecast, known_links
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus

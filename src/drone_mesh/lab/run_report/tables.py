@@ -7,7 +7,7 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Sequence, Union
 
-from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.lab.run_report.story import RunStory
 from drone_mesh.state.model import EventRecord
 from drone_mesh.state.outages import MeshSample, Outage

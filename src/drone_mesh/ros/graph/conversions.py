@@ -8,10 +8,10 @@ from typing import Any, Protocol, Sequence
 
 import rospy
 
-from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.drone.flight_path import Vector
 from drone_mesh.drone.location import Location
-from drone_mesh.layouts import Order
+from drone_mesh.formations.layouts import Order
 from drone_mesh.msg import DroneInfo, MeshState, NodeState, Obstacle, RequestGatewayDroneFlight
 from drone_mesh.msg import Location as LocationMsg
 from drone_mesh.msg import MeshEvent as MeshEventMsg

@@ -15,8 +15,8 @@ from drone_mesh.configuration import FactoryConfiguration, load_configuration
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError, naming_argument
-from drone_mesh.layouts import Layouts
-from drone_mesh.missions import Mission, read_missions
+from drone_mesh.formations.layouts import Layouts
+from drone_mesh.formations.missions import Mission, read_missions
 from drone_mesh.ros.graph import names
 
 PACKAGE = "drone_mesh"

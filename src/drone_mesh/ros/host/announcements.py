@@ -7,8 +7,8 @@ from typing import Callable, Protocol
 
 import rospy
 
-from drone_mesh.communication.messages import packet
-from drone_mesh.communication.packet_types import MessageType
+from drone_mesh.communication.wire.messages import packet
+from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.drone.flight_path import Vector
 from drone_mesh.msg import DroneInfo
 from drone_mesh.ros.graph import names

@@ -6,8 +6,8 @@ from typing import Callable
 
 import rospy
 
-from drone_mesh.communication.component import MeshnetworkComponent
-from drone_mesh.communication.observer import MeshEvent
+from drone_mesh.communication.events.observer import MeshEvent
+from drone_mesh.communication.node.component import MeshnetworkComponent
 from drone_mesh.drone.roles import Role
 from drone_mesh.msg import HostReport, NodeState
 from drone_mesh.ros.graph import names

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from drone_mesh.air.obstacles import Obstacles
-from drone_mesh.communication.node_configuration import NodeConfiguration
+from drone_mesh.communication.node.node_configuration import NodeConfiguration
 from drone_mesh.communication.repair.options import LostPlace, RepairOptions
 from drone_mesh.communication.seals.key_file import read_key_file
 from drone_mesh.communication.seals.keys import MeshKey
-from drone_mesh.communication.timing import MeshTiming
+from drone_mesh.communication.timing.mesh_timing import MeshTiming
 from drone_mesh.configuration import FactoryConfiguration
 from drone_mesh.errors import ConfigurationError, naming_argument
 from drone_mesh.internet.mqtt_topics import PASSWORD_VARIABLE, Broker, parse_broker

@@ -6,7 +6,7 @@ import functools
 import queue
 from typing import Callable, Generic, Protocol, TypeVar
 
-from drone_mesh.communication.component import MeshnetworkComponent
+from drone_mesh.communication.node.component import MeshnetworkComponent
 from drone_mesh.state.model import NodeStatus
 from drone_mesh.state.observation import describe_component
 

@@ -6,7 +6,7 @@ import logging
 import struct
 from typing import Any, Sequence
 
-from drone_mesh.communication.messages import readdressed, receiver, sender
+from drone_mesh.communication.wire.messages import readdressed, receiver, sender
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.persistent_service import (
     PersistentService,

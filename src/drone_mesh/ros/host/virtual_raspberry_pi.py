@@ -6,9 +6,9 @@ import abc
 import random
 from typing import Callable, ClassVar
 
-from drone_mesh.communication.assembly import Security, assemble_node
+from drone_mesh.communication.events.observer import MeshObserver, Observers
 from drone_mesh.communication.interfaces import IInternetConnection, IWirelessCommunication
-from drone_mesh.communication.observer import MeshObserver, Observers
+from drone_mesh.communication.node.assembly import Security, assemble_node
 from drone_mesh.drone.roles import Role
 from drone_mesh.execution import ExecutorSlot
 from drone_mesh.internet import DEFAULT_PORT

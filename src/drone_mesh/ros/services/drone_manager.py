@@ -14,7 +14,8 @@ from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.drone.fleet import ids_in_words
 from drone_mesh.drone.goal import check_apart, check_goal
 from drone_mesh.errors import GoalRefused
-from drone_mesh.layouts import MAX_NAME, Layouts, Order, UnknownCase
+from drone_mesh.formations.layouts import MAX_NAME, Layouts, Order, UnknownCase
+from drone_mesh.formations.standing_orders import PartState
 from drone_mesh.msg import FlightOrderAnswer, RequestGatewayDroneFlight
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import start_node
@@ -29,7 +30,6 @@ from drone_mesh.ros.graph.waiting import comes_true
 from drone_mesh.ros.services.order_answers import OrderAnswers, Outcomes
 from drone_mesh.ros.services.order_summary import OrderSummary
 from drone_mesh.ros.services.standing_layouts import Given, StandingLayouts, flight_rules
-from drone_mesh.state.standing_orders import PartState
 
 WAIT_FOR_GATEWAY_S = 3.0  # of wall time (docs/ros.md, "Drone manager")
 ANSWERS_TIMEOUT_S = 1.0  # wall: a gateway answers in milliseconds, if it answers

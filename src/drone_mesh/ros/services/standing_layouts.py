@@ -14,7 +14,11 @@ import rospy
 
 from drone_mesh.drone.flight_path import FlightPath, PlanFlight
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.layouts import Order
+from drone_mesh.formations.airspace import SWAY_M
+from drone_mesh.formations.departures import FlightRules
+from drone_mesh.formations.layouts import Order
+from drone_mesh.formations.preview import FormationPreview, preview
+from drone_mesh.formations.standing_orders import PartState, StandingOrders, StandingProgress
 from drone_mesh.msg import (
     LayoutAction,
     LayoutFeedback,
@@ -29,11 +33,7 @@ from drone_mesh.ros.graph.conversions import event_record, mesh_status
 from drone_mesh.ros.graph.fleet_parameter import get_fleet_parameter
 from drone_mesh.ros.graph.parameters import configured_obstacles
 from drone_mesh.ros.graph.run import Run, run_of
-from drone_mesh.state.airspace import SWAY_M
-from drone_mesh.state.departures import FlightRules
-from drone_mesh.state.formation_preview import FormationPreview, preview
 from drone_mesh.state.model import MeshStatus
-from drone_mesh.state.standing_orders import PartState, StandingOrders, StandingProgress
 
 _QUEUE = 1000  # events that may wait
 

@@ -15,7 +15,7 @@ from drone_mesh import srv
 from drone_mesh.air.node_table import AirError, NodeTable
 from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.communication.interfaces import PAYLOAD_BYTES
-from drone_mesh.communication.messages import readdressed, receiver
+from drone_mesh.communication.wire.messages import readdressed, receiver
 from drone_mesh.msg import NRF24, DroneInfo
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import start_node

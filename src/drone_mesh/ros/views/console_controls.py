@@ -10,8 +10,9 @@ import rospy
 from drone_mesh import srv
 from drone_mesh.console.controls import MeshControls, OrderRefused
 from drone_mesh.drone.location import Location as Place
-from drone_mesh.layouts import Order
-from drone_mesh.missions import Mission
+from drone_mesh.formations.layouts import Order
+from drone_mesh.formations.missions import Mission
+from drone_mesh.formations.preview import FormationPreview
 from drone_mesh.msg import Location
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import formation_request
@@ -25,7 +26,6 @@ from drone_mesh.ros.graph.persistent_service import (
     call_once,
 )
 from drone_mesh.ros.services.flight_request import FlightNotOrdered, request_flight
-from drone_mesh.state.formation_preview import FormationPreview
 
 log = logging.getLogger(__name__)
 

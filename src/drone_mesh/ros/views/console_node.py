@@ -15,7 +15,7 @@ from drone_mesh.arguments import is_whole
 from drone_mesh.console import DEFAULT_PORT
 from drone_mesh.console.controls import MeshControls, RecordingControls
 from drone_mesh.console.dots import make_dots
-from drone_mesh.console.frames import FrameStore
+from drone_mesh.console.frame_store import FrameStore
 from drone_mesh.console.history import History
 from drone_mesh.console.orders import LayoutOffer, places_of
 from drone_mesh.console.page_token import PageToken
@@ -23,7 +23,7 @@ from drone_mesh.console.runner import ConsoleRunner
 from drone_mesh.console.server import ConsoleServer
 from drone_mesh.console.tiles import open_tiles
 from drone_mesh.errors import ConfigurationError, naming_argument
-from drone_mesh.layouts import FIELD_CASE, GRID_CASE, Layouts
+from drone_mesh.formations.layouts import FIELD_CASE, GRID_CASE, Layouts
 from drone_mesh.msg import MeshEvent, MeshState, PacketSample
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.bounded_master import master_answers

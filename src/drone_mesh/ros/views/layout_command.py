@@ -17,7 +17,7 @@ from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
 from drone_mesh.earth_files import is_earth_file, read_placemarks
 from drone_mesh.errors import MeshError
-from drone_mesh.layouts import MAX_CASE, MAX_NAME, Order, read_layout
+from drone_mesh.formations.layouts import MAX_CASE, MAX_NAME, Order, read_layout
 from drone_mesh.msg import LayoutProgress
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import join_graph, run_tool

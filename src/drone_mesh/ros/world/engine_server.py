@@ -9,9 +9,9 @@ from typing import Callable
 import rospy
 
 from drone_mesh import srv
-from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.errors import GoalRefused
-from drone_mesh.missions import Mission
+from drone_mesh.formations.missions import Mission
 from drone_mesh.msg import DroneInfo
 from drone_mesh.msg import Location as LocationMsg
 from drone_mesh.ros.graph import names

@@ -13,7 +13,7 @@ from drone_mesh.configuration import FactoryConfiguration
 from drone_mesh.drone.fleet import StartPlace, plan_fleet
 from drone_mesh.drone.goal import MAX_HEIGHT_M
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.missions import Mission
+from drone_mesh.formations.missions import Mission
 from drone_mesh.ros.graph.parameters import (
     configured_missions,
     configured_obstacles,

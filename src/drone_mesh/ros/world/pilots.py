@@ -8,7 +8,7 @@ from typing import Mapping, Sequence
 
 from drone_mesh.configuration import FactoryConfiguration
 from drone_mesh.drone.roles import Role
-from drone_mesh.missions import Mission
+from drone_mesh.formations.missions import Mission
 from drone_mesh.mobility import Area, Mobility, tracks_of
 from drone_mesh.mobility.pilot import TrackPilot
 from drone_mesh.world.factory import VirtualDrone

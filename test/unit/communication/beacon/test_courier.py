@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 from rig import RecordingAntenna, packet
 
-from drone_mesh.communication.courier import DROP, HOLD, Courier
-from drone_mesh.communication.deadlines import Deadlines
-from drone_mesh.communication.medium import Medium
+from drone_mesh.communication.beacon.courier import DROP, HOLD, Courier
+from drone_mesh.communication.timing.deadlines import Deadlines
+from drone_mesh.communication.timing.medium import Medium
 
 FROM_5_THROUGH_2 = "05 02 00 01 09 07"
 

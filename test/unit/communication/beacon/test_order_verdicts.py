@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import pytest
 
-from drone_mesh.communication import messages
+from drone_mesh.communication.beacon.courier import Transit
 from drone_mesh.communication.beacon.packets import NO_ANCESTORS, Beacon
 from drone_mesh.communication.beacon.routes import BeaconRoutes
 from drone_mesh.communication.beacon.search import Searches
 from drone_mesh.communication.beacon.verdicts import SUSPECTED_S, Verdicts
-from drone_mesh.communication.courier import Transit
-from drone_mesh.communication.deadlines import Deadlines
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.packet_types import MessageType
+from drone_mesh.communication.timing.deadlines import Deadlines
+from drone_mesh.communication.wire import messages
+from drone_mesh.communication.wire.packet_types import MessageType
 
 GATEWAY, LIAR, RELAY, DRONE = 0, 1, 2, 9
 

@@ -8,13 +8,13 @@ from types import SimpleNamespace
 import pytest
 from rig import AlwaysHalf, RecordingAntenna, packet
 
+from drone_mesh.communication.beacon.courier import DROP, Courier
 from drone_mesh.communication.beacon.packets import NO_ANCESTORS, Beacon
 from drone_mesh.communication.beacon.proofs import Proofs
 from drone_mesh.communication.beacon.routes import BeaconRoutes
-from drone_mesh.communication.complaints import Complaints
-from drone_mesh.communication.courier import DROP, Courier
-from drone_mesh.communication.deadlines import Deadlines
-from drone_mesh.communication.places import KnownPlaces
+from drone_mesh.communication.events.complaints import Complaints
+from drone_mesh.communication.neighbours.known_places import KnownPlaces
+from drone_mesh.communication.timing.deadlines import Deadlines
 from drone_mesh.drone.location import Location
 
 TO_GATEWAY = packet("09 09 04 01 00 01 00")

@@ -8,8 +8,8 @@ from drone_mesh.communication.data.packets import Head
 from drone_mesh.communication.data.ticket import TO_ALL, TO_GATEWAY, TicketState
 from drone_mesh.communication.data.transport import MOST_QUEUED
 from drone_mesh.communication.interfaces import MAX_NODE_ID
-from drone_mesh.communication.messages import is_data
-from drone_mesh.communication.packet_types import Priority
+from drone_mesh.communication.wire.messages import is_data
+from drone_mesh.communication.wire.packet_types import Priority
 from drone_mesh.errors import MessageRefused, QueueFull
 from drone_mesh.inprocess import Network
 

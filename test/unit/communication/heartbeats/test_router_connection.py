@@ -8,9 +8,9 @@ import pytest
 from rig import FROM_0, Rig, packet
 
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.medium import Medium
 from drone_mesh.communication.routing.techniques.etx_tree import EtxTree
-from drone_mesh.communication.timing import MeshTiming
+from drone_mesh.communication.timing.medium import Medium
+from drone_mesh.communication.timing.mesh_timing import MeshTiming
 
 HEARTBEAT, PRESENT, REQUEST, MISSING = 4, 3, 2, 5
 ANSWER = "00 00 04 01 01 01 00 00"  # of gateway 0, a neighbour

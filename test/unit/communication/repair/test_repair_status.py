@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from rig import Rig
 
+from drone_mesh.communication.control.router_states import RepairState
 from drone_mesh.communication.repair.status import NOTHING_TO_REPAIR, RepairStatus
-from drone_mesh.communication.router_states import RepairState
 from drone_mesh.drone.location import Location
 
 OCCUPIED = "the place of 2 is occupied by 3"

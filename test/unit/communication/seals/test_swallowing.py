@@ -14,7 +14,7 @@ from drone_mesh.communication.heartbeats.detours import Detours
 from drone_mesh.communication.heartbeats.relay_check import RelayCheck, Swallowing
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.routing.child_table_tree import ChildTableTree
-from drone_mesh.communication.timing import MeshTiming
+from drone_mesh.communication.timing.mesh_timing import MeshTiming
 from drone_mesh.inprocess import Network
 
 NOTICED_WITHIN_S = 120.0

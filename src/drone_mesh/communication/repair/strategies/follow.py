@@ -7,10 +7,10 @@ tree. A drone whose next hop moves out of reach flies until it is in reach again
 
 from __future__ import annotations
 
+from drone_mesh.communication.control.router_states import RepairState
 from drone_mesh.communication.repair.actions import Step
 from drone_mesh.communication.repair.spots import WITHIN_REACH
 from drone_mesh.communication.repair.strategies.nearest import Nearest
-from drone_mesh.communication.router_states import RepairState
 from drone_mesh.drone.location import Location
 
 

@@ -7,10 +7,10 @@ move may not suffice: a second one leads to the place itself, and a third flight
 
 from __future__ import annotations
 
+from drone_mesh.communication.control.router_states import RepairState
 from drone_mesh.communication.repair.actions import Step
 from drone_mesh.communication.repair.spots import WITHIN_REACH
 from drone_mesh.communication.repair.strategies.home import Home
-from drone_mesh.communication.router_states import RepairState
 from drone_mesh.drone.location import Location
 
 MOVES = 2  # towards one lost next hop

@@ -9,14 +9,14 @@ from __future__ import annotations
 import struct
 from typing import NamedTuple
 
-from drone_mesh.communication import messages
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.routing.techniques.gateway_routes import (
     GatewayRoutes,
     LinkCosts,
     newer_by,
 )
+from drone_mesh.communication.wire import messages
+from drone_mesh.communication.wire.packet_types import MessageType
 
 UPDATE = struct.Struct("<BHH")  # gateway + 1 (0: no update), sequence number, metric
 REQUEST = struct.Struct("<BHB")  # gateway, the sequence number that is needed, hops left

@@ -9,10 +9,10 @@ from __future__ import annotations
 import struct
 from typing import NamedTuple
 
-from drone_mesh.communication import messages
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.routing.techniques.gateway_routes import GatewayRoutes, newer_by
+from drone_mesh.communication.wire import messages
+from drone_mesh.communication.wire.packet_types import MessageType
 
 ENTRY = struct.Struct("<BHB")  # gateway + 1 (0: no entry), sequence number, hops
 INFINITE_HOPS = 255  # with an odd sequence number: the route is broken

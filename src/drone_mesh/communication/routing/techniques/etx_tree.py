@@ -5,10 +5,10 @@ from __future__ import annotations
 import struct
 from typing import NamedTuple
 
-from drone_mesh.communication import messages
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.routing.techniques.gateway_routes import GatewayRoutes
+from drone_mesh.communication.wire import messages
+from drone_mesh.communication.wire.packet_types import MessageType
 
 RANK_PER_ETX = 128  # RFC 6719: ranks are ETX in units of 1/128
 ROOT_RANK = 128  # RFC 6550, MinHopRankIncrease; 0 means that no rank is advertised

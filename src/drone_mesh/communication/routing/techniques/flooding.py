@@ -7,11 +7,11 @@ import struct
 from collections import OrderedDict
 from typing import Sequence
 
-from drone_mesh.communication import messages
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.routing.child_table_tree import ChildTableTree
-from drone_mesh.communication.timing import CIRCULATION_S
+from drone_mesh.communication.timing.mesh_timing import CIRCULATION_S
+from drone_mesh.communication.wire import messages
+from drone_mesh.communication.wire.packet_types import MessageType
 
 REMEMBERED = 512  # packets that a node recognises; heartbeats live for a second
 REACHABLE_S = 20.0  # two check periods

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from routing_rig import hear, next_hop, present, started
 
-from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.routing.techniques.etx_tree import SOLICITATION_TYPE, EtxTree
+from drone_mesh.communication.wire.packet_types import MessageType
 
 ROOT = "00 8000"  # gateway 0 itself: rank 128, little-endian
 ONE_HOP = "00 0001"

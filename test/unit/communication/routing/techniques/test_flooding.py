@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from routing_rig import hear, next_hop, present, started
 
-from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.routing.techniques.flooding import Flooding
+from drone_mesh.communication.wire.packet_types import MessageType
 
 
 @pytest.fixture

@@ -1,0 +1,174 @@
+"""The control plane of a node: who is a neighbour, whether a gateway is reached, which way to send.
+
+The component hands every packet, every outcome of a transmission and the time to its control plane
+and asks it for next hops. There are two: `heartbeats`, the document's way, with a routing technique
+to choose among routes; and `beacon`, in which one broadcast per node and period decides everything.
+A node has no further idea of a neighbour, a connection or a route than its control plane.
+"""
+
+# ruff: noqa: B027 - a host overrides only what concerns it
+
+from __future__ import annotations
+
+import abc
+import math
+from typing import Callable
+
+from drone_mesh.communication.control.delivery import IDelivery, IRoutes, ITechnique
+from drone_mesh.communication.control.parts import NodeBasics
+from drone_mesh.communication.control.router_states import RouterEvent, RouterStates
+from drone_mesh.communication.interfaces import IMeshDebugInfo
+
+Learn = Callable[[int, int, int, bytes], bool]
+Forward = Callable[[bytes, int, int, int, int, float], None]
+
+
+class IControlHost(IMeshDebugInfo):
+    """What a control plane tells its node. The defaults are those of a node that never flies."""
+
+    def may_connect(self, node: int, know_gateway: bool) -> bool:
+        """Whether to connect through `node` now (NO_ROUTE: through any); see ConnectionRepair."""
+        return True
+
+    def on_connected(self) -> None:
+        """A gateway is reached again."""
+
+    def on_unconnected_check(self, due_s: float) -> None:
+        """A check, due at `due_s`, finds no gateway."""
+
+    def on_neighbour_lost(self, node: int) -> None:
+        """A neighbour is out of reach; the routes are already updated."""
+
+    def on_node_heard(self, node: int, hops: int) -> None:
+        """At a gateway: a packet of `node` proves a path of so many hops."""
+
+    def on_node_missing(self, node: int, told: bool) -> None:
+        """Another node has no route to `node`.
+
+        `told`: it told this node alone, as after it dropped an order of it, not all neighbours.
+        """
+
+
+class IControlPlane(abc.ABC):
+    """Decides neighbours, connection and routes of one node. Belongs to its component's thread.
+
+    A method `receive_NAME` handles the packets of that type (see packet_types) for this node.
+    """
+
+    delivery: IDelivery
+    routes: IRoutes
+
+    bids_within_s: float
+    """For so long a bid for a repair counts and is awaited: by then a group has noticed a loss."""
+
+    # Attributes that hold functions, because each packet calls one of them.
+    learn: Learn
+    """(creator, from, type, payload): a packet of another node came in. False: drop it."""
+
+    forward: Forward
+    """(payload, creator, from, type, addressee, now_s): pass on a packet for another node."""
+
+    # Time and surroundings -------------------------------------------------------------------
+
+    @abc.abstractmethod
+    def start(self) -> None:
+        """The node starts."""
+
+    @abc.abstractmethod
+    def on_time(self, now_s: float) -> None:
+        """Do what is due; called at every tick of the component."""
+
+    @abc.abstractmethod
+    def check(self, due_s: float) -> None:
+        """The periodic check, with the antenna on, was due at `due_s`."""
+
+    @abc.abstractmethod
+    def on_power(self, on: bool) -> None:
+        """The antenna was switched on or off."""
+
+    @abc.abstractmethod
+    def on_registered(self) -> None:
+        """The medium has registered the antenna again."""
+
+    def on_internet(self, works: bool) -> None:
+        """A gateway's connection to the outside world works again, or no longer."""
+
+    @abc.abstractmethod
+    def introduce(self) -> None:
+        """Make this node known to all in range, now."""
+
+    @abc.abstractmethod
+    def neighbour_leaves(self, neighbour: int) -> None:
+        """A neighbour or this node flies, and they will be out of reach of each other."""
+
+    @abc.abstractmethod
+    def gateway_sent_place(self) -> None:
+        """The preferred gateway itself reported its place."""
+
+    # Packets ---------------------------------------------------------------------------------
+
+    @abc.abstractmethod
+    def own_came_back(self, from_: int) -> None:
+        """A packet of this node came back through `from_`."""
+
+    @abc.abstractmethod
+    def says_connected(self, kind: int, payload: bytes) -> bool:
+        """Whether it is the introduction of a node that a gateway answers."""
+
+    @abc.abstractmethod
+    def on_delivered(self, neighbour: int, tries: int) -> None:
+        """A neighbour received a queued packet after `tries` transmissions."""
+
+    @abc.abstractmethod
+    def on_undelivered(self, payload: bytes, tries: int) -> None:
+        """The antenna gave up a queued packet: send it another way, or drop it."""
+
+    @abc.abstractmethod
+    def search(self, node: int) -> bool:
+        """Look for a node without a known route. False: not now."""
+
+    # The connection of a router --------------------------------------------------------------
+
+    @property
+    @abc.abstractmethod
+    def gateway(self) -> int:
+        """The preferred gateway, a gateway with internet itself; NO_ROUTE: none is known.
+
+        With a key any node can still say that it is one, so those that have proved it come first
+        (`IMeshSeals.may_be_gateway`); test_captured_gateway.py tries every technique.
+        """
+
+    @property
+    @abc.abstractmethod
+    def hops(self) -> int:
+        """Hops to it; NO_ROUTE: unknown."""
+
+    @abc.abstractmethod
+    def next_hop(self) -> int:
+        """The next hop to the preferred gateway, or NO_ROUTE."""
+
+    def heard_s(self, node: int) -> float:
+        """When `node`, no neighbour, was last known to be there; -inf: not recorded. Any thread."""
+        return -math.inf
+
+    @abc.abstractmethod
+    def may_use(self, gateway: int) -> bool:
+        """Whether `gateway` is the preferred one. If there is none yet, it becomes that."""
+
+    @abc.abstractmethod
+    def end(self, event: RouterEvent) -> None:
+        """The connection ends because of `event`."""
+
+    @abc.abstractmethod
+    def give_up_routes(self) -> None:
+        """Forget every route to the preferred gateway."""
+
+
+class IControlTechnique(ITechnique):
+    """A way to decide neighbours, connection and routes that may be chosen by name."""
+
+    @abc.abstractmethod
+    def control_plane(
+        self, basics: NodeBasics, host: IControlHost, states: RouterStates | None
+    ) -> IControlPlane:
+        """The control plane of one node. `states` are those of a router; a gateway has none."""

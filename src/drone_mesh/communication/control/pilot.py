@@ -1,0 +1,169 @@
+"""The drone as the mesh sees it: its position and its flight (docs/repair.md, "Flight")."""
+
+from __future__ import annotations
+
+import math
+
+from drone_mesh.communication.events.complaints import Complaints
+from drone_mesh.communication.timing.deadlines import Deadlines, Due
+from drone_mesh.communication.timing.mesh_timing import FLIGHT_POSITION_PERIOD_S, LANDED_WITHIN_M
+from drone_mesh.drone.flight_path import SPEED_M_S
+from drone_mesh.drone.interfaces import IDroneEngine
+from drone_mesh.drone.location import Location
+from drone_mesh.errors import GoalRefused, LocationUnknown
+
+STANDS_STILL_WITHIN_M = 1e-3  # far below what a drone flies in a second
+ASKS_WITHOUT_ANSWER = 10  # then the mesh continues with an unknown position
+SETS_OUT_WITHIN_S = 10.0  # a goal may reach a busy engine seconds later
+
+
+class Flight:
+    """One flight: its goal, and whether it has begun and ended."""
+
+    def __init__(
+        self, goal: Location, start: Location | None, replaced: Location | None, now_s: float
+    ) -> None:
+        """From `start` (None: unknown); `replaced`: the goal of a flight that it takes over from.
+
+        A drone that rests at one of these may not have begun yet.
+        """
+        self.goal = goal
+        self.may_begin = True  # its engine has not refused it
+        self.did_not_set_out = False
+        self._start = start
+        self._replaced = replaced
+        self._ordered_s = now_s
+        self._last: Location | None = None
+        self._was_flying = False  # as its engine says
+        self._unanswered = 0
+
+    def is_over(
+        self, location: Location | None, is_flying: bool | None, can_fly: bool, now_s: float
+    ) -> bool:
+        """Process the drone's location (None: unknown); returns whether it has landed.
+
+        Landed: the engine says that it flew and flies no longer. Where it says nothing
+        (`is_flying` None): within 0.1 m of the goal, or not moving between two requests anywhere
+        but where it began. A drone that does not set out has landed, too.
+        """
+        if is_flying:
+            self._was_flying = True
+            return False
+        if self._was_flying:
+            return True
+        if location is None:
+            self._unanswered += 1
+            return self._unanswered >= ASKS_WITHOUT_ANSWER
+        self._unanswered = 0
+        if _is_at(location, self.goal):
+            return True
+        if is_flying is None:
+            last, self._last = self._last, location
+            if last is None or location.distance_m(last) >= STANDS_STILL_WITHIN_M:
+                return False
+            self._start = self._start or last
+            if not (_is_at(location, self._start) or _is_at(location, self._replaced)):
+                return True
+        may_set_out = self.may_begin and can_fly
+        self.did_not_set_out = not may_set_out or now_s >= self._sets_out_until_s(location)
+        return self.did_not_set_out
+
+    def _sets_out_until_s(self, location: Location) -> float:
+        """Until when it may still set out: the nearer the goal, the sooner it would be there."""
+        flies_s = location.distance_m(self.goal) / SPEED_M_S
+        return self._ordered_s + SETS_OUT_WITHIN_S + min(flies_s, SETS_OUT_WITHIN_S)
+
+
+def _is_at(location: Location, place: Location | None) -> bool:
+    return place is not None and location.distance_m(place) <= LANDED_WITHIN_M
+
+
+class Pilot:
+    """Flies the drone of one node and watches the flight."""
+
+    def __init__(self, engine: IDroneEngine, deadlines: Deadlines, complaints: Complaints) -> None:
+        self._engine = engine
+        self._deadlines = deadlines
+        self._complaints = complaints
+        self._flight: Flight | None = None
+        self._origin: Location | None = None  # start of the flight, or of the first of several
+        self.flight_end = ""  # why the last flight ended short of its goal
+
+    @property
+    def goal(self) -> Location | None:
+        """The goal of the current flight; None without one."""
+        flight = self._flight
+        return flight.goal if flight is not None else None
+
+    def location(self) -> Location | None:
+        """The drone's position; None, with a log line, if it is unknown."""
+        try:
+            return self._located()
+        except LocationUnknown as error:
+            self._complaints.add("own location unknown", str(error), self._deadlines.now_s)
+            return None
+
+    def place(self) -> Location | None:
+        """The drone's position; None, without a log line, if it is unknown."""
+        try:
+            return self._located()
+        except LocationUnknown:
+            return None
+
+    def obey(self, goal: Location) -> None:
+        """Start an ordered flight, or change the goal of the current one.
+
+        Raises GoalRefused, and changes nothing, if the engine refuses the goal.
+        """
+        self._engine.set_goal(*goal)
+        self._begin(goal)
+
+    def step_back_to(self, goal: Location) -> None:
+        """Start a repair flight, or change the goal of the current one."""
+        flight = self._begin(goal)
+        try:
+            self._engine.step_back_to(*goal)
+        except GoalRefused as error:  # the flight ends as soon as the drone stands still
+            flight.may_begin = False
+            self._complaints.add("goal refused", str(error), self._deadlines.now_s)
+
+    def distance_m(self) -> float:
+        """Straight distance from the start to the goal of the flight, m; infinity if unknown."""
+        if self._flight is None or self._origin is None:
+            return math.inf
+        return self._origin.distance_m(self._flight.goal)
+
+    def _begin(self, goal: Location) -> Flight:
+        here = self.location()
+        if self._flight is None:
+            self._origin = here
+        self._flight = flight = Flight(goal, here, self.goal, self._deadlines.now_s)
+        self._ask_position_later()
+        return flight
+
+    def watch(self) -> bool:
+        """Request the position; returns whether the flight is over."""
+        assert self._flight is not None
+        flight, engine, now_s = self._flight, self._engine, self._deadlines.now_s
+        if not flight.is_over(self.location(), engine.is_flying(), engine.can_fly(), now_s):
+            self._ask_position_later()
+            return False
+        did_not = flight.did_not_set_out
+        self.flight_end = "the drone did not set out" if did_not else "the flight ended"
+        self.forget_flight()
+        return True
+
+    def forget_flight(self) -> None:
+        """No longer watch the flight."""
+        self._flight = None
+        self._deadlines.set(Due.ASK_POSITION, math.inf)
+
+    def _located(self) -> Location:
+        location = self._engine.get_location()
+        if not math.isfinite(sum(location)):
+            raise LocationUnknown(f"invalid position of the drone: {location}")
+        return location
+
+    def _ask_position_later(self) -> None:
+        now_s = self._deadlines.now_s
+        self._deadlines.set(Due.ASK_POSITION, now_s + FLIGHT_POSITION_PERIOD_S)

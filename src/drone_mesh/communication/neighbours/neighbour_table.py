@@ -1,0 +1,192 @@
+"""Neighbours: the nodes in direct reach, as known from their packets."""
+
+from __future__ import annotations
+
+import math
+from typing import Iterable, Iterator, NamedTuple
+
+from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.neighbours.seen_motion import FLIGHT_S, SeenMotion
+from drone_mesh.drone.location import Location
+
+NAMED_AFTER_DEATH_S = 60.0  # lists of six hops had a dead node for up to 59 s
+
+
+class HeardPlace(NamedTuple):
+    """The place that a node reported."""
+
+    place: Location
+    heard_s: float
+
+
+class Neighbours:
+    """When each neighbour was last heard, which gateway it uses, and the places of nodes.
+
+    The only owner of this table: the other parts of a component report here what they learn. The
+    gateway and place of a node are kept when it is no longer a neighbour.
+    """
+
+    def __init__(self, check_period_s: float, noticed_late: bool, motion: SeenMotion) -> None:
+        """Neighbours that fall silent within a check period do so together.
+
+        `noticed_late`: a loss may be noticed several checks later, as on a shared channel, so that
+        the time of a neighbour's last packet says more.
+        """
+        self._check_period_s = check_period_s
+        self._noticed_late = noticed_late
+        self.motion = motion
+        self._heard_s: dict[int, float] = {}
+        self._deaf: set[int] = set()  # heard, but no neighbours: they do not hear this node
+        self._fell_silent_s: dict[int, float] = {}  # when each of those lost did so
+        self._out_of_reach: set[int] = set()  # of these
+        self._stands_since_s = -math.inf  # infinity: this node flies
+        self._gateways: dict[int, int] = {}
+        self._hops: dict[int, int] = {}
+        self._places: dict[int, HeardPlace] = {}
+        self._goals_s: dict[int, float] = {}  # when those in flight told their goal, their place
+        self._seen: dict[int, HeardPlace] = {}  # where these were seen since, perhaps for good
+        self.silent = False  # all neighbours (2 or more) fell silent together; none heard since
+
+    def heard(self, node: int, now_s: float) -> bool:
+        """A packet arrived from `node`. Returns whether it is a new neighbour."""
+        is_new = node not in self._heard_s
+        if is_new and node in self._deaf:
+            return False
+        self._heard_s[node] = now_s
+        if is_new:
+            self._fell_silent_s.pop(node, None)
+            self._out_of_reach.discard(node)
+            self.silent = False
+        return is_new
+
+    def lost(self, node: int, now_s: float) -> bool:
+        """`node` is out of reach. Returns whether it was a neighbour."""
+        self._deaf.discard(node)
+        heard_s = self._heard_s.pop(node, None)
+        if heard_s is None:
+            return False
+        if heard_s >= self._stands_since_s:  # otherwise this node flew away from it
+            self._fell_silent_s[node] = heard_s if self._noticed_late else now_s
+        if not self._heard_s and self._fell_silent_s:
+            since_s = max(self._fell_silent_s.values()) - self._check_period_s
+            self.silent = sum(at_s > since_s for at_s in self._fell_silent_s.values()) >= 2
+        return True
+
+    def forget(self, node: int) -> None:
+        """Remove `node` from the neighbours, without counting it as fallen silent."""
+        self._heard_s.pop(node, None)
+
+    def is_deaf(self, node: int) -> bool:
+        """Mark `node` as deaf to this node until `hears` is called; it does not count as silent.
+
+        Returns whether it was a neighbour.
+        """
+        self._deaf.add(node)
+        return self._heard_s.pop(node, None) is not None
+
+    def hears(self, node: int) -> None:
+        """`node` hears this one."""
+        self._deaf.discard(node)
+
+    def deaf(self) -> frozenset[int]:
+        """The nodes that are heard and do not hear this one."""
+        return frozenset(self._deaf)
+
+    def takes_off(self, by_order: bool) -> None:
+        """This node flies away, so that neighbours it stops hearing do not count as silent.
+
+        A repair flight does not end a silence that was before.
+        """
+        self._stands_since_s = math.inf
+        self._fell_silent_s.clear()
+        self._out_of_reach.clear()
+        self.silent = self.silent and not by_order
+
+    def stands(self, now_s: float) -> None:
+        """This node no longer flies."""
+        self._stands_since_s = now_s
+
+    def forget_all(self) -> None:
+        """This node moved and may have other neighbours."""
+        self._heard_s.clear()
+        self._deaf.clear()
+        self._fell_silent_s.clear()
+        self._out_of_reach.clear()
+
+    def ids(self) -> frozenset[int]:
+        """The current neighbours."""
+        return frozenset(self._heard_s)
+
+    def named(self, nodes: Iterable[int], now_s: float) -> None:
+        """Another node knows these: one that fell silent long ago lives, its link here failed."""
+        for node in self._fell_silent_s.keys() & nodes:
+            if now_s - self._fell_silent_s[node] > NAMED_AFTER_DEATH_S:
+                self._out_of_reach.add(node)
+
+    def out_of_reach(self) -> frozenset[int]:
+        """Former neighbours that live, but no longer have a link to this node where it stands."""
+        return frozenset(self._out_of_reach)
+
+    def heard_s(self) -> dict[int, float]:
+        """A copy: for each neighbour the time of its last packet, in seconds."""
+        return dict(self._heard_s)
+
+    def last_heard_s(self, node: int, otherwise: float) -> float:
+        """When `node` was last heard; `otherwise` if it is not a neighbour."""
+        return self._heard_s.get(node, otherwise)
+
+    # Reported by the nodes themselves--------------------------------------------------------
+
+    def set_gateway(self, node: int, gateway: int) -> None:
+        """`node` is connected to `gateway`."""
+        self._gateways[node] = gateway
+
+    def gateway_of(self, node: int) -> int:
+        """The gateway that `node` reported last, or NO_ROUTE."""
+        return self._gateways.get(node, NO_ROUTE)
+
+    def set_hops(self, node: int, hops: int) -> None:
+        """`node` introduced itself with `hops` to its gateway; 255: it has none."""
+        self._hops[node] = hops
+
+    def hops_of(self, node: int) -> int:
+        """The hops that `node` reported last; 255: none."""
+        return self._hops.get(node, NO_ROUTE)
+
+    def set_place(self, node: int, place: Location, heard_s: float, is_goal: bool = False) -> None:
+        """`node`, a neighbour or not, was at `place` at `heard_s`; older information is ignored.
+
+        Or, if `is_goal`, it flies there: that counts as its place from then on.
+        """
+        known = self._places.get(node)
+        if known is None or heard_s >= known.heard_s:
+            self._goals_s.pop(node, None)
+            self._seen.pop(node, None)
+            if is_goal:
+                self._goals_s[node] = heard_s
+            self._places[node] = HeardPlace(place, heard_s)
+            if known is None or known.place != place:  # most nodes stand
+                self.motion.reported(node, place, heard_s)
+
+    def passes(self, node: int, place: Location, heard_s: float) -> None:
+        """Note that `node` was at `place`; while it flies, its announced goal counts, too.
+
+        It may have ended its flight there, and fallen silent.
+        """
+        if heard_s - self._goals_s.get(node, -math.inf) > FLIGHT_S:
+            self.set_place(node, place, heard_s)
+        elif node in self._goals_s and heard_s > self._goals_s[node]:
+            self._seen[node] = HeardPlace(place, heard_s)
+
+    def place_of(self, node: int) -> HeardPlace | None:
+        """The last reported place of `node`."""
+        return self._places.get(node)
+
+    def taken(self) -> Iterator[tuple[int, HeardPlace]]:
+        """Where each node may be: its reported place, and where it was seen on the way there."""
+        yield from self._places.items()
+        yield from self._seen.items()
+
+    def places(self) -> dict[int, HeardPlace]:
+        """All reported places, by node. Do not modify."""
+        return self._places

@@ -1,0 +1,187 @@
+"""MeshnetworkGateway: connects the mesh to the outside world (docs/protocol.md, "Gateway")."""
+
+from __future__ import annotations
+
+import math
+import random
+from typing import TYPE_CHECKING
+
+from drone_mesh.communication.control.delivery import ITechnique
+from drone_mesh.communication.events.observer import MeshEventKind
+from drone_mesh.communication.interfaces import (
+    MAX_NODE_ID,
+    NO_ROUTE,
+    IGatewayCommands,
+    IInternetConnection,
+    IWirelessCommunication,
+    KnownNode,
+)
+from drone_mesh.communication.node.component import MeshnetworkComponent
+from drone_mesh.communication.node.mesh_node import NodeSettings
+from drone_mesh.communication.order_record import OrderRecord
+from drone_mesh.communication.orders.book import OrderBook
+from drone_mesh.communication.orders.final_places import check_place
+from drone_mesh.communication.orders.messages import OrderReply
+from drone_mesh.communication.reports.node_reports import ReportBook, ReportedNode
+from drone_mesh.communication.timing.deadlines import Due
+from drone_mesh.communication.wire.messages import GatewayPlace, type_of
+from drone_mesh.drone.goal import check_goal
+from drone_mesh.drone.interfaces import IDroneEngine
+from drone_mesh.drone.location import Location
+from drone_mesh.errors import GoalRefused
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+SEARCH_WITHIN_S = 600.0  # search for nodes that were heard within this time
+
+
+class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
+    """A node that answers heartbeats and sends orders from outside into the mesh."""
+
+    def __init__(
+        self,
+        node_id: int,
+        antenna: IWirelessCommunication,
+        engine: IDroneEngine,
+        routing: ITechnique,
+        internet: IInternetConnection,
+        rng: random.Random,
+        **settings: Unpack[NodeSettings],
+    ) -> None:
+        """Like MeshNode; orders arrive through `internet`."""
+        super().__init__(node_id, antenna, engine, routing, rng, None, **settings)
+        self._internet = internet
+        self._internet_works = True
+        self._heartbeats: dict[int, tuple[int, float]] = {}  # by creator: hops, when
+        self._reports = ReportBook()
+        self._book = OrderBook(self._parts, self._may_find, self.control.search)
+        self._orders.on_own_reply = self._book.on_outcome
+
+    def stop(self) -> None:
+        """Stop the internet connection, the antenna and debugging."""
+        self._internet.disconnect()
+        super().stop()
+
+    def tick(self, now_s: float) -> None:
+        """Do what is due."""
+        super().tick(now_s)
+        if now_s >= self._deadlines.at_s[Due.ORDERS]:
+            self._book.on_due()
+
+    def set_internet(self, works: bool, now_s: float) -> None:
+        """Its connection to the outside world works again, or no longer.
+
+        Without one it is a router of another gateway, as far as the connection is concerned; it
+        does not fly for it.
+        """
+        self._deadlines.now_s = now_s
+        if works != self._internet_works:
+            self._internet_works = works
+            self.control.on_internet(works)
+            kind = MeshEventKind.CONNECTED if works else MeshEventKind.DISCONNECTED
+            self._report(kind, self._node_id)
+
+    def get_connected_to_gateway(self) -> bool:
+        """True while its internet works; otherwise whether it reaches another gateway."""
+        return self.control.hops != NO_ROUTE
+
+    def send_goal_request_to_drone(
+        self,
+        node_id: int,
+        latitude: float,
+        longitude: float,
+        height: int,
+        now_s: float,
+        allow_shared_place: bool = False,
+    ) -> bool:
+        """See IGatewayCommands; its own drone is asked at once.
+
+        True also for that one. GoalRefused: an invalid node id or place, or it cannot fly.
+        """
+        self._deadlines.now_s = now_s
+        if not 0 <= node_id <= MAX_NODE_ID:
+            raise GoalRefused(f"invalid drone id {node_id}: must be 0..{MAX_NODE_ID}")
+        check_goal(latitude, longitude, height)
+        if height != int(height):
+            raise GoalRefused(f"invalid height {height} m: must be in whole metres")
+        goal = Location(latitude, longitude, height)
+        if not allow_shared_place:
+            orders, reports = self._book.records(), self._reports.nodes()
+            check_place(self._parts, orders, reports, node_id, goal, self._options.clearance_m)
+        number = self._book.enter(node_id, goal)
+        if node_id != self._node_id:
+            return self._book.send(number)
+        self._orders.take(node_id, goal, number)
+        return True
+
+    def get_orders(self) -> list[OrderRecord]:
+        """The orders that it remembers, oldest first, with their outcomes."""
+        return self._book.records()
+
+    def get_node_reports(self) -> list[ReportedNode]:
+        """What other nodes have reported, by id. Any thread."""
+        return self._reports.nodes()
+
+    def get_known_nodes(self) -> list[KnownNode]:
+        """All other nodes that it has a route to or has heard, by id."""
+        nodes = []
+        reported = {one.node_id: one.report.hops for one in self._reports.nodes()}
+        for node in range(MAX_NODE_ID + 1):
+            if node == self._node_id:
+                continue
+            next_hop = self.control.routes.get_direction_to_node(node)
+            unheard = reported.get(node, NO_ROUTE), -math.inf
+            hops, heard_s = self._heartbeats.get(node, unheard)
+            heard_s = max(heard_s, self.control.heard_s(node))
+            heard_s = max(heard_s, self._neighbours.last_heard_s(node, otherwise=-math.inf))
+            if next_hop != NO_ROUTE or heard_s > -math.inf:
+                nodes.append(KnownNode(node, next_hop, hops, heard_s))
+        return nodes
+
+    def on_node_missing(self, node: int, told: bool) -> None:
+        """A relay that cannot forward an order reports this to the gateway."""
+        super().on_node_missing(node, told)
+        self._book.on_missing(node, told)
+
+    def on_node_heard(self, node: int, hops: int) -> None:
+        """Its path works: send it what waits."""
+        self._heartbeats[node] = (min(hops, NO_ROUTE), self._deadlines.now_s)
+        self._book.on_found(node)
+
+    def receive_node_report(self, payload: bytes, creator: int, _from: int) -> None:
+        """Keep the report."""
+        self._reports.on_packet(creator, type_of(payload), payload, self._deadlines.now_s)
+
+    receive_node_words = receive_node_report
+
+    def receive_order_reply(self, payload: bytes, creator: int, _from: int) -> None:
+        """Enter the reply into the book of orders."""
+        reply = OrderReply.from_payload(payload)
+        if reply is None:
+            self._drop("an invalid reply to an order", payload)
+        else:
+            self._book.on_reply(creator, reply)
+
+    def _may_find(self, node: int) -> bool:
+        """Whether a search could find this node.
+
+        A relay learns from the packets of others that it is connected, so it may send nothing to
+        the gateway for minutes.
+        """
+        _hops, heard_s = self._heartbeats.get(node, (NO_ROUTE, -math.inf))
+        medium = self._antenna.medium
+        ago_s = self._deadlines.now_s - heard_s
+        return medium.shared and ago_s < medium.stretched(SEARCH_WITHIN_S)
+
+    def _begin(self) -> None:
+        self._internet.connect(self)
+
+    def _on_location(
+        self, node: int, location: Location, is_goal: bool, gateway: GatewayPlace | None
+    ) -> None:
+        now_s = self._deadlines.now_s
+        self._neighbours.set_place(node, location, now_s, is_goal)
+        if node == self.control.gateway:
+            self.places.update_gateway(location, now_s)
+            self.control.gateway_sent_place()

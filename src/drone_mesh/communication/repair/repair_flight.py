@@ -1,0 +1,174 @@
+"""RepairFlight: a flight for a repair, which ends beside other drones and not on them."""
+
+from __future__ import annotations
+
+from typing import Callable
+
+from drone_mesh.communication.control.parts import NodeParts
+from drone_mesh.communication.control.place_requests import ask_all_for_places
+from drone_mesh.communication.repair.actions import Step
+from drone_mesh.communication.repair.heights import above_ground, at_whole_metres
+from drone_mesh.communication.repair.options import RepairOptions
+from drone_mesh.communication.repair.spots import Landing
+from drone_mesh.communication.repair.taken_places import TakenPlaces
+from drone_mesh.communication.timing.mesh_timing import LANDED_WITHIN_M
+from drone_mesh.drone.location import Location
+
+ASK_AGAIN_S = 0.3  # an answer takes some milliseconds
+ASK_SEALED_S = 1.0  # on a shared channel with a key, where it takes a handshake, too
+ASKS_ON_GROUND = 2  # a lossy medium loses a question now and then
+LEG = 2.0 / 3.0  # of the range: at half that height it hears nodes below
+
+
+class RepairFlight:
+    """One flight of one drone, from take-off until it is clear of other drones.
+
+    Once a second it asks all nodes in range for their places. If one of them is at the goal, the
+    drone diverts to a spot beside the goal and lands earlier if it is connected on the way. On the
+    ground it asks again.
+    """
+
+    def __init__(
+        self,
+        parts: NodeParts,
+        introduce: Callable[[], None],
+        step: Step,
+        goal: Location,
+        options: RepairOptions,
+        taken: TakenPlaces,
+        landing: Landing,
+    ) -> None:
+        """To `goal`, at or near the place of `step`. `introduce` broadcasts a PRESENT."""
+        self.goal = goal
+        self._step = step
+        self.group = parts.neighbours.ids()  # the neighbours that it leaves behind
+        self.stops_when_connected = False
+        self.asks_left = 0  # on the ground
+        self._wanted = at_whole_metres(step.place)  # or beside it
+        self._taken = taken
+        self._landing = landing
+        self._parts = parts
+        self._introduce = introduce
+        self._clearance_m = options.clearance_m
+        self._leg_m = LEG * options.range_m
+        self._diversions = 0
+        self._leg_from: Location | None = None
+        self._leg_end = goal
+
+    @property
+    def on_ground(self) -> bool:
+        """Whether it has landed and checks that it is clear of others."""
+        return self.asks_left > 0
+
+    @property
+    def leads_back(self) -> bool:
+        """Whether its goal is the place where this drone stood before."""
+        return self._step.owner == self._parts.node_id
+
+    def each_second(self) -> None:
+        """Called once a second in flight."""
+        ask_all_for_places(self._parts)
+        if self.stops_when_connected:
+            self._introduce()
+
+    def stop_when_connected(self) -> None:
+        """Stop at the first connection, unless this flight leads back."""
+        self.stops_when_connected = not self.leads_back
+
+    def stop_here(self, next_hop: int) -> None:
+        """Land at the nearest free spot, in reach of `next_hop` if possible."""
+        here = self._parts.pilot.location()
+        if here is not None and not self.on_ground:
+            below = Location(here.latitude, here.longitude, self.goal.height)
+            if below.distance_m(self.goal) >= self._clearance_m:
+                relay = self._parts.neighbours.place_of(next_hop)
+                self._wanted = below
+                self._landing = Landing(here, [] if relay is None else [relay.place])
+                self._go_to(below if self._taken.is_free(below) else self._spot())
+
+    def on_place(self, node: int, place: Location) -> None:
+        """Another node reports its place; keep clear of it."""
+        if node == self._step.owner and place.distance_m(self._step.place) < self._clearance_m:
+            self.stop_when_connected()
+        if above_ground(place).distance_m(self.goal) < self._clearance_m:
+            self.stop_when_connected()
+        self.on_taken(place)
+
+    def on_taken(self, place: Location) -> None:
+        """Another drone is at `place`, or may be there in silence; keep clear of it."""
+        if self._is_taken_by(place, self.goal):
+            self._diversions += 1
+            self._go_to(self._spot())
+        elif not self.on_ground and self._is_taken_by(place, self._leg_end):
+            self._diversions += 1
+            self.fly_on()
+
+    def _is_taken_by(self, place: Location, spot: Location) -> bool:
+        near = above_ground(place).distance_m(spot) < self._clearance_m
+        return near and not self._taken.is_free(spot)
+
+    def arrived(self) -> bool:
+        """Ask for the places of others after landing. Returns False if another leg follows."""
+        here = self._parts.pilot.location()
+        if self._leg_is_short(here):
+            self.fly_on()
+            return False
+        self.ask_on_ground()
+        return True
+
+    def ask_on_ground(self) -> None:
+        """It is on the ground: begin to ask who else is there."""
+        self.asks_left = ASKS_ON_GROUND
+        ask_all_for_places(self._parts, may_fly_on=True)
+
+    def ask_again(self) -> bool:
+        """Ask once more who is near. Returns False after the last time: the flight is over."""
+        self.asks_left -= 1
+        if self.on_ground:
+            ask_all_for_places(self._parts, may_fly_on=True)
+        return self.on_ground
+
+    def _go_to(self, goal: Location) -> None:
+        self.goal = goal
+        self.asks_left = 0
+        self.fly_on()
+
+    def fly_on(self) -> None:
+        """Take off, or continue towards the goal.
+
+        A flight that may end where the drone is connected consists of legs. The drone climbs by
+        half the length of a leg; from higher up it would hear no node on the ground. Each leg ends
+        clear of others, like the flight, and none just before the goal. The others are told where
+        it ends at once: this drone may fall silent within a second.
+        """
+        here = self._parts.pilot.location()
+        self._leg_from, self._leg_end = here, above_ground(self.goal)
+        longest_m = self._leg_m + LANDED_WITHIN_M
+        if (
+            self.stops_when_connected
+            and here is not None
+            and here.distance_m(self.goal) > longest_m
+        ):
+            end = at_whole_metres(here.towards(self.goal, self._leg_m))
+            free = self._taken.is_free(end)
+            self._leg_end = end if free else self._beside(end, Landing(self.goal))
+        self._parts.pilot.step_back_to(self._leg_end)
+        ask_all_for_places(self._parts)
+
+    def _leg_is_short(self, here: Location | None) -> bool:
+        """Whether this was not the last leg, and the drone makes progress."""
+        if (
+            here is None
+            or self._leg_from is None
+            or here.distance_m(self._leg_from) < LANDED_WITHIN_M
+        ):
+            return False
+        return here.distance_m(self.goal) > LANDED_WITHIN_M
+
+    def _spot(self) -> Location:
+        return self._beside(self._wanted, self._landing)
+
+    def _beside(self, place: Location, landing: Landing) -> Location:
+        """A free spot; two drones that divert at the same time skip different numbers of spots."""
+        skip = self._parts.node_id % 5 if self._diversions > 1 else 0
+        return self._taken.beside(place, landing, skip)

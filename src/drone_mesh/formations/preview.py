@@ -1,0 +1,167 @@
+"""A formation before it is flown: how long it takes, and who would lose the mesh.
+
+The flights of the plan, on an ideal mesh: a drone is connected if places and range allow a path.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import AbstractSet, Mapping
+
+from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.drone.fleet import ids_in_words
+from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath
+from drone_mesh.drone.location import Location
+from drone_mesh.drone.roles import Role
+from drone_mesh.formations.departures import AT_PLACE_M, MEMBERS_IN_FLIGHT, Departures, FlightRules
+from drone_mesh.formations.reach import Reach
+from drone_mesh.state.model import MeshStatus, NodeStatus, position_is_known
+from drone_mesh.state.observation import path_ahead
+
+STEP_S = 2.0  # how often the plan looks who may set out; also its time for an order
+
+
+@dataclass
+class FormationPreview:
+    """What would happen to a fleet; ids ascending."""
+
+    duration_s: float = 0.0  # until the last drone of the formation has landed
+    out_of_reach: list[int] = field(default_factory=list)  # without a path at the end
+    cut_off: list[int] = field(default_factory=list)  # at rest and without a path on the way
+    stays: dict[int, str] = field(default_factory=dict)  # who does not set out: why
+    least_connected: float = 1.0  # smallest share of the drones with a path, flying ones without
+
+    def in_words(self) -> str:
+        """For example: 3 drones would be out of reach: 14..16; 40 s."""
+        words = []
+        for drones, what in (
+            (self.out_of_reach, "out of reach"),
+            (self.cut_off, "cut off on the way"),
+        ):
+            if drones:
+                noun = "drone" if len(drones) == 1 else "drones"
+                words.append(f"{len(drones)} {noun} would be {what}: {ids_in_words(drones)}")
+        words += [f"drone {drone} would stay: {why}" for drone, why in self.stays.items()]
+        words.append(
+            f"{self.duration_s:.0f} s, at least {100 * self.least_connected:.0f} % connected"
+        )
+        return "; ".join(words)
+
+
+def preview(
+    mesh: MeshStatus,
+    goals: Mapping[int, Location],
+    rules: FlightRules = FlightRules(),  # noqa: B008 (immutable)
+    at_once: bool = False,
+    standing: Mapping[int, Location] | None = None,
+) -> FormationPreview:
+    """Fly this formation from the present state of the mesh.
+
+    `standing`: goals of formations that were ordered before. Their other drones fly too.
+    """
+    others = {} if at_once or standing is None else standing
+    return _Rehearsal(mesh, {**others, **goals}, goals.keys(), rules).run(at_once)
+
+
+class _Rehearsal:
+    def __init__(
+        self,
+        mesh: MeshStatus,
+        goals: Mapping[int, Location],
+        formation: AbstractSet[int],
+        rules: FlightRules,
+    ) -> None:
+        self._formation = formation
+        self._rules = rules
+        self._range_m = mesh.max_distance
+        self._routing = mesh.routing
+        self._nodes = {n.id: replace(n) for n in mesh.nodes if position_is_known(n)}
+        self._goals = {n: goal for n, goal in goals.items() if n in self._nodes}
+        self._flights: dict[int, FlightPath] = {}
+        self._ordered: set[int] = set()  # of those that set out together
+        self._now_s = 0.0
+        self._found = FormationPreview()
+        for node in self._nodes.values():
+            if len(node.path):
+                self._fly(node, Location.from_vector(node.path[-3:]))
+
+    def run(self, at_once: bool) -> FormationPreview:
+        sent = self._due() if at_once else self._choose()
+        while sent or self._flights:
+            for drone, goal in sent.items():
+                self._fly(self._nodes[drone], goal)
+            self._note_who_is_cut_off()
+            self._now_s += STEP_S
+            self._move()
+            sent = self._due() if at_once else self._choose()
+        self._found.out_of_reach = sorted(self._routers() - self._connected().keys())
+        self._found.cut_off = sorted(set(self._found.cut_off) - set(self._found.out_of_reach))
+        self._found.stays = {n: why for n, why in self._found.stays.items() if n in self._formation}
+        for drone in self._formation & self._nodes.keys():
+            here = Location.from_vector(self._nodes[drone].position)
+            if here.distance_m(self._goals[drone]) > AT_PLACE_M:
+                self._found.stays.setdefault(drone, "it has no route")
+        return self._found
+
+    def _due(self) -> Mapping[int, Location]:
+        """All that rest elsewhere and can be ordered, each once."""
+        connected = self._connected()
+        due = {
+            drone: goal
+            for drone, goal in self._goals.items()
+            if drone in connected and drone not in self._flights and drone not in self._ordered
+        }
+        self._ordered.update(due)
+        return due
+
+    def _choose(self) -> Mapping[int, Location]:
+        hops = self._connected()
+        for drone, node in self._nodes.items():
+            node.hops, node.connected = hops.get(drone, NO_ROUTE), drone in hops
+        departures = Departures(self._status(), self._goals, {}, self._rules, self._formation)
+        choice = departures.choose(hops.keys() & self._goals.keys())
+        self._found.stays = choice.blocked
+        return choice.set_out
+
+    def _status(self) -> MeshStatus:
+        nodes = list(self._nodes.values())
+        return MeshStatus(self._now_s, nodes, self._range_m, routing=self._routing)
+
+    def _fly(self, node: NodeStatus, goal: Location) -> None:
+        x, y, z = node.position
+        path = self._rules.plan_flight((x, y, z), goal.to_vector(), self._now_s, SPEED_M_S)
+        if path is None:
+            self._found.stays[node.id] = "no path past the obstacles"
+            return
+        self._flights[node.id] = path
+        node.path = path_ahead(path, self._now_s)
+
+    def _move(self) -> None:
+        for drone, path in list(self._flights.items()):
+            node = self._nodes[drone]
+            node.position = path.position_at(self._now_s)
+            node.path = path_ahead(path, self._now_s)
+            if path.share_flown(self._now_s) >= 1.0:
+                node.path = ()
+                del self._flights[drone]
+                if drone in self._formation:
+                    landed_s = path.start_s + path.duration_s
+                    self._found.duration_s = max(self._found.duration_s, landed_s)
+
+    def _routers(self) -> set[int]:
+        return {n for n, node in self._nodes.items() if node.on and node.role != Role.GATEWAY}
+
+    def _connected(self) -> dict[int, int]:
+        on = {n: node.position for n, node in self._nodes.items() if node.on}
+        gateways = {n for n in on if self._nodes[n].role == Role.GATEWAY}
+        flying = set() if self._routing == MEMBERS_IN_FLIGHT else self._flights.keys()
+        relays = on.keys() - flying
+        return Reach(on, gateways, self._range_m).hops(relays)
+
+    def _note_who_is_cut_off(self) -> None:
+        routers, connected = self._routers(), self._connected()
+        lost = routers - connected.keys() - self._flights.keys()
+        self._found.cut_off = list(lost.union(self._found.cut_off))
+        if routers:
+            share = len(routers & connected.keys()) / len(routers)
+            self._found.least_connected = min(self._found.least_connected, share)

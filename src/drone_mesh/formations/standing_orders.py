@@ -1,0 +1,341 @@
+"""StandingOrders: formations as goals, kept until each drone is at its place.
+
+docs/ros.md, "Formations". An order through the mesh is lost on a drone that has no route at that
+moment, and a drone in flight has none: what has not been accepted is ordered again. Departures
+decides which drones set out when.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass, field
+from typing import Any, Iterable, Mapping, Sequence
+
+from drone_mesh.communication.events.observer import MeshEventKind
+from drone_mesh.drone.fleet import ids_in_words
+from drone_mesh.drone.location import Location
+from drone_mesh.drone.roles import Role
+from drone_mesh.formations.departures import AT_PLACE_M, Departures, FlightRules
+from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus, position_is_known
+from drone_mesh.state.orders import CLOCKS_DIFFER_S
+
+FIRST_PAUSE_S = 5.0  # simulated: an order over 100 nodes takes less than a second
+LONGEST_PAUSE_S = 40.0  # each try costs a packet per hop
+CUT_OFF = "its place is out of reach"  # it was there, and a repair brought it back
+UNDER_WAY_S = 30.0  # a gateway repeats an order for as long: the drone may still set out
+
+
+class PartState(enum.Enum):
+    """How far one drone of a standing order has come."""
+
+    WAITING = "without a route"
+    LATER = "waiting to set out"
+    FLYING = "flying"
+    ARRIVED = "at its place"
+    REFUSED = "refused"
+    ABSENT = "not in this fleet"
+    REPLACED = "replaced by a later order"
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the drone may still reach its place because of this order."""
+        return self not in (PartState.ARRIVED, PartState.ABSENT, PartState.REPLACED)
+
+
+@dataclass
+class _Part:
+    """The goal of one drone."""
+
+    goal: Location
+    state: PartState = PartState.WAITING
+    reason: str = ""  # of a refusal
+    pause_s: float = FIRST_PAUSE_S
+    due_s: float = -math.inf  # when to order it next
+    arrived: bool = False  # it has been at its place
+    settled: bool = False  # it was connected there: a repair may take it elsewhere
+    sent_to: Location | None = None  # by an order that it may still follow
+    sent_s: float = -math.inf
+
+    @property
+    def is_followed(self) -> bool:
+        """Whether it may still have to be ordered."""
+        return not self.settled if self.state is PartState.ARRIVED else self.state.is_open
+
+    def is_ordered(self, place: Location | None) -> bool:
+        """Whether this order sends its drone to this place."""
+        own = (self.goal.as_ordered(), (self.sent_to or self.goal).as_ordered())
+        return place is not None and place.as_ordered() in own
+
+    def replace(self) -> None:
+        """The drone has been ordered elsewhere."""
+        if self.state is PartState.ARRIVED:
+            self.settled = True
+        else:
+            self.state = PartState.REPLACED
+
+    def send(self, to: Location, now_s: float) -> None:
+        """Note that the drone is being ordered to its goal."""
+        self.sent_to, self.sent_s = to, now_s
+        self.due_s = now_s + self.pause_s
+        self.pause_s = min(2.0 * self.pause_s, LONGEST_PAUSE_S)
+
+    def stay(self, state: PartState, reason: str = "") -> None:
+        """Note that the drone will not follow its latest order."""
+        self.state, self.reason, self.sent_to = state, reason, None
+
+
+@dataclass(frozen=True)
+class StandingProgress:
+    """How far one standing order has come: ids, ascending, by state."""
+
+    number: int
+    name: str
+    drones: Mapping[PartState, Sequence[int]]
+    reasons: Mapping[int, str] = field(default_factory=dict)  # of the refused drones
+
+    @property
+    def is_over(self) -> bool:
+        """Whether nothing is left to order."""
+        return not any(self.drones[state] for state in PartState if state.is_open)
+
+    def in_words(self) -> str:
+        """One line, such as: 12 of 17 at their places, 3 flying, 2 without a route: 4, 9."""
+        total = sum(len(drones) for drones in self.drones.values())
+        noun = "place" if total == 1 else "places"
+        words = [f"{len(self.drones[PartState.ARRIVED])} of {total} at their {noun}"]
+        flying = self.drones[PartState.FLYING]
+        if flying:
+            words.append(f"{len(flying)} flying")
+        others = (PartState.LATER, PartState.WAITING, PartState.ABSENT, PartState.REPLACED)
+        for state in others:
+            if self.drones[state]:
+                ids = ids_in_words(self.drones[state])
+                words.append(f"{len(self.drones[state])} {state.value}: {ids}")
+        for drone in self.drones[PartState.REFUSED]:
+            words.append(f"{drone} refused: {self.reasons[drone]}")
+        return ", ".join(words)
+
+
+@dataclass
+class _StandingOrder:
+    """One layout or formation that was ordered."""
+
+    number: int
+    name: str
+    parts: Mapping[int, _Part]  # by drone
+    given_s: float
+    at_once: bool
+
+    def is_moving(self) -> bool:
+        """Whether a drone has still to arrive: it may then connect others."""
+        on_the_way = (PartState.LATER, PartState.FLYING)
+        return any(part.state in on_the_way and not part.arrived for part in self.parts.values())
+
+    def progress(self) -> StandingProgress:
+        """A snapshot."""
+        by_state = {
+            state: tuple(sorted(d for d, part in self.parts.items() if part.state is state))
+            for state in PartState
+        }
+        reasons = {drone: self.parts[drone].reason for drone in by_state[PartState.REFUSED]}
+        return StandingProgress(self.number, self.name, by_state, reasons)
+
+
+class StandingOrders:
+    """All layouts that were ordered and are not complete. Not thread-safe.
+
+    Each drone has at most one goal: that of the latest order for it.
+    """
+
+    def __init__(self) -> None:
+        self._orders: dict[int, _StandingOrder] = {}  # by number, oldest first
+        self._sent: dict[int, tuple[Location, float]] = {}  # latest order of each drone, and when
+        self._last_number = 0
+
+    def give(
+        self, name: str, goals: Mapping[int, Location], now_s: float, at_once: bool = False
+    ) -> int:
+        """These drones are being ordered; returns the number. It replaces their earlier goals.
+
+        `name`: such as "layout 202"; `now_s`: simulated time. `at_once`: all drones set out
+        together, whatever becomes of the mesh and whomever they meet. The first orders are those of
+        the next `update`.
+        """
+        self._replace(goals)
+        number = self._last_number = self._last_number + 1
+        parts = {drone: _Part(goal) for drone, goal in goals.items()}
+        self._orders[number] = _StandingOrder(number, name, parts, now_s, at_once)
+        return number
+
+    def ordered(self, drone: int, to: Location, now_s: float) -> None:
+        """Somebody else ordered this drone to a place."""
+        self._replace([drone])
+        self._sent[drone] = to, now_s
+
+    def _replace(self, drones: Iterable[int]) -> None:
+        for order in self._orders.values():
+            for drone in drones:
+                if drone in order.parts and order.parts[drone].is_followed:
+                    order.parts[drone].replace()
+
+    def withdraw(self, number: int) -> StandingProgress | None:
+        """Order no drone of this layout any more; returns how far it came. None: unknown."""
+        order = self._orders.pop(number, None)
+        return None if order is None else order.progress()
+
+    def take(self, event: EventRecord) -> None:
+        """Process an event: a drone refused its order, or somebody else sent it elsewhere."""
+        if len(event.peers) != 1:
+            return
+        drone = event.peers[0]
+        for order in self._orders.values():
+            part = order.parts.get(drone)
+            is_older = event.stamp_s < order.given_s - CLOCKS_DIFFER_S
+            if part is None or not part.is_followed or is_older:
+                continue
+            if event.kind == MeshEventKind.ORDER_REFUSED.value:
+                part.stay(PartState.REFUSED, event.detail)
+            elif event.kind == MeshEventKind.NO_ROUTE.value:
+                part.sent_to = None
+            elif event.kind == MeshEventKind.ORDER_SENT.value and not part.is_ordered(event.place):
+                part.replace()
+
+    def update(
+        self,
+        mesh: MeshStatus,
+        rules: FlightRules = FlightRules(),  # noqa: B008 (immutable)
+    ) -> list[tuple[int, Location]]:
+        """Compare the goals with the state of the mesh; returns the orders to give now."""
+        nodes = {node.id: node for node in mesh.nodes}
+        wanted: dict[int, Location] = {}
+        together: dict[int, _Part] = {}
+        due: dict[int, _Part] = {}
+        for order in self._orders.values():
+            is_moving = order.is_moving()
+            for drone, part in sorted(order.parts.items(), reverse=True):
+                if not part.is_followed or (part.state is PartState.ARRIVED and not is_moving):
+                    continue
+                if self._follow(part, nodes.get(drone), order.at_once, mesh.stamp_s):
+                    if part.sent_to is not None:
+                        wanted[drone] = part.sent_to
+                        part.send(part.sent_to, mesh.stamp_s)
+                    else:
+                        (together if order.at_once else due)[drone] = part
+        if together or due:
+            departures = self._departures(mesh, rules)
+            taken = {drone: departures.taken_by(drone) for drone in together}
+            free = {drone: part.goal for drone, part in together.items() if not taken[drone]}
+            back = {drone for drone, part in due.items() if part.arrived}
+            cut_off = {drone: CUT_OFF for drone in back if not departures.is_in_reach(drone)}
+            choice = departures.choose(due.keys() - cut_off.keys())
+            together.update(due)
+            for drone, reason in [*taken.items(), *cut_off.items(), *choice.blocked.items()]:
+                if reason:
+                    together[drone].stay(PartState.REFUSED, reason)
+            for drone, to in [*free.items(), *choice.set_out.items()]:
+                if together[drone].state is PartState.REFUSED:
+                    together[drone].state = PartState.LATER
+                together[drone].send(to, mesh.stamp_s)
+                wanted[drone] = to
+        self._sent.update({drone: (to, mesh.stamp_s) for drone, to in wanted.items()})
+        return list(wanted.items())
+
+    def _departures(self, mesh: MeshStatus, rules: FlightRules) -> Departures:
+        sent = {
+            drone: part.sent_to.as_ordered()
+            for order in self._orders.values()
+            for drone, part in order.parts.items()
+            if part.state.is_open and part.sent_to is not None
+        }
+        first = {d for d, part in self._latest().items() if part.is_followed}
+        return Departures(mesh, self.goals(mesh), sent, rules, first)
+
+    def _latest(self) -> Mapping[int, _Part]:
+        return self._orders[max(self._orders)].parts
+
+    def goals(self, mesh: MeshStatus) -> dict[int, Location]:
+        """The places that drones still have to reach, or have reached and keep."""
+        at = {n.id: Location.from_vector(n.position) for n in mesh.nodes if position_is_known(n)}
+        goals: dict[int, Location] = {}
+        for order in self._orders.values():
+            for drone, part in order.parts.items():
+                goal = part.goal.as_ordered()
+                stands = drone in at and at[drone].distance_m(goal) <= AT_PLACE_M
+                if part.state.is_open or (part.state is PartState.ARRIVED and stands):
+                    goals[drone] = goal
+        return goals
+
+    def _follow(self, part: _Part, node: NodeStatus | None, at_once: bool, now_s: float) -> bool:
+        """Update one drone's state; returns whether it may be ordered now."""
+        if node is None:
+            part.state = PartState.ABSENT
+            return False
+        flies = bool(len(node.path))
+        has_route = node.connected or node.role == Role.GATEWAY
+        if flies or position_is_known(node):
+            end = Location.from_vector(node.path[-3:] if flies else node.position)
+            is_there = end.distance_m(part.goal.as_ordered()) <= AT_PLACE_M
+            if is_there and not flies and self._may_leave(node.id, part.goal, now_s):
+                part.stay(PartState.LATER if has_route else PartState.WAITING)
+                part.sent_to = part.goal if has_route else None  # replaces the order that it has
+                return has_route
+            if is_there:
+                part.stay(PartState.FLYING if flies else PartState.ARRIVED)
+                part.pause_s = FIRST_PAUSE_S
+                part.arrived = part.arrived or not flies
+                part.settled = not flies and has_route
+                return False
+            is_aside = part.sent_to is not None and end.distance_m(part.sent_to) <= AT_PLACE_M
+            if is_aside and not flies:
+                part.sent_to, part.due_s = None, now_s
+        if now_s - part.sent_s >= UNDER_WAY_S and not flies:
+            part.sent_to = None
+        if part.state is not PartState.REFUSED:
+            part.state = PartState.LATER if has_route or flies else PartState.WAITING
+        if at_once and part.sent_s == -math.inf:
+            return True  # a gateway may find a drone that seems lost
+        return now_s >= part.due_s and has_route and (at_once or not flies)
+
+    def _may_leave(self, drone: int, goal: Location, now_s: float) -> bool:
+        """Whether it may still follow an order to another place."""
+        to, sent_s = self._sent.get(drone, (goal, -math.inf))
+        return to.distance_m(goal) > AT_PLACE_M and now_s - sent_s < UNDER_WAY_S
+
+    def all_progress(self) -> list[StandingProgress]:
+        """How far each has come, oldest first."""
+        return [order.progress() for order in self._orders.values()]
+
+    def forget_complete(self) -> None:
+        """Forget those with which nothing is left to do."""
+        over = [number for number, order in self._orders.items() if order.progress().is_over]
+        for number in over:
+            del self._orders[number]
+
+    # For a restart ---------------------------------------------------------------------------
+
+    def saved(self) -> list[dict[str, Any]]:
+        """What is left to do, in plain values."""
+        return [
+            {
+                "number": order.number,
+                "name": order.name,
+                "at_once": order.at_once,
+                "goals": {
+                    str(drone): list(part.goal)
+                    for drone, part in order.parts.items()
+                    if part.state.is_open
+                },
+            }
+            for order in self._orders.values()
+        ]
+
+    def restore(self, saved: Iterable[Mapping[str, Any]]) -> None:
+        """Go on with what `saved` returned."""
+        for entry in saved:
+            parts = {int(n): _Part(Location(*goal)) for n, goal in entry["goals"].items()}
+            number = int(entry["number"])
+            self._orders[number] = _StandingOrder(
+                number, str(entry["name"]), parts, -math.inf, bool(entry["at_once"])
+            )
+            self._last_number = max(self._last_number, number)
