@@ -1,49 +1,50 @@
 // The log of events, newest first: one sentence for each, and one for all nodes of which the same is said.
 
 import { arrowKeys } from "./arrows.js";
-import { idLinks } from "./panel.js";
+import { idLink, idLinks } from "./panel.js";
 
 const ROWS_SHOWN = 300;
 const SAME_WITHIN_S = 5; // simulated; events so close may share a sentence
 const LOOKED_BACK = 8; // sentences, for one that an event can share
 const NEIGHBOUR_KINDS = new Set(["neighbour found", "neighbour lost", "node missing"]);
 
-// Kind -> its tone and its sentence. NODE: the node; PEERS: the other nodes; DETAIL: in brackets.
+// Kind -> its tone and its sentence. NODE: the node; PEERS: the other nodes. Of a|b, a is said of one node and b of several.
 const SENTENCES = {
   started: ["", "NODE started"],
   connected: ["good", "NODE reached gateway PEERS"],
   disconnected: ["bad", "NODE lost gateway PEERS"],
   "gateway changed": ["", "NODE changed to gateway PEERS"],
   "neighbour found": ["", "NODE found PEERS"],
-  "neighbour lost": ["", "NODE lost its neighbours PEERS"],
-  "node missing": ["", "NODE has no route to PEERS any more"],
-  "no route": ["bad", "NODE has no route to PEERS: the order was not delivered"],
-  "power on": ["good", "NODE was switched on"],
-  "power off": ["bad", "NODE was switched off"],
-  emergency: ["bad", "NODE begins a repair"],
-  "negotiation started": ["", "NODE negotiates who flies"],
+  "neighbour lost": ["", "NODE lost contact with PEERS"],
+  "node missing": ["", "NODE has|have no route to PEERS any more"],
+  "no route": ["bad", "NODE has no route to PEERS: the order was|orders were not delivered"],
+  "power on": ["good", "NODE was|were switched on"],
+  "power off": ["bad", "NODE was|were switched off"],
+  emergency: ["bad", "NODE begins|begin a repair"],
+  "negotiation started": ["", "NODE negotiates|negotiate who flies"],
   "negotiation ended": ["", "NODE learned that PEERS flies"],
-  "flight decided": ["flight", "NODE flies to the place of PEERS, to repair the mesh"],
-  "flight ordered": ["flight", "NODE flies, ordered by PEERS"],
+  "flight decided": ["flight", "NODE flies|fly to the place of PEERS, to repair the mesh"],
+  "flight ordered": ["flight", "NODE flies|fly, ordered by PEERS"],
   landed: ["flight", "NODE landed"],
   crashed: ["bad", "NODE crashed"],
-  "battery low": ["bad", "NODE has a low battery"],
-  "battery empty": ["bad", "NODE has an empty battery"],
+  "battery low": ["bad", "NODE has|have a low battery"],
+  "battery empty": ["bad", "NODE has|have an empty battery"],
   "goal refused": ["bad", "NODE refused a goal"],
-  "order sent": ["", "NODE sent an order to PEERS"],
-  "order accepted": ["", "PEERS accepted an order of NODE"],
-  "order refused": ["bad", "PEERS refused an order of NODE"],
+  "order sent": ["", "NODE sent an order|orders to PEERS"],
+  "order accepted": ["", "PEERS accepted an order|orders of NODE"],
+  "order refused": ["bad", "PEERS refused an order|orders of NODE"],
   "order arrived": ["good", "PEERS arrived, ordered by NODE"],
-  "order given up": ["bad", "PEERS gave up an order of NODE"],
-  "order replaced": ["", "PEERS has a later order of NODE"],
-  "order lost contact": ["bad", "PEERS is out of contact during an order of NODE"],
+  "order given up": ["bad", "PEERS gave up an order|orders of NODE"],
+  "order replaced": ["", "PEERS has|have a later order of NODE"],
+  "order lost contact": ["bad", "PEERS is|are out of contact during an order|orders of NODE"],
   "took off": ["flight", "NODE took off"],
   "cannot fly": ["bad", "NODE cannot fly"],
   "can fly again": ["good", "NODE can fly again"],
 };
+const FORMS = /(an order|[a-z]+)\|([a-z]+)/g;
 
 export class EventLog {
-  #said = []; // the newest sentences: {kind, t, nodes, peers, details, row}
+  #said = []; // the newest sentences: {kind, of, others, events: [{t, id, detail}], row, open}
 
   constructor(mesh, list, showNeighbours, onlySelected) {
     this.mesh = mesh;
@@ -57,7 +58,7 @@ export class EventLog {
     mesh.addEventListener("select", () => this.onlySelected.checked && this.#rebuild());
     for (const box of [showNeighbours, onlySelected])
       box.addEventListener("change", () => this.#rebuild());
-    arrowKeys(list, ".id-link");
+    arrowKeys(list, "button");
   }
 
   #wanted(event) {
@@ -91,40 +92,78 @@ export class EventLog {
 
   /** Adds the event to a recent sentence that says the same of others, or begins a new one. */
   #take({ t, node, kind, peers, detail }) {
-    const ofPeers = kind.startsWith("order ") || kind === "no route";
-    const same = this.#said.find(
+    const ofPeers = peers.length > 0 && (kind.startsWith("order ") || kind === "no route");
+    const [ids, others] = ofPeers ? [peers, [node]] : [[node], peers];
+    const at = this.#said.findIndex(
       (said) =>
         said.kind === kind &&
-        t - said.t <= SAME_WITHIN_S &&
-        String(ofPeers ? said.nodes : said.peers) === String(ofPeers ? [node] : peers),
+        t - said.events[0].t <= SAME_WITHIN_S &&
+        String(said.others) === String(others),
     );
-    if (same) {
-      for (const id of ofPeers ? peers : [node])
-        if (!same[ofPeers ? "peers" : "nodes"].includes(id))
-          same[ofPeers ? "peers" : "nodes"].push(id);
-      same.details.add(detail);
-      return same;
+    const events = ids.map((id) => ({ t, id, detail }));
+    // What happened to a node keeps its order: nothing joins a sentence before what was said of that node since.
+    const since = this.#said.slice(0, at + 1).flatMap((said) => said.events);
+    if (at >= 0 && !since.some(({ id }) => ids.includes(id))) {
+      this.#said[at].events.push(...events);
+      return this.#said[at];
     }
-    const row = document.createElement("li");
-    const said = { t, kind, nodes: [node], peers: [...peers], details: new Set([detail]), row };
+    const said = { kind, ofPeers, others, events, row: document.createElement("li"), open: false };
     this.#said = [said, ...this.#said].slice(0, LOOKED_BACK);
     return said;
   }
 
-  #write({ t, kind, nodes, peers, details, row }) {
+  #write(said) {
+    const { kind, ofPeers, others, events, row } = said;
     const [tone, sentence] = SENTENCES[kind] ?? ["", `NODE ${kind} PEERS`];
-    const time = document.createElement("time");
-    time.textContent = `${t.toFixed(1)} s`;
+    const ids = sorted(events.map(({ id }) => id));
+    const [nodes, peers] = ofPeers ? [others, ids] : [ids, sorted(others)];
     const text = document.createElement("span");
     text.className = tone;
-    for (const part of sentence.split(/(NODE|PEERS)/)) {
-      if (part === "NODE") text.append(...idLinks(this.mesh, sorted(nodes)));
-      else if (part === "PEERS") text.append(...idLinks(this.mesh, sorted(peers)));
+    const number = ids.length > 1 ? "$2" : "$1";
+    for (const part of sentence.replace(FORMS, number).split(/(NODE|PEERS)/)) {
+      if (part === "NODE") text.append(...idLinks(this.mesh, nodes));
+      else if (part === "PEERS")
+        text.append(...(peers.length ? idLinks(this.mesh, peers) : ["nobody"]));
       else text.append(part);
     }
+    const details = new Set(events.map(({ detail }) => detail));
     const [detail] = details;
     if (details.size === 1 && detail) text.append(` (${detail})`);
-    row.replaceChildren(time, text);
+    row.replaceChildren(this.#time(said), text);
+    if (said.open) row.append(this.#each(events));
+  }
+
+  /** When it happened; of several nodes a button, which shows it of each. */
+  #time(said) {
+    const { events } = said;
+    const times = events.map(({ t }) => t);
+    const [first, last] = [Math.min(...times), Math.max(...times)].map((t) => t.toFixed(1));
+    const time = document.createElement("time");
+    time.textContent = first === last ? `${first} s` : `${first} to ${last} s`;
+    if (events.length === 1) return time;
+    const button = document.createElement("button");
+    button.type = "button";
+    button.className = "when";
+    button.tabIndex = -1;
+    button.title = "When each";
+    button.setAttribute("aria-expanded", said.open);
+    button.append(time);
+    button.addEventListener("click", () => {
+      said.open = !said.open;
+      this.#write(said);
+      said.row.querySelector(".when").focus();
+    });
+    return button;
+  }
+
+  #each(events) {
+    const each = document.createElement("p");
+    for (const { t, id, detail } of [...events].sort((a, b) => a.t - b.t || a.id - b.id)) {
+      const one = document.createElement("span");
+      one.append(idLink(this.mesh, id, -1), ` ${t.toFixed(1)} s${detail && ` (${detail})`}`);
+      each.append(one);
+    }
+    return each;
   }
 }
 
