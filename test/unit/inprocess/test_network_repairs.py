@@ -396,3 +396,23 @@ def test_a_moving_neighbour_that_dies_is_replaced_all_the_same():
     assert flown(network) == set()
     network.run_for(30.0)
     assert flown(network) == {2}
+
+
+def test_a_drone_lands_clear_of_one_that_died_a_second_after_it_had_connected():
+    """Nobody had asked 3 for its place, and no drone in reach of the lost relay is left."""
+    network = Network(seed=1)
+    network.add_gateway(0, 0.0, 0.0)
+    for node, x, y in ((1, 8.0, 0.0), (2, 16.0, 0.0), (3, 16.0, 1.1), (4, 24.0, 0.0)):
+        network.add_router(node, x, y)
+    assert network.run_until(network.all_connected, within_s=30.0)
+    network.run_for(1.0)
+    network.power(3, False)
+    network.run_for(60.0)
+    network.power(1, False)
+    network.power(2, False)
+    dead, nearest_m = network.location(3), math.inf
+    while network.now_s() < 150.0:
+        network.run_for(0.1)
+        nearest_m = min(nearest_m, network.location(4).distance_m(dead))
+    assert flown(network) == {4}
+    assert nearest_m >= 1.0

@@ -1,4 +1,4 @@
-"""Requests for places, and what a drone in flight is told of others in answer to them.
+"""Places that nodes ask for and tell, and what a drone in flight hears of others.
 
 A REQUESTLOCATION, which its addressee answers with a LOCATION; and LAST_PLACE: where another node
 was last heard, for a drone that is about to land near there (docs/repair.md, "Places of silent
@@ -30,6 +30,17 @@ def ask_for_place(parts: NodeParts, node: int) -> None:
 def ask_all_for_places(parts: NodeParts, may_fly_on: bool = False) -> None:
     """Ask every node in range for its place; `may_fly_on`: also of others near, as in flight."""
     parts.antenna.broadcast_message(request(parts, BROADCAST, may_fly_on))
+
+
+def tell_all_place(parts: NodeParts) -> None:
+    """Tell every node in range where this one is, or where it flies to: it may fall silent soon."""
+    goal = parts.pilot.goal
+    place = goal or parts.pilot.location()
+    if place is not None:
+        packet = messages.own_location(
+            place, goal is not None, parts.now_s, parts.node_id, BROADCAST
+        )
+        parts.antenna.broadcast_message(packet)
 
 
 def request(parts: NodeBasics, to: int, may_fly_on: bool = False) -> bytes:

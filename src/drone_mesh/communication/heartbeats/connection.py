@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import Callable, NamedTuple
 
-from drone_mesh.communication.control.place_requests import ask_for_place
+from drone_mesh.communication.control.place_requests import ask_for_place, tell_all_place
 from drone_mesh.communication.control.router_states import (
     ConnectionState,
     RouterEvent,
@@ -221,6 +221,7 @@ class GatewayConnection:
         if is_new:
             self._introduce()
             self._ask_for_places()
+            tell_all_place(self._parts)
         return is_new
 
     def take_gateway_of(self, neighbour: int, gateway: int) -> None:

@@ -220,7 +220,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
         """A node's place or goal, and perhaps the place of a gateway."""
         location, is_goal = messages.place_in(payload), messages.is_goal(payload)
         self._on_location(creator, location, is_goal, messages.GatewayPlace.from_payload(payload))
-        if creator == from_ and messages.addressee(payload) == BROADCAST:
+        if is_goal and creator == from_ and messages.addressee(payload) == BROADCAST:
             self._on_goal(creator, location)
 
     def receive_requestlocation(self, payload: bytes, creator: int, from_: int) -> None:

@@ -11,10 +11,12 @@ from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.routing.techniques.etx_tree import EtxTree
 from drone_mesh.communication.timing.medium import Medium
 from drone_mesh.communication.timing.mesh_timing import MeshTiming
+from drone_mesh.drone.location import Location
 
 HEARTBEAT, PRESENT, REQUEST, MISSING = 4, 3, 2, 5
 ANSWER = "00 00 04 01 01 01 00 00"  # of gateway 0, a neighbour
 INTRODUCTION_1_HOP = "01 01 03 fe fe 01 01"
+OWN_PLACE = packet("01 01 01 fe fe")  # (0, 0, 0), no goal, at 0 s
 
 
 def connected_rig():
@@ -60,8 +62,16 @@ def test_a_router_that_does_not_know_its_distance_waits_as_long_as_for_ten_hops(
 def test_becoming_connected_introduces_the_node_at_once():
     rig = Rig()
     rig.hear(ANSWER)
-    assert rig.broadcasts() == [packet(INTRODUCTION_1_HOP)]
+    assert rig.broadcasts() == [packet(INTRODUCTION_1_HOP), OWN_PLACE]
     assert "CONNECTED" in rig.kinds()
+
+
+def test_a_router_that_connects_tells_all_in_range_where_it_stands():
+    """They may have to land beside it, if it dies before anybody asks it."""
+    rig = Rig()
+    rig.engine.place = Location(1.0, 2.0, 3)
+    rig.hear(ANSWER)
+    assert rig.broadcasts()[1] == packet("01 01 01 fe fe 00 00 80 3f 00 00 00 40 03 00")
 
 
 def test_staying_connected_is_no_reason_to_introduce_the_node():
@@ -174,7 +184,7 @@ def test_an_answer_after_the_connection_was_lost_is_a_new_connection():
     rig.wait(0.7)
     rig.forget()
     rig.hear("00 02 04 01 01 01 00 01")
-    assert rig.broadcasts() == [packet("01 01 03 fe fe 02 01")]
+    assert rig.broadcasts() == [packet("01 01 03 fe fe 02 01"), OWN_PLACE]
     assert rig.sent(REQUEST) == [
         packet("01 01 02 02 00" + FROM_0),
         packet("01 01 02 02 02" + FROM_0),
@@ -759,7 +769,7 @@ def test_a_neighbour_that_flies_out_of_reach_is_no_neighbour_from_its_take_off(l
     """8 m and 9 m away; the range is 9 m. It has announced its goal to all."""
     rig = shared_rig()
     rig.connect_through(2)
-    rig.hear(f"02 02 01 01 fe {latitude}")
+    rig.hear(f"02 02 01 01 fe {latitude} 00 00 00 00 00 00 00 00 00 80")
     assert (2 in rig.mesh.get_neighbours()) is stays
     assert rig.mesh.get_connected_to_gateway() is stays
 
