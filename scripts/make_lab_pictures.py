@@ -19,8 +19,8 @@ from drone_mesh.drone.flight_path import FlightPath
 from drone_mesh.inprocess import Network
 from drone_mesh.lab.command import main as lab
 from drone_mesh.lab.network_sample import physical_graph
-from drone_mesh.lab.quiet import quiet_nodes
 from drone_mesh.lab.run_report.drawing import in_style, svg_of_its_own
+from drone_mesh.lab.worker import quiet_nodes
 from drone_mesh.view.palette import LIGHT
 
 ROOT = Path(__file__).resolve().parents[1]

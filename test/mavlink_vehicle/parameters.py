@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import struct
 from typing import Callable, Dict
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -66,7 +67,9 @@ class Parameters(Dict[str, float]):
 
     def _report(self, name: str) -> None:
         kind, names = _kind(name), self.names()
-        value = self._autopilot.parameter_bytes(self[name], kind)
+        value = self[name]
+        if self._autopilot.integers_as_bytes and kind != mavlink.MAV_PARAM_TYPE_REAL32:
+            value = float(struct.unpack("<f", struct.pack("<i", int(value)))[0])
         self._send(
             mavlink.MAVLink_param_value_message(
                 name.encode(), value, kind, len(names), names.index(name)

@@ -26,7 +26,7 @@ from drone_mesh.formations.missions import read_missions
 from drone_mesh.lab.experiment import load_experiment
 from drone_mesh.lab.places import rows_of_file
 from drone_mesh.mobility import Mobility
-from drone_mesh.mobility.limits import check
+from drone_mesh.mobility.settings import check
 from drone_mesh.mobility.trace_files import read_trace
 from drone_mesh.secret_file import read_secret
 from drone_mesh.yaml_file import read_text

@@ -263,7 +263,6 @@ def _rounded(place: Sequence[float]) -> Place:
 
 
 def _away(mesh: MeshStatus, places: Places) -> list[NodeStatus]:
-    """The drones that are not at their places."""
     return [
         node
         for node in mesh.nodes

@@ -65,7 +65,6 @@ class GatewayControls(MeshControls):
         self._client = client
 
     def fly(self, node: int, x: float, y: float, z: float, allow_shared_place: bool = False) -> str:
-        """Order a drone to a place, through the mesh."""
         try:
             self._client.order(node, y, x, round(z), allow_shared_place)
         except NoAnswer as error:

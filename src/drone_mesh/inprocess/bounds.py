@@ -67,19 +67,15 @@ class ShortestPath(ChildTableTree):
         self._essentials.send_heartbeats(sorted(self.get_set_of_children()))
 
     def get_direction_to_node(self, node: int) -> int:
-        """The next hop over the current links."""
         return self._links.next_hop(self._node_id, node)
 
     def get_set_of_children(self) -> frozenset[int]:
-        """The neighbours over the current links."""
         return self._links.neighbours(self._node_id)
 
     def get_amount_of_children(self) -> int:
-        """The number of neighbours."""
         return len(self.get_set_of_children())
 
     def empty(self) -> bool:
-        """Whether there are no neighbours."""
         return not self.get_set_of_children()
 
     def gateway_lost(self, gateway: int) -> bool:

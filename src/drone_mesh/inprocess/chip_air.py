@@ -105,7 +105,6 @@ class ChipAir(IInProcessAir):
         return self.air.airtime_s
 
     def antenna(self, host: Host, rng: random.Random) -> ChipAntenna:
-        """A new antenna for that node."""
         antenna = self.antennas[host.node_id] = ChipAntenna(self, host, rng)
         return antenna
 
@@ -114,7 +113,6 @@ class ChipAir(IInProcessAir):
         self._tasks.append(self.clock.tasks.start(function, "node"))
 
     def stop(self) -> None:
-        """Wait until all nodes have stopped."""
         for task in self._tasks:
             task.join()
 
@@ -138,7 +136,6 @@ class ChipAir(IInProcessAir):
         )
 
     def flight(self, node: int, started: bool) -> None:
-        """A drone took off (True) or stopped (False)."""
         (self._flying.add if started else self._flying.discard)(node)
         self.moved((node,))
         if not self._stepping:
@@ -146,7 +143,6 @@ class ChipAir(IInProcessAir):
             self._plan_step()
 
     def moved(self, nodes: Iterable[int]) -> None:
-        """Pilots have flown these drones to other places."""
         for node in nodes:
             self.antennas[node].move()
 

@@ -75,7 +75,6 @@ class InProcessAir(IInProcessAir):
         return self._delivered + len(self._under_way)
 
     def antenna(self, host: Host, rng: random.Random) -> InProcessAntenna:
-        """A new antenna for that node."""
         self._ids.add(host.node_id)
         return InProcessAntenna(self, host)
 
@@ -90,7 +89,6 @@ class InProcessAir(IInProcessAir):
         self._antennas.pop(antenna.node_id, None)
 
     def flight(self, node: int, started: bool) -> None:
-        """A drone took off (True) or stopped (False)."""
         if started:
             self._unlink(node)
             self._flying.add(node)
@@ -260,23 +258,19 @@ class InProcessAntenna(IInProcessAntenna):
         self.take: Deliver = _ignore  # called with each packet that arrives
 
     def start_antenna(self, mesh: IMeshNetwork) -> None:
-        """Become reachable."""
         self._mesh = mesh
         self._listen()
         self._air.add(self)
 
     def stop_antenna(self) -> None:
-        """Become unreachable."""
         self._mesh = None
         self._listen()
         self._air.remove(self)
 
     def send_message_to(self, payload: bytes) -> bool:
-        """Send to the node in byte 3."""
         return self.powered and self._air.send(payload)
 
     def broadcast_message(self, payload: bytes) -> None:
-        """Send to each node in range."""
         if self.powered:
             self._air.broadcast(payload, self.node_id)
 
@@ -288,7 +282,6 @@ class InProcessAntenna(IInProcessAntenna):
         return self._air.jammed
 
     def switch_power(self, on: bool) -> None:
-        """Power on or off."""
         self.powered = on
         self._listen()
         mesh = self._mesh

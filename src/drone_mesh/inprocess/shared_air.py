@@ -110,17 +110,14 @@ class SharedAir(IInProcessAir):
         self._forget(radio.node_id)
 
     def flight(self, node: int, started: bool) -> None:
-        """A drone took off (True) or stopped (False)."""
         (self._flying.add if started else self._flying.discard)(node)
         self._forget(node)
 
     def moved(self, _nodes: Iterable[int]) -> None:
-        """Pilots have flown these drones to other places."""
         self._reached.clear()
         self._power_dbm.clear()
 
     def in_range(self, node: int) -> dict[int, SharedRadio]:
-        """The radios that a node could reach on an undisturbed channel, by id."""
         if node not in self._radios:
             return {}
         return {radio.node_id: radio for radio in self._in_reach(node, faded=False)}

@@ -76,20 +76,17 @@ class SharedAntenna(SharedRadio):
         return self.access.patience
 
     def start_antenna(self, mesh: IMeshNetwork) -> None:
-        """Become reachable."""
         self._mesh = mesh
         self.listening_since_s = self._clock.now_s
         self._air.add(self)
 
     def stop_antenna(self) -> None:
-        """Become unreachable."""
         self._mesh = None
         self.listening_since_s = None
         self.access.clear()
         self._air.remove(self)
 
     def send_message_to(self, payload: bytes) -> bool:
-        """Queue it for the node in byte 3."""
         self._air.on_packet(payload)
         to = receiver(payload)
         if not self.powered or to > MAX_NODE_ID or to == self.node_id:
@@ -99,7 +96,6 @@ class SharedAntenna(SharedRadio):
         return taken
 
     def broadcast_message(self, payload: bytes) -> None:
-        """Queue one frame for all nodes."""
         self._air.on_packet(payload)
         if self.powered:
             self.access.offer(
@@ -267,5 +263,4 @@ class SharedChannel(SharedAir):
     """The air of a network on the fast model."""
 
     def antenna(self, host: Host, rng: random.Random) -> SharedAntenna:
-        """A new antenna for that node."""
         return SharedAntenna(self, host, rng)

@@ -1,11 +1,11 @@
-"""Imports the HTTP and MQTT libraries only when a gateway needs them."""
+"""The connections of a gateway: imported only when it needs them; several as one."""
 
 from __future__ import annotations
 
 import contextlib
 from typing import TYPE_CHECKING, Any, Iterator
 
-from drone_mesh.communication.interfaces import IInternetConnection
+from drone_mesh.communication.interfaces import IGatewayCommands, IInternetConnection
 from drone_mesh.errors import ConfigurationError
 
 if TYPE_CHECKING:
@@ -48,3 +48,18 @@ def status_server(status: ReadStatus, http: HttpSettings) -> StatusServer:
     with _extra("http", "--http needs"):
         from drone_mesh.internet.status import StatusServer
     return StatusServer(status, http)
+
+
+class SeveralInternets(IInternetConnection):
+    """Connects and disconnects all its connections."""
+
+    def __init__(self, *connections: IInternetConnection) -> None:
+        self._connections = connections
+
+    def connect(self, commands: IGatewayCommands) -> None:
+        for connection in self._connections:
+            connection.connect(commands)
+
+    def disconnect(self) -> None:
+        for connection in self._connections:
+            connection.disconnect()

@@ -57,7 +57,6 @@ def approaches(run: RunRecord, within_m: float) -> list[Approach]:
 
 
 def _way(run: RunRecord, node: int, place: Place) -> Iterator[_Piece]:
-    """Where a drone was from the start to the end of the run."""
     now_s = 0.0
     for leg in run.legs:
         if leg.node != node:

@@ -1,4 +1,4 @@
-"""Runs the missing runs of an experiment until it is complete."""
+"""Runs the missing runs of an experiment until it is complete, and merges shards."""
 
 from __future__ import annotations
 
@@ -8,12 +8,19 @@ from pathlib import Path
 from typing import Iterator, Mapping, Sequence
 
 from drone_mesh.lab.engine import run_all
-from drone_mesh.lab.experiment import LoadedExperiment
+from drone_mesh.lab.experiment import LoadedExperiment, load_experiment
 from drone_mesh.lab.plan import Plan, PlannedRun
 from drone_mesh.lab.program import PROGRAM
 from drone_mesh.lab.progress import Progress
-from drone_mesh.lab.provenance import code_of, describe_session
-from drone_mesh.lab.store import Store, StoreError, read_runs
+from drone_mesh.lab.provenance import code_with, describe_session
+from drone_mesh.lab.store import (
+    EXPERIMENT,
+    PROVENANCE,
+    Store,
+    StoreError,
+    read_provenance,
+    read_runs,
+)
 
 
 class OlderCodeError(StoreError):
@@ -138,7 +145,9 @@ class Campaign:
 
 def _older(plan: Plan, store: Store) -> dict[str, str]:
     """The finished runs of the plan that are not of this code, and the code that is."""
-    now = {one.spec.run: code_of(one.spec) for one in plan if one.spec.run in store.codes}
+    now = {
+        one.spec.run: code_with(one.spec.own_code) for one in plan if one.spec.run in store.codes
+    }
     return {run: code for run, code in now.items() if store.codes[run] != code}
 
 
@@ -162,3 +171,28 @@ def _is_narrow(
         return half <= half_width
     assert relative_half_width is not None
     return half <= relative_half_width * abs(mean)
+
+
+def merge(into: Path, shards: Sequence[Path]) -> int:
+    """Add all new rows of the shards; returns the number of runs added.
+
+    Raises StoreError for shards of different experiments, or one run of different code.
+    """
+    sessions = [read_provenance(shard) for shard in shards]
+    for shard, found in zip(shards, sessions):
+        if not found:
+            raise StoreError(f"{shard}: no {PROVENANCE} there, so it is not a results folder")
+    digests = {found[-1]["experiment_hash"] for found in sessions}
+    if len(digests) > 1:
+        raise StoreError("these shards belong to different experiments: their files differ")
+    overrides = list(sessions[0][-1].get("overrides", ()))
+    folder = Path(sessions[0][-1]["folder"])
+    plan = Plan(load_experiment(shards[0] / EXPERIMENT, overrides, folder))
+    store = Store(into, plan)
+    try:
+        added = store.take_from(shards)
+        store.describe([one for found in sessions for one in found])
+        store.export()
+    finally:
+        store.close()
+    return added

@@ -7,7 +7,7 @@ from typing import NamedTuple, Sequence
 
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.lab.program import PROGRAM
-from drone_mesh.lab.results import Row, load_results, number
+from drone_mesh.lab.results import Row, load_results, paired
 from drone_mesh.lab.statistics import holm, mean_interval, paired_difference
 
 
@@ -75,22 +75,15 @@ def _one_code(rows: Sequence[Row]) -> str:
 
 def _print_table(found: Sequence[_Pairs], metrics: Sequence[str]) -> None:
     print(f"{'metric':20} {'seeds':>5}  {'A':26} {'B':26} {'B - A, paired':28} {'p (Holm)':>9}")
-    columns = [_values(pairs, metric) for pairs in found for metric in metrics]
+    columns = [paired(pairs.a, pairs.b, metric) for pairs in found for metric in metrics]
     differences = [paired_difference(xs, ys) for xs, ys in columns]
-    lines = zip(columns, differences, holm([paired.p for paired in differences]))
+    lines = zip(columns, differences, holm([one.p for one in differences]))
     for pairs in found:
         if pairs.label:
             print(pairs.label)
-        for metric, ((xs, ys), paired, p) in zip(metrics, lines):
+        for metric, ((xs, ys), compared, p) in zip(metrics, lines):
             print(
                 f"{metric:20} {len(xs):5}  {mean_interval(xs)!s:26} {mean_interval(ys)!s:26} "
-                f"{paired.difference!s:28} {p:9.2g}"
+                f"{compared.difference!s:28} {p:9.2g}"
             )
     print("means with 95 % BCa bootstrap intervals; p: Wilcoxon signed-rank, Holm over the rows")
-
-
-def _values(pairs: _Pairs, metric: str) -> tuple[list[float], list[float]]:
-    """A metric of both, for the seeds for which both have a value."""
-    values = ((number(a, metric), number(b, metric)) for a, b in zip(pairs.a, pairs.b))
-    whole = [(x, y) for x, y in values if x is not None and y is not None]
-    return [x for x, _ in whole], [y for _, y in whole]

@@ -8,8 +8,7 @@ from typing import NamedTuple, Sequence
 
 from drone_mesh.errors import MeshError
 from drone_mesh.lab.plan import Plan, RunSpec
-from drone_mesh.lab.quiet import quiet_nodes
-from drone_mesh.lab.worker import execute, measured, scenario_of, simulation_of
+from drone_mesh.lab.worker import execute, measured, quiet_nodes, scenario_of, simulation_of
 
 BUDGET_S = 20.0  # of trial runs
 MOST_CELLS = 60  # cells that get a trial; if there are more, every n-th one does
@@ -20,19 +19,11 @@ START_S = 2.5  # time in which local workers start and load the code
 TASK_S = 0.004  # additional time per run: scheduling, storing
 
 
-class Trial(NamedTuple):
-    """The cost of one run, in seconds of this process's processor time."""
-
-    run_s: float
-    outside_s: float | None  # of these, outside the simulation; None: cut off, or without packets
-
-
 class Estimate(NamedTuple):
     """The seconds that the experiment needs on otherwise idle cores."""
 
     wall_s: float
     run_s: float  # mean of one run
-    outside_s: float | None  # of these, outside the simulation; None: no trial was completed
     trials: int
 
 
@@ -56,28 +47,26 @@ def estimate(plan: Plan, workers: int) -> Estimate:
     cells = [by_cell[cell] for cell in list(by_cell)[::stride]]
     most_s = BUDGET_S / len(cells)
     _trial(cells[0][0], most_s)  # loads the modules of a first run
-    trials: list[list[Trial]] = [[] for _ in cells]
+    trials: list[list[float]] = [[] for _ in cells]
     started_s = time.process_time()
     for repetition in range(most_trials):
         for specs, found in zip(cells, trials):
             if repetition and time.process_time() - started_s > BUDGET_S:
                 break
             found.append(_trial(specs[repetition], most_s))
-    run_s = statistics.mean(statistics.mean(t.run_s for t in found) for found in trials)
-    outside = [t.outside_s for found in trials for t in found if t.outside_s is not None]
+    run_s = statistics.mean(map(statistics.mean, trials))
     wall_s = len(plan) * (run_s + TASK_S) / max(1, workers) + (START_S if workers else 0.0)
-    return Estimate(
-        wall_s, run_s, statistics.mean(outside) if outside else None, sum(map(len, trials))
-    )
+    return Estimate(wall_s, run_s, sum(map(len, trials)))
 
 
-def _trial(spec: RunSpec, most_s: float) -> Trial:
+def _trial(spec: RunSpec, most_s: float) -> float:
+    """The cost of a run, in seconds of this process's processor time."""
     started_s = time.process_time()
     if scenario_of(spec.scenario).model == "ideal":
         outcome = execute(spec)
         if outcome.failure:
             raise EstimateError(f"a trial run failed: {outcome.message}")
-        return Trial(time.process_time() - started_s, None)
+        return time.process_time() - started_s
     try:
         with quiet_nodes():
             return _try_packets(spec, most_s)
@@ -86,7 +75,7 @@ def _trial(spec: RunSpec, most_s: float) -> Trial:
         raise EstimateError(f"a trial run failed: {type(error).__name__}: {message}") from error
 
 
-def _try_packets(spec: RunSpec, most_s: float) -> Trial:
+def _try_packets(spec: RunSpec, most_s: float) -> float:
     started_s = time.process_time()
     simulation = simulation_of(spec)
     duration_s = simulation.scenario.duration_s
@@ -95,11 +84,10 @@ def _try_packets(spec: RunSpec, most_s: float) -> Trial:
     for now_s in simulation.samples():
         samples.append((now_s, time.process_time() - started_s))
         if samples[-1][1] > most_s and LEAST_SHARE * duration_s <= now_s < duration_s:
-            return Trial(_extrapolated(samples, duration_s), None)
+            return _extrapolated(samples, duration_s)
     measured(simulation.record(), spec.own_metrics)
     simulation.event_hash()
-    run_s = time.process_time() - started_s
-    return Trial(run_s, run_s - simulation.simulating_s)
+    return time.process_time() - started_s
 
 
 def _extrapolated(samples: Sequence[tuple[float, float]], duration_s: float) -> float:

@@ -54,7 +54,6 @@ def nearest_name(name: str, known: Sequence[str]) -> str:
 
 
 def _keys_at(model: Any, place: KeyPath) -> List[str]:
-    """The keys of a model at this place."""
     for step in place:
         if isinstance(step, int):
             continue

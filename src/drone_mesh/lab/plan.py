@@ -7,7 +7,7 @@ import json
 from typing import Any, Iterator, NamedTuple, Sequence
 
 from drone_mesh.lab.experiment import Cell, LoadedExperiment, as_text
-from drone_mesh.lab.own_code import own_code
+from drone_mesh.lab.provenance import own_code
 from drone_mesh.lab.scenario import Scenario
 
 LONGEST_VALUE = 200  # characters in one field of runs.csv; longer values become a hash

@@ -10,8 +10,7 @@ from drone_mesh.communication.data.transport import ReceivedMessage
 from drone_mesh.lab.flights import Leg
 from drone_mesh.lab.formations import Formations
 from drone_mesh.lab.impairments import Traffic
-from drone_mesh.lab.link_watch import LinkWatch
-from drone_mesh.lab.network_sample import NetworkSample
+from drone_mesh.lab.network_sample import LinkWatch, NetworkSample
 from drone_mesh.lab.probes import ProbeFate
 from drone_mesh.lab.scenario import Scenario
 from drone_mesh.lab.timeline import HandedIn, Happened, OrderAttempt

@@ -8,19 +8,19 @@ from typing import Sequence
 import jinja2
 
 from drone_mesh.errors import ConfigurationError, MeshError
-from drone_mesh.lab.animation import animate_repair
-from drone_mesh.lab.figures import Drawing, axis_drawing, axis_drawings
-from drone_mesh.lab.healing_figures import (
+from drone_mesh.lab.figures import (
     HEALED,
     PHASES_OF_REPAIR,
+    Drawing,
+    axis_drawing,
+    axis_drawings,
     phases_drawing,
     survival_drawing,
 )
 from drone_mesh.lab.metrics import METRICS
 from drone_mesh.lab.program import PROGRAM
-from drone_mesh.lab.results import Results, load_results, number
+from drone_mesh.lab.results import Results, load_results
 from drone_mesh.lab.run_report.drawing import in_style, svg_element, svg_of_its_own
-from drone_mesh.lab.show import replay
 from drone_mesh.lab.store import EXPERIMENT
 from drone_mesh.lab.tables import Table, all_tables
 
@@ -55,7 +55,6 @@ def _render(results: Results, tables: Sequence[Table], drawings: Sequence[Drawin
     experiment = results.loaded.experiment
     done = sum(planned.spec.run in results.rows for planned in results.plan)
     codes = sorted({row["code"].partition(" ")[0] for row in results.rows.values()})
-    run, animation = _animation(results)
     return template.render(
         title=experiment.title or experiment.name,
         name=experiment.name,
@@ -67,9 +66,6 @@ def _render(results: Results, tables: Sequence[Table], drawings: Sequence[Drawin
         draws=experiment.draws,
         tables={table.name: table for table in tables},
         drawings=[(drawing, svg_element(drawing.figure)) for drawing in drawings],
-        animation=animation,
-        animated_run=run,
-        folder=results.folder,
         definitions=[(name, METRICS[name]) for name in results.metrics if name in METRICS],
         codes=codes,
         mixed=any(len(results.codes(cell)) > 1 for cell in range(len(results.loaded.cells))),
@@ -77,23 +73,6 @@ def _render(results: Results, tables: Sequence[Table], drawings: Sequence[Drawin
         sessions=results.sessions,
         experiment_text=(results.folder / EXPERIMENT).read_text(encoding="utf-8"),
     )
-
-
-def _animation(results: Results) -> tuple[str, str]:
-    """(run id, SVG) of the healed run with the median time among those with a flight."""
-    flown = [
-        (total_s, row["run"])
-        for planned in results.plan
-        if (row := results.rows.get(planned.spec.run)) is not None
-        and row.get("model") == "mesh"
-        and (number(row, "flights") or 0) > 0
-        and (total_s := number(row, "t_total_s")) is not None
-    ]
-    if not flown:
-        return "", ""
-    run = sorted(flown)[len(flown) // 2][1]
-    shown = replay(results, run)
-    return run, animate_repair(shown.states, shown.record)
 
 
 def _export(

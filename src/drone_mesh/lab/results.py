@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Mapping, NamedTuple, Sequence
+from typing import Iterable, Mapping, NamedTuple, Sequence
 
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.lab import extensions
@@ -110,11 +110,8 @@ class Results(NamedTuple):
     def paired(self, a: int, b: int, metric: str) -> tuple[list[float], list[float]]:
         """A metric in two cells, for the seeds for which both have a value, in the same order."""
         in_a, in_b = self.of_cell(a), self.of_cell(b)
-        pairs = (
-            (number(in_a[r], metric), number(in_b[r], metric)) for r in sorted(in_a.keys() & in_b)
-        )
-        whole = [(x, y) for x, y in pairs if x is not None and y is not None]
-        return [x for x, _ in whole], [y for _, y in whole]
+        both = sorted(in_a.keys() & in_b)
+        return paired([in_a[r] for r in both], [in_b[r] for r in both], metric)
 
     @property
     def axis_names(self) -> dict[str, str]:
@@ -167,6 +164,13 @@ def number(row: Row, column: str) -> float | None:
     """A metric of a run; None if undefined."""
     text = row.get(column, "")
     return float(text) if text else None
+
+
+def paired(a: Iterable[Row], b: Iterable[Row], metric: str) -> tuple[list[float], list[float]]:
+    """A metric of these pairs of runs, where both have a value."""
+    values = ((number(x, metric), number(y, metric)) for x, y in zip(a, b))
+    whole = [(x, y) for x, y in values if x is not None and y is not None]
+    return [x for x, _ in whole], [y for _, y in whole]
 
 
 def is_share(column: str) -> bool:

@@ -17,8 +17,8 @@ from drone_mesh.errors import ConfigurationError
 from drone_mesh.lab.experiment_parts import Above0, AtLeast0, NodeId, Part, PartOfKind, Point, Share
 from drone_mesh.lab.faults import Fault
 from drone_mesh.mobility import Mobility
-from drone_mesh.mobility.limits import check as check_mobility
 from drone_mesh.mobility.settings import Knot
+from drone_mesh.mobility.settings import check as check_mobility
 from drone_mesh.yaml_file import is_number
 
 _MODEL = ("speed_m_s", "height_m", "share", "gateways")

@@ -9,7 +9,7 @@ from drone_mesh.communication.seals.keys import Keys, MeshKey
 from drone_mesh.communication.timing.mesh_timing import MeshTiming
 from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.positions import PositionErrors
-from drone_mesh.lab.one_way import OneWay
+from drone_mesh.lab.impairments import OneWay
 from drone_mesh.lab.places import StartPoint, draw_places
 from drone_mesh.lab.propagation import obstacles_of
 from drone_mesh.lab.scenario import Scenario

@@ -83,7 +83,6 @@ class SequenceRun(Simulation):
         return super().is_able(node) and not all(air.is_cut(node, other) for other in helpers)
 
     def _alive(self) -> list[int]:
-        """Routers with power."""
         nodes = self.network.nodes
         return [n for n, node in nodes.items() if node.antenna.powered and not node.is_gateway]
 
@@ -200,7 +199,6 @@ class SequenceRun(Simulation):
 
 
 def _drawn(scenario: Scenario, rng: random.Random) -> Scenario:
-    """The scenario with its random mesh."""
     sequence = scenario.sequence
     assert sequence is not None
     if scenario.radio.kind != "disc":

@@ -11,7 +11,7 @@ from typing import NamedTuple, NoReturn, Sequence
 
 from drone_mesh.errors import ConfigurationError, MeshError
 from drone_mesh.lab.plan import PlannedRun
-from drone_mesh.lab.provenance import code_of
+from drone_mesh.lab.provenance import code_with
 from drone_mesh.lab.record import RunRecord
 from drone_mesh.lab.results import Results, load_results
 from drone_mesh.lab.worker import scenario_of, simulation_of
@@ -49,7 +49,7 @@ def explain_hash(results: Results, shown: Replay) -> str:
         return f"event hash {shown.event_hash}; the folder has no row of this run to compare with"
     if row["event_hash"] == shown.event_hash:
         return f"event hash {shown.event_hash}: reproduces the run in {results.folder}"
-    now = code_of(shown.planned.spec)
+    now = code_with(shown.planned.spec.own_code)
     why = (
         f"the row was computed by code {row['code']}, this is {now}"
         if row["code"] != now

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import math
-import time
 from dataclasses import replace
 from typing import Callable, Iterator, Protocol, cast
 
@@ -16,18 +15,17 @@ from drone_mesh.channel.statistics import RadioStatistics
 from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.radio import InProcessAir
 from drone_mesh.lab.flights import Flights
-from drone_mesh.lab.impairments import Impairments
-from drone_mesh.lab.link_watch import LinkWatch
+from drone_mesh.lab.impairments import Impairments, OneWay
 from drone_mesh.lab.metrics import STACKED_M
 from drone_mesh.lab.movement import ToldPilots, tracks
 from drone_mesh.lab.network_sample import (
+    LinkWatch,
     NetworkSample,
     gateways_of,
     physical_graph,
     route_hops,
     sample_of,
 )
-from drone_mesh.lab.one_way import OneWay
 from drone_mesh.lab.probes import ProbeSender
 from drone_mesh.lab.propagation import ChannelAir, obstacles_of, put_obstacles
 from drone_mesh.lab.record import AirFigures, Place, RunRecord, ServiceGap, Topology
@@ -55,7 +53,6 @@ class Simulation:
         places = places_of(scenario, streams)
         one_way = OneWay(scenario, streams)
         self.network = network_of(scenario, streams, places, one_way)
-        self.simulating_s = 0.0  # processor time in the network, without the lab's own
         self.impairments = Impairments(self.network, streams.of, scenario.radio.loss, one_way)
         self._planner = put_obstacles(self.network, self.impairments, scenario)
         self.flights = Flights(self.network)
@@ -176,15 +173,10 @@ class Simulation:
         clock = self.network.clock
         while clock.now_s < until_s:
             if self.flights.in_the_air:
-                self._run_until(min(until_s, clock.now_s + FLIGHT_SAMPLE_S))
+                clock.run_until(min(until_s, clock.now_s + FLIGHT_SAMPLE_S))
                 self._watch_distances()
             else:
-                self._run_until(until_s)
-
-    def _run_until(self, until_s: float) -> None:
-        before_s = time.process_time()
-        self.network.clock.run_until(until_s)
-        self.simulating_s += time.process_time() - before_s
+                clock.run_until(until_s)
 
     def is_able(self, node: int) -> bool:
         """Whether a drone can fly and the gateway would be in range of its believed place."""

@@ -229,7 +229,7 @@ def worst_table(results: Results) -> Table | None:
     header = ["cell", "seed", "healed after", "connected at the end", "run"]
     caption = (
         "The runs that took longest. To repeat one with all its events: "
-        f"{PROGRAM} show {results.folder} RUN, with --page FILE for a page about it."
+        f"{PROGRAM} show {results.folder} RUN, with --page FILE or --console for a page about it."
     )
     return Table("worst", "Worst seeds", caption, header, rows)
 

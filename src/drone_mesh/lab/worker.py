@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import functools
 import json
+import logging
 import math
 import threading
 import time
 import traceback
-from typing import Mapping, NamedTuple, Sequence
+from typing import Iterator, Mapping, NamedTuple, Sequence
 
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.lab import extensions
 from drone_mesh.lab.metrics import METRICS, measure_all
-from drone_mesh.lab.own_code import imported_code
 from drone_mesh.lab.plan import RunSpec
-from drone_mesh.lab.provenance import code_of
-from drone_mesh.lab.quiet import quiet_nodes
+from drone_mesh.lab.provenance import code_with, imported_code
 from drone_mesh.lab.record import RunRecord, ServiceGap
 from drone_mesh.lab.scenario import Scenario
 from drone_mesh.lab.sequence import SequenceRun
@@ -64,9 +64,11 @@ def execute(spec: RunSpec) -> Outcome:
         else:
             message = f"still running after {spec.timeout_s:g} s of wall time"
         wall_s, words = time.perf_counter() - started, traceback.format_exc()
-        return Outcome(spec, wall_s, code_of(spec), failure=kind, message=message, traceback=words)
+        return Outcome(
+            spec, wall_s, code_with(spec.own_code), failure=kind, message=message, traceback=words
+        )
     wall_s = time.perf_counter() - started
-    return Outcome(spec, wall_s, code_of(spec), values, event_hash, outages)
+    return Outcome(spec, wall_s, code_with(spec.own_code), values, event_hash, outages)
 
 
 def _measure(spec: RunSpec) -> tuple[dict[str, float], str, Sequence[ServiceGap]]:
@@ -146,3 +148,15 @@ class _Alarm:
                 ctypes.pythonapi.PyThreadState_SetAsyncExc(
                     ctypes.c_ulong(self._thread), ctypes.py_object(RunTimeout)
                 )
+
+
+@contextlib.contextmanager
+def quiet_nodes() -> Iterator[None]:
+    """Log only critical messages of the package; restore the level at the end."""
+    logger = logging.getLogger("drone_mesh")
+    level = logger.level
+    logger.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        logger.setLevel(level)

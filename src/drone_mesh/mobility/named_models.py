@@ -10,10 +10,9 @@ from drone_mesh.errors import ConfigurationError
 from drone_mesh.mobility.area import Area
 from drone_mesh.mobility.gauss_markov import gauss_markov
 from drone_mesh.mobility.group import reference_point, wandering
-from drone_mesh.mobility.limits import check, check_area
 from drone_mesh.mobility.patrol import eight, lanes, oval
 from drone_mesh.mobility.random_waypoint import random_waypoint
-from drone_mesh.mobility.settings import Mobility
+from drone_mesh.mobility.settings import Mobility, check, check_area
 from drone_mesh.mobility.track import Legs, Loop, Together, Track, legs_between
 
 

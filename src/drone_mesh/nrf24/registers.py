@@ -86,9 +86,6 @@ class BitField:
 
 
 # CONFIG, p. 57
-MASK_RX_DR = BitField(Register.CONFIG, 6)  # 1: RX_DR does not pull the IRQ pin low
-MASK_TX_DS = BitField(Register.CONFIG, 5)
-MASK_MAX_RT = BitField(Register.CONFIG, 4)
 EN_CRC = BitField(Register.CONFIG, 3)  # forced on while any bit of EN_AA is set
 CRCO = BitField(Register.CONFIG, 2)  # 1: 2 bytes of CRC, 0: 1 byte
 PWR_UP = BitField(Register.CONFIG, 1)
@@ -101,12 +98,9 @@ ERX = tuple(BitField(Register.EN_RXADDR, pipe) for pipe in range(PIPES))
 AW = BitField(Register.SETUP_AW, 0, 2)  # p. 58; 1, 2, 3 = 3, 4, 5 bytes
 ARD = BitField(Register.SETUP_RETR, 4, 4)  # p. 58; (n + 1) * 250 us
 ARC = BitField(Register.SETUP_RETR, 0, 4)  # p. 58; automatic retransmits, 0..15
-RF_CHANNEL = BitField(Register.RF_CH, 0, 7)  # p. 58; carrier = 2400 + n MHz
 
 # RF_SETUP, p. 59
-CONT_WAVE = BitField(Register.RF_SETUP, 7)
 RF_DR_LOW = BitField(Register.RF_SETUP, 5)  # 1: 250 kbit/s
-PLL_LOCK = BitField(Register.RF_SETUP, 4)
 RF_DR_HIGH = BitField(Register.RF_SETUP, 3)  # 1: 2 Mbit/s, if RF_DR_LOW is 0
 RF_PWR = BitField(Register.RF_SETUP, 1, 2)  # -18, -12, -6, 0 dBm
 
@@ -115,7 +109,6 @@ RX_DR = BitField(Register.STATUS, 6)  # a payload arrived
 TX_DS = BitField(Register.STATUS, 5)  # sent, and acknowledged if requested
 MAX_RT = BitField(Register.STATUS, 4)  # all retransmits used up; blocks sending until cleared
 RX_P_NO = BitField(Register.STATUS, 1, 3)  # pipe of the oldest payload, RX_FIFO_IS_EMPTY if none
-STATUS_TX_FULL = BitField(Register.STATUS, 0)
 RX_FIFO_IS_EMPTY = 7  # value of RX_P_NO
 
 PLOS_CNT = BitField(Register.OBSERVE_TX, 4, 4)  # p. 60; MAX_RT events since RF_CH was written

@@ -12,9 +12,9 @@ from drone_mesh.errors import ConfigurationError
 from drone_mesh.nrf24.emulator.air import Air
 from drone_mesh.nrf24.emulator.air_server import AirServer
 from drone_mesh.nrf24.emulator.chip import EmulatedChip
+from drone_mesh.nrf24.emulator.clock import WallClock
 from drone_mesh.nrf24.emulator.links import LogDistance
 from drone_mesh.nrf24.emulator.trace import FrameTrace
-from drone_mesh.nrf24.emulator.wall_clock import WallClock
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
 from drone_mesh.nrf24.settings import DataRate, RadioSettings
 

@@ -14,8 +14,12 @@ from typing import Callable, Iterable, Iterator, Sequence
 
 from drone_mesh.communication.interfaces import IInternetConnection
 from drone_mesh.drone.engines import create_engine
-from drone_mesh.internet.on_demand import http_internet, mqtt_internet, status_server
-from drone_mesh.internet.several import SeveralInternets
+from drone_mesh.internet.on_demand import (
+    SeveralInternets,
+    http_internet,
+    mqtt_internet,
+    status_server,
+)
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
 from drone_mesh.raspberry.drone_check import check_drone
 from drone_mesh.raspberry.emulated_air import EmulatedAir

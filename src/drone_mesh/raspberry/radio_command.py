@@ -19,9 +19,9 @@ from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError, MeshError
 from drone_mesh.nrf24.emulator.air import Air
 from drone_mesh.nrf24.emulator.chip import EmulatedChip
+from drone_mesh.nrf24.emulator.clock import WallClock
 from drone_mesh.nrf24.emulator.links import LogDistance
 from drone_mesh.nrf24.emulator.pcapng import LINKTYPE_PAYLOADS, CapturedPacket, PcapngWriter
-from drone_mesh.nrf24.emulator.wall_clock import WallClock
 from drone_mesh.nrf24.gpio import CePin, IrqPin
 from drone_mesh.nrf24.settings import DATA_RATES, RadioSettings
 from drone_mesh.nrf24.spi import SpiDevice

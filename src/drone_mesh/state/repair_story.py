@@ -111,7 +111,6 @@ class RepairStory:
         self._last(("lost", len(self._fliers)), text, now_s, until_s)
 
     def _describe_bids(self, group: Sequence[NodeStatus], mesh: MeshStatus) -> None:
-        """Describe a negotiation."""
         now_s = mesh.stamp_s
         if self._key is None or self._key[0] not in ("asking", "bids"):
             self._bids.clear()

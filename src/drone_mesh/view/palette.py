@@ -82,7 +82,6 @@ AXIS: Colour = "#a8b2ad"
 SHADOW: Colour = "#ccd1cc"
 FRAME: Colour = "#3a424d"  # of a drone
 ROTOR: Colour = "#aab3bd"  # of a drone in flight
-SKY: Colour = "#d9e6f2"
 
 _LINK_COLOUR_NAMES: Mapping[LinkUse, str] = {
     LinkUse.ROUTE: "connected",

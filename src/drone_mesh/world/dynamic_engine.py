@@ -59,7 +59,6 @@ class DynamicEngine(DroneEngine):
         world.wake(self)
 
     def why_not_fly(self) -> str:
-        """Crashed, or out of battery; empty while it can fly."""
         if self.crashed:
             return "crashed"
         if self._battery_percent <= LAND_AT_PERCENT:
@@ -67,16 +66,13 @@ class DynamicEngine(DroneEngine):
         return ""
 
     def battery_percent(self) -> float:
-        """0..100."""
         return self._battery_percent
 
     @property
     def is_flat(self) -> bool:
-        """Whether the battery is empty."""
         return self._battery_percent == 0.0
 
     def is_flying(self) -> bool:
-        """Whether a flight is under way."""
         return self._route is not None or bool(self._goals)
 
     def set_goal(self, latitude: float, longitude: float, height: float) -> None:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from drone_mesh.drone.engines import FlightOptions, create_engine
+from drone_mesh.drone.engines import FlightOptions, GroundEngine, create_engine
 from drone_mesh.drone.geodesy import Origin
-from drone_mesh.drone.ground import GroundEngine
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.limits import FlightLimits

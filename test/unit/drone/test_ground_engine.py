@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from drone_mesh.drone import Location
-from drone_mesh.drone.ground import GroundEngine
+from drone_mesh.drone.engines import GroundEngine
 from drone_mesh.errors import GoalRefused, LocationUnknown
 
 HERE = Location(latitude=52.5, longitude=-3.0, height=2.0)

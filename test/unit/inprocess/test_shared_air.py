@@ -9,7 +9,7 @@ import pytest
 from scenarios import events, flown, layout
 
 from drone_mesh.communication.interfaces import IMeshNetwork
-from drone_mesh.drone.ground import GroundEngine
+from drone_mesh.drone.engines import GroundEngine
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.inprocess import Network

@@ -8,14 +8,14 @@ from typing import Callable
 
 from drone_mesh.communication.node.assembly import assemble_node
 from drone_mesh.communication.node.component import MeshnetworkComponent
-from drone_mesh.drone.ground import GroundEngine
+from drone_mesh.drone.engines import GroundEngine
 from drone_mesh.drone.location import Location
 from drone_mesh.execution import MeshExecutor
 from drone_mesh.inprocess.node import NoInternet
 from drone_mesh.nrf24.emulator.air import Air
 from drone_mesh.nrf24.emulator.chip import EmulatedChip
+from drone_mesh.nrf24.emulator.clock import WallClock
 from drone_mesh.nrf24.emulator.links import LinkModel
-from drone_mesh.nrf24.emulator.wall_clock import WallClock
 from drone_mesh.nrf24.high_level import NRF24HighLevelInterface
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
 from drone_mesh.nrf24.settings import RadioSettings

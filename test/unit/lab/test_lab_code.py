@@ -11,8 +11,8 @@ from typing import Callable
 import pytest
 
 from drone_mesh.lab.command import main
-from drone_mesh.lab.own_code import imported_code, own_code
 from drone_mesh.lab.program import _program as typed
+from drone_mesh.lab.provenance import imported_code, own_code
 from drone_mesh.lab.store import read_failures, read_runs
 
 EXPERIMENT = """\

@@ -10,7 +10,7 @@ import pytest
 
 from drone_mesh.inprocess.radio import InProcessAir
 from drone_mesh.lab import estimate as estimating
-from drone_mesh.lab.estimate import EstimateError, Trial, estimate
+from drone_mesh.lab.estimate import EstimateError, estimate
 from drone_mesh.lab.experiment import load_experiment
 from drone_mesh.lab.plan import Plan
 from drone_mesh.lab.worker import execute
@@ -77,7 +77,7 @@ def test_more_workers_take_less_time_and_none_do_not_have_to_start(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     plan = plan_of(tmp_path, SEVERAL_CELLS)
-    monkeypatch.setattr(estimating, "_trial", lambda *_arguments: Trial(1.0, None))
+    monkeypatch.setattr(estimating, "_trial", lambda *_arguments: 1.0)
     alone, one, two = (estimate(plan, workers).wall_s for workers in (0, 1, 2))
     assert one - alone == pytest.approx(estimating.START_S)
     assert two - estimating.START_S == pytest.approx((one - estimating.START_S) / 2)
@@ -91,15 +91,7 @@ def test_every_cell_has_a_trial_even_without_any_time_for_it(
     monkeypatch.setattr(estimating, "BUDGET_S", 0.0)
     guess = estimate(plan, 1)
     assert guess.trials == len(plan.cells)
-    assert guess.outside_s is None  # all were cut off
     assert clock.now_s < (len(plan.cells) + 1) * guess.run_s / 2
-
-
-def test_nothing_of_a_run_that_costs_only_packets_is_outside_the_simulation(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    PacketClock(monkeypatch)
-    assert estimate(plan_of(tmp_path, SEVERAL_CELLS), 1).outside_s == pytest.approx(0.0)
 
 
 def test_a_long_run_is_extrapolated_by_its_second_half() -> None:
@@ -113,9 +105,9 @@ def test_a_cell_with_few_trials_weighs_as_much_as_the_others(
 ) -> None:
     costs = iter([9.0, 1.0, 1.0, 3.0, 3.0, 5.0])  # the first loads the code, and does not count
 
-    def trial(_spec: object, _most_s: float) -> Trial:
+    def trial(_spec: object, _most_s: float) -> float:
         spent_s.append(next(costs))
-        return Trial(spent_s[-1], None)
+        return spent_s[-1]
 
     spent_s: list[float] = []
     monkeypatch.setattr(estimating, "_trial", trial)

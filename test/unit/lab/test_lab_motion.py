@@ -11,9 +11,8 @@ import pytest
 from drone_mesh.air.graph import Graph
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.lab.experiment import load_experiment
-from drone_mesh.lab.link_watch import LinkWatch
 from drone_mesh.lab.metrics import measure_all
-from drone_mesh.lab.network_sample import NetworkSample
+from drone_mesh.lab.network_sample import LinkWatch, NetworkSample
 from drone_mesh.lab.record import RunRecord
 from drone_mesh.lab.scenario import Scenario
 from drone_mesh.lab.simulation import Simulation

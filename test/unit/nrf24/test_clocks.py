@@ -11,9 +11,9 @@ from chip_lab import PAYLOAD, Lab
 
 from drone_mesh.nrf24.emulator.air import Air
 from drone_mesh.nrf24.emulator.chip import EmulatedChip
+from drone_mesh.nrf24.emulator.clock import WallClock
 from drone_mesh.nrf24.emulator.cooperative_clock import CooperativeClock
 from drone_mesh.nrf24.emulator.links import IdealDisc
-from drone_mesh.nrf24.emulator.wall_clock import WallClock
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
 
 

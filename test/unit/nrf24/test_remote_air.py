@@ -11,9 +11,9 @@ import pytest
 from drone_mesh.nrf24.emulator.air import Air
 from drone_mesh.nrf24.emulator.air_server import AirServer
 from drone_mesh.nrf24.emulator.chip import EmulatedChip
+from drone_mesh.nrf24.emulator.clock import WallClock
 from drone_mesh.nrf24.emulator.links import IdealDisc
 from drone_mesh.nrf24.emulator.remote_chip import RemoteChip
-from drone_mesh.nrf24.emulator.wall_clock import WallClock
 from drone_mesh.nrf24.errors import RadioError
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
 

@@ -12,8 +12,8 @@ from drone_mesh.channel.runtime import Runtime
 from drone_mesh.communication.wire.messages import IntroduceMessage
 from drone_mesh.nrf24.emulator.air import Air
 from drone_mesh.nrf24.emulator.chip import EmulatedChip
+from drone_mesh.nrf24.emulator.clock import WallClock
 from drone_mesh.nrf24.emulator.links import LogDistance
-from drone_mesh.nrf24.emulator.wall_clock import WallClock
 from drone_mesh.nrf24.errors import RadioError
 from drone_mesh.nrf24.registers import Register
 from drone_mesh.nrf24.settings import DataRate, RadioSettings

@@ -14,8 +14,8 @@ import pytest
 from drone_mesh.nrf24.emulator.air import Air
 from drone_mesh.nrf24.emulator.chip import EmulatedChip
 from drone_mesh.nrf24.emulator.chip_core import ChipVariant
+from drone_mesh.nrf24.emulator.clock import WallClock
 from drone_mesh.nrf24.emulator.links import LogDistance
-from drone_mesh.nrf24.emulator.wall_clock import WallClock
 from drone_mesh.nrf24.errors import RadioError
 from drone_mesh.nrf24.settings import BroadcastMode, DataRate, RadioSettings
 from drone_mesh.raspberry import range_test

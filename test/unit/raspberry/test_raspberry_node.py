@@ -17,8 +17,8 @@ import pytest
 from drone_mesh.nrf24.emulator.air import Air
 from drone_mesh.nrf24.emulator.chip import EmulatedChip
 from drone_mesh.nrf24.emulator.chip_core import State
+from drone_mesh.nrf24.emulator.clock import WallClock
 from drone_mesh.nrf24.emulator.links import IdealDisc
-from drone_mesh.nrf24.emulator.wall_clock import WallClock
 from drone_mesh.raspberry import program, wiring_options
 from drone_mesh.raspberry.options import parse_gateway, parse_router
 from drone_mesh.stopping import ends_as

@@ -16,7 +16,7 @@ from typing import Iterator
 import httpx
 import pytest
 
-from drone_mesh.drone.ground import GroundEngine
+from drone_mesh.drone.engines import GroundEngine
 from drone_mesh.internet.http_settings import HttpSettings
 from drone_mesh.internet.on_demand import http_internet
 from drone_mesh.nrf24.emulator.chip_core import State

@@ -50,12 +50,6 @@ class Autopilot:
             return value
         return float(struct.unpack("<i", struct.pack("<f", value))[0])
 
-    def parameter_bytes(self, value: float, kind: int) -> float:
-        """The float that represents a value in a PARAM_VALUE or a PARAM_SET."""
-        if not self.integers_as_bytes or kind == mavlink.MAV_PARAM_TYPE_REAL32:
-            return value
-        return float(struct.unpack("<f", struct.pack("<i", int(value)))[0])
-
 
 def px4_mode(main: int, sub: int = 0) -> int:
     """PX4's custom_mode (px4_custom_mode.h)."""

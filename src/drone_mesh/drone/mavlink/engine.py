@@ -98,14 +98,12 @@ class MavlinkEngine(IDroneEngine):
         self._take(Location(latitude, longitude, hover_m), False, True, status.why_not_repair)
 
     def get_location(self) -> Location:
-        """The drone's position. Raises LocationUnknown with the reason."""
         status = self.status()
         if status.location is None:
             raise LocationUnknown(status.location_trouble)
         return status.location
 
     def why_not_fly(self) -> str:
-        """Why it cannot fly to a goal now; empty if it can."""
         return self.status().why_not_fly
 
     def why_not_repair(self) -> str:
@@ -113,19 +111,15 @@ class MavlinkEngine(IDroneEngine):
         return self.status().why_not_repair
 
     def why_ended(self) -> str:
-        """Why its last flight ended before its goal."""
         return self.status().ended
 
     def is_flying(self) -> bool:
-        """Whether a flight to a goal is under way."""
         return bool(self._goals) or self.status().is_flying
 
     def battery_percent(self) -> float | None:
-        """The charge that the autopilot reports."""
         return self.status().battery_percent
 
     def frame_digest(self) -> int:
-        """The digest of --origin."""
         return self._origin.digest
 
     def status(self) -> PilotStatus:
@@ -145,7 +139,6 @@ class MavlinkEngine(IDroneEngine):
         return latest[0]
 
     def close(self) -> None:
-        """End the thread and close the link."""
         self._ended.set()
         self._thread.join()
 

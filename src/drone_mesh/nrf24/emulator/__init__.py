@@ -6,9 +6,9 @@ pin. Any driver that accepts these runs on it.
 
 from drone_mesh.nrf24.emulator.air import Air
 from drone_mesh.nrf24.emulator.chip import EmulatedChip
+from drone_mesh.nrf24.emulator.clock import WallClock
 from drone_mesh.nrf24.emulator.links import IdealDisc, LogDistance
 from drone_mesh.nrf24.emulator.trace import FrameTrace
-from drone_mesh.nrf24.emulator.wall_clock import WallClock
 
 __all__ = [
     "Air",

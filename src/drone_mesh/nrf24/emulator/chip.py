@@ -80,7 +80,6 @@ class EmulatedChip(ChipCore):
     # -- timers and states ---------------------------------------------------------------------
 
     def settle(self) -> None:
-        """Start what CONFIG and CE request, now that the chip is idle."""
         self.overtake()
         self.stop_listening()
         if self.registers.receiver:
@@ -97,7 +96,6 @@ class EmulatedChip(ChipCore):
             self.state = State.STANDBY_II
 
     def config_written(self, was_powered: bool, was_receiver: bool) -> None:
-        """CONFIG has changed."""
         registers = self.registers
         self.update_irq()
         if not registers.powered:

@@ -43,8 +43,6 @@ Payload = TypeVar("Payload")
 
 
 class _Fifo(Generic[Payload]):
-    """Up to FIFO_DEPTH payloads."""
-
     def __init__(self) -> None:
         self._payloads: list[Payload] = []
 

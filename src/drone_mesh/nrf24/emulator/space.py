@@ -84,7 +84,6 @@ class Noise:
         return any(begin < end_ns and start_ns < end for begin, end in self._bursts)
 
     def _draw(self, to_ns: int) -> None:
-        """Draw the bursts up to this time."""
         bursts = self._bursts
         while self._drawn_to_ns <= to_ns:
             begin_ns = self._drawn_to_ns + self._rng.expovariate(1.0) * self._mean_pause_ns

@@ -42,7 +42,6 @@ class PacketSamples(Periodic):
             self._sampler.note(packet, time.monotonic())
 
     def start(self) -> None:
-        """Start publishing, until the node shuts down."""
         super().start()
         rospy.on_shutdown(self.stop)
 

@@ -15,8 +15,8 @@ from drone_mesh.msg import NRF24
 from drone_mesh.nrf24.airtime import NS_PER_S
 from drone_mesh.nrf24.emulator.air import Air
 from drone_mesh.nrf24.emulator.chip import EmulatedChip
+from drone_mesh.nrf24.emulator.clock import WallClock
 from drone_mesh.nrf24.emulator.links import LogDistance
-from drone_mesh.nrf24.emulator.wall_clock import WallClock
 from drone_mesh.nrf24.high_level import NRF24HighLevelInterface
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
 from drone_mesh.nrf24.settings import DataRate, RadioSettings
@@ -58,18 +58,15 @@ class EmulatedNRF24(NRF24HighLevelInterface):
         self._panel = AntennaPanel(node_id, slot, self.on, self._switch)
 
     def start_antenna(self, mesh: IMeshNetwork) -> None:
-        """Set the chip up and listen. Raises RadioError."""
         super().start_antenna(mesh)
         self._panel.start()
 
     def stop_antenna(self) -> None:
-        """Power the chip down, and leave the ROS graph."""
         self._panel.stop()
         super().stop_antenna()
         self._received.unregister()
 
     def debugging_mode(self, info: IMeshDebugInfo, on: bool) -> None:
-        """Start or stop publishing NodeDebugInfo."""
         self._panel.debugging_mode(info, on)
 
     def _switch(self, on: bool) -> None:
@@ -143,7 +140,6 @@ class EmulatedRadios(Radios):
         }
 
     def start(self) -> None:
-        """Start publishing what is in the air."""
         self._samples.start()
 
     def antenna(self, node_id: int, slot: ExecutorSlot) -> EmulatedNRF24:
@@ -163,7 +159,6 @@ class EmulatedRadios(Radios):
         return antenna
 
     def remove(self, node_id: int) -> None:
-        """Discard the chip of this node."""
         self._antennas.pop(node_id, None)
         self._chips.pop(node_id, None)
 
@@ -173,7 +168,6 @@ class EmulatedRadios(Radios):
             antenna.fall_silent()
 
     def close(self) -> None:
-        """Stop the air; returns when its thread has ended."""
         self._wall_clock.close()
 
 

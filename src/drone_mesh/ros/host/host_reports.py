@@ -61,7 +61,6 @@ class HostReports(Periodic):
         self._batcher.observe(event)
 
     def stop(self) -> None:
-        """Stop reporting; returns when the thread has ended."""
         super().stop()
         self._publisher.unregister()
 

@@ -85,7 +85,6 @@ class SimulatorLink(Radios, rospy.SubscribeListener):
 
     @property
     def ready(self) -> bool:
-        """Whether packets can be handed to a simulator."""
         return self._connection is not None
 
     # Packets, the executor's worker ----------------------------------------------------------

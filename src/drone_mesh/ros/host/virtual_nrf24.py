@@ -73,11 +73,9 @@ class VirtualNRF24(IWirelessCommunication):
         return self._on and self._link.send(payload)
 
     def send_messages(self, payloads: Sequence[bytes]) -> list[bool]:
-        """Send each to the node in its byte 3, in one call."""
         return self._link.send_all(payloads) if self._on else [False] * len(payloads)
 
     def broadcast_message(self, payload: bytes) -> None:
-        """Send to every node in range."""
         if self._on:
             self._link.broadcast(payload)
 
@@ -86,11 +84,9 @@ class VirtualNRF24(IWirelessCommunication):
         return self._link.jammed
 
     def debugging_mode(self, info: IMeshDebugInfo, on: bool) -> None:
-        """Start or stop publishing NodeDebugInfo."""
         self._panel.debugging_mode(info, on)
 
     def on(self) -> bool:
-        """Whether the antenna has power."""
         return self._on
 
     # Threads of rospy ------------------------------------------------------------------------
@@ -126,5 +122,4 @@ class VirtualRadios(SimulatorLink):
     """An ideal disc, in the process of the WirelessSignalSimulator."""
 
     def antenna(self, node_id: int, slot: ExecutorSlot) -> VirtualNRF24:
-        """The antenna of a node."""
         return VirtualNRF24(node_id, self, slot)

@@ -13,8 +13,7 @@ from drone_mesh.drone.roles import Role
 from drone_mesh.execution import ExecutorSlot
 from drone_mesh.internet import DEFAULT_PORT
 from drone_mesh.internet.http_settings import HttpSettings
-from drone_mesh.internet.on_demand import http_internet, mqtt_internet
-from drone_mesh.internet.several import SeveralInternets
+from drone_mesh.internet.on_demand import SeveralInternets, http_internet, mqtt_internet
 from drone_mesh.ros.host.engine_connector import RosDroneEngineConnector
 from drone_mesh.ros.host.internet_mock import RosInternetMock
 from drone_mesh.ros.host.mesh_settings import MeshSettings

@@ -157,7 +157,6 @@ class DroneManager:
     def _order_case(
         self, case: int, at_once: bool, handle: actionlib.ServerGoalHandle | None = None
     ) -> srv.OrderLayoutResponse:
-        """Order a layout."""
         return self._carry_out(f"layout {case}", self._orders_of(case), at_once, handle)
 
     def _carry_out(

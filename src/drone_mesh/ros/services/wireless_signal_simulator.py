@@ -190,7 +190,6 @@ class WirelessSignalSimulator:
         return srv.AreaScanResponse([node for node, topic in topics if self._is_heard(topic)])
 
     def _topics_in_range(self, node_id: int) -> list[tuple[int, str | None]]:
-        """The nodes in range of this one, and the topic of each."""
         with self._lock:
             try:
                 nodes = self._nodes.in_range(node_id)

@@ -34,12 +34,10 @@ class RosControls(MeshControls):
     """Any thread; each call opens a connection of its own and closes it."""
 
     def power(self, node: int, on: bool) -> str:
-        """Switch the antenna of a node."""
         _call(names.power_switch(node), srv.PowerSwitch, srv.PowerSwitchRequest(power=on))
         return f"node {node} is {'on' if on else 'off'}"
 
     def fly(self, node: int, x: float, y: float, z: float, allow_shared_place: bool = False) -> str:
-        """Order a drone to a place, through the mesh."""
         try:
             request_flight(node, Place(latitude=y, longitude=x, height=z), allow_shared_place)
         except FlightNotOrdered as error:
@@ -47,19 +45,16 @@ class RosControls(MeshControls):
         return f"ordered drone {node} to x {x:g}, y {y:g}, z {round(z)} m"
 
     def layout(self, case: int) -> str:
-        """Order all drones of a layout to their positions."""
         request = srv.OrderLayoutRequest(caseID=case)
         answer = _call(names.ORDER_LAYOUT_SERVICE, srv.OrderLayout, request)
         return _outcome(f"layout {case}", answer)
 
     def formation(self, name: str, orders: Sequence[Order], gateways: Sequence[int]) -> str:
-        """Order these drones to their positions, as those of a layout."""
         request = formation_request(name, orders, gateways=gateways)
         answer = _call(names.ORDER_FORMATION_SERVICE, srv.OrderFormation, request)
         return _outcome(name, answer)
 
     def preview(self, case: int) -> FormationPreview:
-        """What would happen if this layout were ordered now."""
         request = srv.PreviewLayoutRequest(caseID=case)
         answer = _call(names.PREVIEW_LAYOUT_SERVICE, srv.PreviewLayout, request)
         return FormationPreview(
@@ -71,7 +66,6 @@ class RosControls(MeshControls):
         )
 
     def speed(self, paused: bool, factor: float) -> str:
-        """Pause or resume simulated time, or change its speed."""
         request = srv.SetSpeedRequest(paused=paused, real_time_factor=factor)
         _done(_call(names.SPEED_SERVICE, srv.SetSpeed, request))
         if paused:
@@ -83,19 +77,16 @@ class RosControls(MeshControls):
         )
 
     def add(self, node: int | None, gateway: bool, x: float, y: float) -> str:
-        """Add a drone to the simulation; None: it gets the lowest free id."""
         wanted = srv.AddDroneRequest.LOWEST_FREE if node is None else node
         request = srv.AddDroneRequest(id=wanted, gateway=gateway, latitude=y, longitude=x)
         return _done(_call(names.ADD_DRONE_SERVICE, srv.AddDrone, request))
 
     def remove(self, node: int) -> str:
-        """Remove a drone from the simulation."""
         return _done(
             _call(names.REMOVE_DRONE_SERVICE, srv.RemoveDrone, srv.RemoveDroneRequest(id=node))
         )
 
     def mission(self, nodes: Sequence[int], mission: Mission) -> str:
-        """Let the pilots of these drones fly this mission."""
         waypoints = [
             Location(latitude=y, longitude=x, height=round(z)) for x, y, z in mission.waypoints
         ]
@@ -108,7 +99,6 @@ class RosControls(MeshControls):
         return f"the mission of {who} has begun"
 
     def pilots(self, action: str) -> str:
-        """Pause, resume or stop all missions."""
         drones = drones_if_known()
         request = srv.FlyMissionRequest(action=_ACTIONS[action])
         done = sum(

@@ -87,7 +87,6 @@ class _Newcomers(rospy.SubscribeListener):
 
 
 def _frames(nodes: Iterable[NodeStatus], stamp: rospy.Time) -> TFMessage:
-    """The frames map -> drone_<id>."""
     return TFMessage(transforms=[_transform(node, stamp) for node in nodes])
 
 

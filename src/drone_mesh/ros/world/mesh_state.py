@@ -82,7 +82,6 @@ class MeshStatePublisher(Periodic):
         self._forgotten.append(node_id)
 
     def stop(self) -> None:
-        """Stop publishing; returns when the thread has ended."""
         for subscriber in self._subscribers:
             subscriber.unregister()
         super().stop()
