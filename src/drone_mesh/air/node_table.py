@@ -89,7 +89,8 @@ class NodeTable:
     def drone_info(self, node_id: int, position: Sequence[float], sub: str, on: bool) -> None:
         """Apply one DroneInfo. With `sub` it comes from an antenna; without, it is a position.
 
-        Only without either it speaks of power alone: engines leave `on` false.
+        Without `sub` and without a position it switches the power. With a position, `on` does not
+        count, because engines leave it false.
 
         Raises AirError, and changes nothing, for an invalid id, position or topic.
         """

@@ -40,7 +40,7 @@ class MeshControls:
         raise self._refusal("formation")
 
     def preview(self, case: int) -> FormationPreview:
-        """What would happen if this layout were ordered now."""
+        """Describe what would happen if this layout were ordered now."""
         raise self._refusal("preview")
 
     def speed(self, paused: bool, factor: float) -> str:

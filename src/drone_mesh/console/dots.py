@@ -35,12 +35,12 @@ class RecordedDots(NamedTuple):
 
     @classmethod
     def of(cls, stamp_s: float, carried: int, dots: Sequence[Dot]) -> RecordedDots:
-        """Pack these."""
+        """Pack the packets of a sample."""
         packets = bytes(byte for dot in dots for byte in dot[:3])
         return cls(stamp_s, carried, packets, array("f", (dot.age_s for dot in dots)))
 
     def dots(self, age_s: float) -> list[Dot]:
-        """The packets, so many seconds after the sample."""
+        """The packets, as dots that appear this many seconds after the sample."""
         senders, receivers, types = (self.packets[field::3] for field in range(3))
         return make_dots(senders, receivers, types, (age + age_s for age in self.ages_s))
 

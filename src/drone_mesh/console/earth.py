@@ -50,7 +50,7 @@ class EarthFiles:
         return await asyncio.get_running_loop().run_in_executor(self._workers, work, *what)
 
     def _mesh_at(self, moment: str) -> MeshStatus | None:
-        """The mesh at this simulated second; now, if the history does not have it."""
+        """The mesh at this simulated second; the present one if the history does not have it."""
         try:
             at_s = float(moment)
         except ValueError:
@@ -61,7 +61,7 @@ class EarthFiles:
 
 
 def places_of(mesh: MeshStatus | None) -> Placemarks:
-    """Where the routers are: what a layout sends somewhere."""
+    """The places of the routers, as points of a layout."""
     found = Placemarks()
     for node in mesh.nodes if mesh else ():
         if node.role == Role.ROUTER and position_is_known(node):

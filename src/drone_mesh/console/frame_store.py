@@ -48,7 +48,7 @@ NOTHING_MORE: Mapping[int, Mapping[str, Any]] = {}
 
 
 class FrameStore:
-    """Belongs to one thread, the server's event loop. Version 0: a page that has nothing yet."""
+    """Belongs to one thread, the server's event loop. An empty page has version 0."""
 
     def __init__(self, history: History | None = None, origin: Origin | None = None) -> None:
         """`history` keeps the states given to the store, for pages that look back.
@@ -212,7 +212,7 @@ class FrameStore:
         return self._cache[version]
 
     def detail_of(self, node_id: int) -> dict[str, Any]:
-        """What pages show only of the selected node, since it changes all the time.
+        """The values of the selected node that change all the time, which pages show for no other.
 
         `neighbours`: (neighbour, simulated seconds since it was last heard); `fallback_age`:
         simulated seconds since the fallback position was reported, None without one.

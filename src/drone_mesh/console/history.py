@@ -26,7 +26,7 @@ _MARKED = {
 
 
 def unpacked(state: bytes) -> MeshStatus:
-    """A state that a History keeps. Any thread."""
+    """The state in a compressed form that a History keeps. Any thread."""
     mesh: MeshStatus = pickle.loads(zlib.decompress(state))
     return mesh
 

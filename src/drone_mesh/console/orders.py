@@ -80,7 +80,7 @@ class _Request(BaseModel):
 
 
 class _Answered(_Request):
-    """What has an answer, which carries the same `number`."""
+    """A request that is answered; the answer has the same `number`."""
 
     number: int = Field(ge=0, le=MAX_ORDER_NUMBER)
 

@@ -34,7 +34,7 @@ class Page:
         self._told: list[str] = []  # what other pages ordered
 
     def tell(self, text: str) -> None:
-        """Another page ordered this."""
+        """Show what another page has ordered."""
         self._told.append(text)
 
     @property

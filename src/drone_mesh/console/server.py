@@ -307,7 +307,7 @@ class ConsoleServer:
         page: Page,
         request: PageOrder | ReadPlaces | PreviewLayout | Acknowledge | Demonstrate,
     ) -> None:
-        """Do what has an answer. Raises OrderRefused."""
+        """Carry out a request and return its answer. Raises OrderRefused."""
         if isinstance(request, (PageOrder, Demonstrate)) and request.heard is not None:
             late_s = asyncio.get_running_loop().time() - request.heard
             if late_s > MOST_LATE_S:  # it was queued while page and console did not hear each other

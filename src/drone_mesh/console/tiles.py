@@ -53,7 +53,7 @@ ReadTile = Callable[[int, int, int], "bytes | None"]
 
 @dataclass(frozen=True)
 class MapOffer:
-    """What a page must know of a map."""
+    """The description of a map for a page."""
 
     url: str
     min_zoom: int
@@ -240,7 +240,7 @@ def _bounded(
 
 
 def _is_directory(unpacked: bytes) -> bool:
-    """Whether no number of it has more bytes than one of 64 bits."""
+    """Whether each number in this directory of a PMTiles file fits into 64 bits."""
     return _LONG_NUMBER.search(unpacked) is None
 
 
@@ -251,7 +251,7 @@ def _of_pictures(
     bounds: Sequence[float],
     read: ReadTile,
 ) -> Tiles:
-    """The tiles of a file, of which `some` is one."""
+    """The tiles of a file; `some` is any one of them and shows their kind."""
     if _picture_type(some) is None:
         raise ConfigurationError(
             "its tiles are not pictures (PNG, JPEG or WebP): the page draws no vector tiles"

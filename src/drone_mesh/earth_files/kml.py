@@ -82,7 +82,7 @@ def _write(
 
 
 def _tag(element: Element) -> str:
-    """The name without its namespace: programs write several."""
+    """The name of an element without its namespace, of which programs write several."""
     return str(element.tag).rpartition("}")[2]
 
 

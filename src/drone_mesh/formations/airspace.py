@@ -15,7 +15,10 @@ _TOUCH_M = 1e-3  # rounding of positions
 
 
 class Airspace:
-    """Who flies, or is about to, and who rests. Paths count whole, whenever they are flown."""
+    """The drones in flight or about to set out, and those at rest.
+
+    A path takes its space as a whole: the time at which a drone is where does not count.
+    """
 
     def __init__(self, sway_m: float, clearance_m: float) -> None:
         """`clearance_m`: the least distance between two drones at rest."""
@@ -88,7 +91,7 @@ def segments(corners: Sequence[Sequence[float]]) -> np.ndarray:
 
 
 def ways_of(path: FlightPath) -> np.ndarray:
-    """Where this flight may lead, as segments.
+    """The space that this flight may take, as segments.
 
     A kinematic drone flies across in a slope, a dynamic one at the higher end of it.
     """

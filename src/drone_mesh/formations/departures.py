@@ -100,7 +100,7 @@ class Departures:
             self._leave(drone, self._path(drone, under_order[drone]))
 
     def choose(self, candidates: Iterable[int]) -> Choice:
-        """Who may set out now, and where to, of those that can be ordered."""
+        """Choose the drones that may set out now, of those that can be ordered, and their goals."""
         choice = Choice()
         left = sorted(set(candidates) & self._to_go & self._resting, key=self._rank)
         first: set[int] = set()
@@ -150,7 +150,7 @@ class Departures:
         return self._is_near(self._goals[drone], self._anchors())
 
     def taken_by(self, drone: int) -> str:
-        """Why the goal stays occupied: by which drones; empty if it is or may become free."""
+        """The drones that keep the goal occupied, in words; empty if it is or may become free."""
         goal, within_m = self._goals[drone], self._rules.clearance_m - ROUNDING_M
         others = self._resting - self._to_go - {drone}
         near = [n for n in sorted(others) if self._is_at(n, goal, within_m)]
@@ -194,7 +194,7 @@ class Departures:
     # The mesh --------------------------------------------------------------------------------
 
     def _stay_without(self, drone: int) -> set[int] | None:
-        """Drones at rest that keep a path; None: one that is still to be ordered loses it."""
+        """The drones at rest that keep a path; None if one loses it that is still to be ordered."""
         before = self._reach.over(self._resting)
         after = self._reach.over(self._resting - {drone})
         return None if (before - after - {drone}) & self._to_go else after
@@ -211,7 +211,7 @@ class Departures:
         return self._are_enough(connected + len(self._ends) * self._flying_are_members)
 
     def _routes_hold_without(self, drone: int) -> bool:
-        """Whether few enough routes lead over it, once those that fly now have landed."""
+        """Whether only few routes lead over it, once the drones that fly now have landed."""
         return self._are_enough(self._fleet - 1 - len(self._behind[drone]))
 
     def _mesh_is_whole_without(self, drone: int) -> bool:
@@ -232,7 +232,7 @@ class Departures:
         return anchors.reshape(-1, 3)
 
     def _hops_at_the_end(self) -> Mapping[int, int]:
-        """Of the drones that will have a path to a gateway when all are at their places."""
+        """Hops of the drones that will have a path to a gateway when all are at their places."""
         places = {n: self._nodes[n].position for n in self._resting if self._nodes[n].on}
         places.update({n: end.to_vector() for n, end in self._ends.items() if self._nodes[n].on})
         places.update({n: self._goals[n].to_vector() for n in self._to_go})

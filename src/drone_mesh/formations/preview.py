@@ -55,7 +55,7 @@ def preview(
     at_once: bool = False,
     standing: Mapping[int, Location] | None = None,
 ) -> FormationPreview:
-    """Fly this formation from the present state of the mesh.
+    """What happens if this formation is flown from the present state of the mesh.
 
     `standing`: goals of formations that were ordered before. Their other drones fly too.
     """
@@ -104,7 +104,7 @@ class _Rehearsal:
         return self._found
 
     def _due(self) -> Mapping[int, Location]:
-        """All that rest elsewhere and can be ordered, each once."""
+        """The drones that rest away from their goals and can be ordered."""
         connected = self._connected()
         due = {
             drone: goal

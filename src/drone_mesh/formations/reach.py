@@ -22,11 +22,11 @@ class Reach:
         self._near = {int(one): set(ids[near[row]].tolist()) for row, one in enumerate(ids)}
 
     def over(self, relays: Collection[int]) -> set[int]:
-        """The drones that have a path to a gateway over these, gateways excluded."""
+        """The drones, without gateways, that have a path to a gateway over these drones."""
         return self.hops(relays).keys() - set(self._gateways)
 
     def hops(self, relays: Collection[int]) -> dict[int, int]:
-        """Their hops, gateways included."""
+        """The hops of each of them and of the gateways."""
         allowed = set(relays) | set(self._gateways)
         reached = dict.fromkeys(self._gateways, 0)
         left, frontier, count = allowed - reached.keys(), set(reached), 0

@@ -156,7 +156,7 @@ class StandingOrders:
     def give(
         self, name: str, goals: Mapping[int, Location], now_s: float, at_once: bool = False
     ) -> int:
-        """These drones are being ordered; returns the number. It replaces their earlier goals.
+        """Begin an order to these drones, which replaces their earlier goals; returns its number.
 
         `name`: such as "layout 202"; `now_s`: simulated time. `at_once`: all drones set out
         together, whatever becomes of the mesh and whomever they meet. The first orders are those of
@@ -180,7 +180,7 @@ class StandingOrders:
                     order.parts[drone].replace()
 
     def withdraw(self, number: int) -> StandingProgress | None:
-        """Order no drone of this layout any more; returns how far it came. None: unknown."""
+        """Order no drone of this layout any more; returns its progress, None if it is unknown."""
         order = self._orders.pop(number, None)
         return None if order is None else order.progress()
 
@@ -307,7 +307,7 @@ class StandingOrders:
         return [order.progress() for order in self._orders.values()]
 
     def forget_complete(self) -> None:
-        """Forget those with which nothing is left to do."""
+        """Forget the orders that are complete."""
         over = [number for number, order in self._orders.items() if order.progress().is_over]
         for number in over:
             del self._orders[number]

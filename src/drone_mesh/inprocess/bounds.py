@@ -1,4 +1,4 @@
-"""Bounds for routing and for repairs: what they do would need global knowledge of a network."""
+"""Bounds for routing and for repairs: techniques that need global knowledge of a network."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ class InProcessNode:
         is_gateway: bool,
         why_not_fly: str = "",
     ) -> None:
-        """`rng` is the antenna's."""
+        """`rng`: the random numbers of the antenna."""
         self.node_id = node_id
         self.is_gateway = is_gateway
         self._clock = air.clock

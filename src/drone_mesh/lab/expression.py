@@ -88,7 +88,7 @@ def _times(left: Any, right: Any) -> Any:
 
 
 def _dotted(node: ast.AST) -> str | None:
-    """The dotted name of a chain of attributes, or None."""
+    """The name that a chain of attributes spells, with dots; None for anything else."""
     if isinstance(node, ast.Name):
         return node.id
     if isinstance(node, ast.Attribute):

@@ -23,7 +23,7 @@ _FREE_SPACE, _OUTDOORS = 2.0, 2.7  # exponents of the path loss, as in IdealDisc
 
 
 class OneWay:
-    """Who hears whom in one run, apart from what distance and obstacles allow."""
+    """The radios of one run that are mute, deaf or weak: who hears whom if distance allows it."""
 
     def __init__(self, scenario: Scenario, streams: Streams) -> None:
         """Draw how much shorter each node's range is."""

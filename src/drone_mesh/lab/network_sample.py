@@ -105,7 +105,7 @@ def gateways_of(network: Network) -> list[int]:
 
 @dataclass
 class Lapses:
-    """Of the routers that have a path, how many are in a state that they should be in."""
+    """How many of the routers that have a path are in the state that they should be in."""
 
     shares: list[float] = field(default_factory=list)  # of each sample
     lapses_s: list[float] = field(default_factory=list)  # times with a path, but not in that state

@@ -39,7 +39,7 @@ from drone_mesh.state.observation import describe_obstacles
 
 FLIGHT_SAMPLE_S = 0.25  # period of distance checks while a drone flies: 0.5 m at 2 m/s
 
-ABLE_WITHIN_M = 1.0  # a place believed to be so near to the range leads to the gateway
+ABLE_WITHIN_M = 1.0  # a gateway counts as reachable up to this far inside the range
 
 OnStatus = Callable[[MeshStatus], None]
 

@@ -127,7 +127,7 @@ class Timeline:
 
     @contextlib.contextmanager
     def disruption(self, action: str, nodes: Sequence[int]) -> Iterator[None]:
-        """What happens inside must be healed; it befalls these nodes."""
+        """Observe the network before and after a fault of these nodes, which must be healed."""
         if self.first_disruption_s is None:
             self.first_disruption_s = self._network.clock.now_s
         with self._observing():

@@ -17,7 +17,7 @@ from drone_mesh.mobility.track import Legs, Loop, Together, Track, legs_between
 
 
 class Fleet(NamedTuple):
-    """What a model knows of the drones that it moves."""
+    """The drones that a model moves, and its numbers."""
 
     mobility: Mobility
     places: Mapping[int, Vector]  # of the drones that move, at time 0
@@ -25,7 +25,7 @@ class Fleet(NamedTuple):
     seed: int
 
     def rng(self, of: object) -> random.Random:
-        """A stream of its own for a drone or a group: others do not shift its draws."""
+        """A random stream for one drone or group, which the draws of others do not shift."""
         return random.Random(f"{self.seed} motion {of}")
 
     def speed_m_s(self, of: object) -> float:

@@ -78,7 +78,7 @@ class ChipLink:
 
 
 def _is_old_chip(values: Mapping[Register, bytes], wrong: Mapping[Register, bytes]) -> bool:
-    """Whether all that does not hold is what a chip without "+" does not have."""
+    """Whether only those bits differ that a chip without "+" does not have."""
     return all(
         found[0] == values[register][0] & ~_NOT_IN_OLD_CHIPS.get(register, 0)
         for register, found in wrong.items()

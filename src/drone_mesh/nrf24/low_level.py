@@ -290,7 +290,7 @@ class NRF24LowLevelInterface:
 
     @contextlib.contextmanager
     def _noting_failure(self) -> Iterator[None]:
-        """Use the chip under the lock; if it fails, what follows this block runs."""
+        """Hold the lock in this block; if the chip fails in it, note that and go on after it."""
         with self._lock:
             try:
                 yield

@@ -29,7 +29,7 @@ _log = logging.getLogger(__name__)
 
 
 class EventHistory:
-    """Any thread. The lock guards number and history, and is held only for a copy."""
+    """Recent events; any thread may use it. The lock is held only while they are copied."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()

@@ -15,7 +15,7 @@ LOST_AFTER_CHECKS = 3  # a route that is missing for a moment is not an event
 
 @dataclass
 class _Seen:
-    """A node as it was at the last call."""
+    """The values of a node at the last call."""
 
     connected: bool = False
     routed_s: float = -math.inf  # when the gateway last had a route to it

@@ -93,7 +93,7 @@ class _DebugSwitch:
     pressed = False
 
     def press(self, _number: int, _frame: FrameType | None) -> None:
-        """Two presses between two looks at it change nothing."""
+        """Switch once more; two presses within one period of the check cancel each other."""
         self.pressed = not self.pressed
 
 

@@ -127,7 +127,7 @@ class _Partner:
         raise RadioError(self._complaint(heard, rate))
 
     def send_back(self, rate: DataRate) -> None:
-        """Ask it to return now; if the request is lost, it returns after `hold_s`."""
+        """Ask it to return to its own rate; if the request is lost, it does so after `hold_s`."""
         self._radio.use(dataclasses.replace(self._base, data_rate=rate))
         self._may_be_away = not self._send(_RETURN, rate)
 

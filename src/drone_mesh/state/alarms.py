@@ -54,7 +54,7 @@ class AlarmBook:
                 self._end(key, mesh.stamp_s)
 
     def take(self, events: Iterable[EventRecord]) -> None:
-        """Process new events: an order failed, or a later one did not."""
+        """Process new events: a failed order is an alarm until a later one succeeds."""
         for event in events:
             if len(event.peers) != 1:
                 continue
@@ -69,7 +69,7 @@ class AlarmBook:
                     self._end(key, event.stamp_s)
 
     def acknowledge(self, text: str) -> int:
-        """Somebody has seen the alarms with this text; returns how many. What is over goes."""
+        """Somebody has seen the alarms with this text; returns how many. Those over end."""
         seen = [key for key in self._alarms if key[1] == text]
         for key in seen:
             if self._alarms[key].until_s < math.inf:

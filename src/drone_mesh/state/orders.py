@@ -58,7 +58,7 @@ class FollowedOrder:
         return self.state.in_words(self.reason)
 
     def since(self, node: NodeStatus) -> str:
-        """What the drone did since the state changed, as far as the state does not say it."""
+        """What the drone did after the state changed, as text; empty if the state says it."""
         goal, parts = self.goal, list(self.deeds)
         if not position_is_known(node):
             return ", ".join(parts)
@@ -191,7 +191,7 @@ class OrderWatch:
         return "" if latest is None else f"{latest.name}: {latest.in_words(node)}"
 
     def since(self, node: NodeStatus) -> str:
-        """What the drone did since, beyond that progress, as text; empty: nothing."""
+        """What the drone did after the state of its latest order changed; empty: nothing."""
         latest = None if node.id in self._expected else self._latest.get(node.id)
         return "" if latest is None else latest.since(node)
 

@@ -195,7 +195,7 @@ class RepairStory:
     def _last(
         self, key: tuple[object, ...], text: str, now_s: float, until_s: float = math.inf
     ) -> None:
-        """The step with this key: a new one, or the last one in new words."""
+        """Add a step, or write the last one anew if it has this key."""
         if key == self._key:
             self.steps[-1] = replace(self.steps[-1], text=text, until_s=until_s)
         else:

@@ -74,7 +74,7 @@ def find_trouble(nodes: Sequence[NodeStatus]) -> list[Trouble]:
 
 
 def summarise(nodes: Sequence[NodeStatus], troubles: Sequence[Trouble]) -> Summary:
-    """The number of routers with a gateway among those that are on, and the worst severity."""
+    """How many of the routers that are on have a gateway, and the worst severity."""
     if not nodes:
         return Summary(Severity.STALE, "no nodes")
     conditions = {node.id: condition_of(node) for node in nodes}

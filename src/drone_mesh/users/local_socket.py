@@ -159,7 +159,7 @@ class _Client(socketserver.StreamRequestHandler):
             raise ValueError(f"unknown request: {what}")
 
     def _wait(self, sending: Sending, seconds: float) -> bool:
-        """Wait in short steps, so that the end of the node ends the wait."""
+        """Wait for the delivery in short steps, so that the end of the node ends the wait."""
         if seconds <= 0:
             return sending.wait(0.0)
         while seconds > 0 and not self.server.stopping:

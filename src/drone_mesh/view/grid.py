@@ -42,7 +42,7 @@ def _shadow(size: Vector, shape: Shape) -> list[tuple[float, float]]:
 
 
 def _number_grid(sketch: Sketch, step_m: float, ground: tuple[float, float, float, float]) -> None:
-    """x (longitude) along the lower edge, y (latitude) along the left one."""
+    """Write x (longitude) along the lower edge and y (latitude) along the left one."""
     west, south, east, north = ground
     width, height = sketch.size
     bottom = sketch.camera.on_ground((0.0, sketch.camera.size[1] - 14.0 * OVERSAMPLING))

@@ -62,7 +62,7 @@ def _row(node: NodeStatus, trouble: Trouble | None) -> tuple[str, ...]:
 
 
 def _names(mesh: MeshStatus) -> str:
-    """The algorithms in use; old recordings do not contain them."""
+    """The techniques in use, as text; old recordings do not contain them."""
     named = {"routing": mesh.routing, "repair": mesh.repair_strategy}
     return "".join(f"; {what} {name}" for what, name in named.items() if name)
 

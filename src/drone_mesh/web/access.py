@@ -105,7 +105,7 @@ def is_loopback(name: str) -> bool:
 
 
 def _parts(address: str) -> SplitResult:
-    """All parts are empty if it is no address."""
+    """The parts of an address; all are empty if it is none."""
     try:
         return urlsplit(address)
     except ValueError:

@@ -39,7 +39,7 @@ class ModeChoice:
         self._commanded = mode
 
     def withdraw(self) -> None:
-        """Stop expecting the mode that this program ordered and the autopilot has not reported."""
+        """Stop expecting the mode that this program ordered, unless it is reported already."""
         if self._commanded != self._mode:
             self._commanded = None
 

@@ -34,7 +34,7 @@ class PlaceMsg(Protocol):
 
 
 def ros_time(seconds: float) -> rospy.Time:
-    """Rounded to the nearest nanosecond; rospy.Time.from_sec truncates 0.94 s to 0.939999999 s."""
+    """The time, to the nearest nanosecond: rospy.Time.from_sec makes 0.939999999 s of 0.94 s."""
     return rospy.Time(0, round(seconds * 1e9))
 
 

@@ -43,7 +43,7 @@ class WatchedLaunch(roslaunch.parent.ROSLaunchParent, ProcessListener):
 
 
 def _end(_number: int, _frame: object) -> None:
-    """A node cannot start with its arguments."""
+    """End the launch, because a node cannot start with its arguments."""
     WatchedLaunch.failed.append("")
     os.kill(os.getpid(), signal.SIGINT)
 

@@ -29,7 +29,7 @@ class Periodic(abc.ABC):
 
     @abc.abstractmethod
     def _work(self) -> None:
-        """What the thread repeats."""
+        """The work that the thread repeats."""
 
     def _run(self) -> None:
         while not (self._stopped.wait(self._period_s) or rospy.is_shutdown()):

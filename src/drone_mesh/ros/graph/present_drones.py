@@ -21,7 +21,10 @@ class PresentDrones:
         return [node_id for node_id, role in self.roles.items() if role is Role.GATEWAY]
 
     def of_host(self, host: str, share: Collection[int]) -> dict[int, Role]:
-        """The drones whose nodes this host runs; `share`: its part of those with no other host."""
+        """The drones whose nodes this host runs.
+
+        `share`: the drones that it runs unless another host runs them.
+        """
         return {
             node_id: role
             for node_id, role in self.roles.items()

@@ -16,7 +16,7 @@ Run = str
 
 
 def new_run() -> Run:
-    """Unlike all earlier ones."""
+    """The name of a new run, different from all earlier ones."""
     return secrets.token_hex(8)
 
 
@@ -31,5 +31,5 @@ def run_of(message: Any) -> Run:
 
 
 def is_left_behind(message: Any, run: Run) -> bool:
-    """Whether a received message is of another run. Those of strangers, who name none, are not."""
+    """Whether a received message names another run. Publishers of other programs name none."""
     return run_of(message) not in ("", run)

@@ -94,7 +94,7 @@ class FollowedFleet:
         self._served: dict[int, Role] = {}
 
     def follow(self) -> None:
-        """Read the parameter once; start and end the nodes that differ."""
+        """Read the parameter once; start the missing nodes, and end those that are not in it."""
         try:
             wanted = get_present_drones().of_host(rospy.get_name(), self._share)
         except (KeyError, *NO_ANSWER) as error:  # the master is ending or has just started

@@ -20,7 +20,7 @@ from drone_mesh.ros.graph.run import Run
 
 @dataclass(frozen=True)
 class MeshSettings:
-    """Settings of every node of a simulation: the configuration, and what its words stand for."""
+    """Settings of every node of a simulation: the configuration, with the objects that it names."""
 
     configuration: FactoryConfiguration
     run: Run

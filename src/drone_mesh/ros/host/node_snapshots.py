@@ -22,7 +22,7 @@ class Worker(Protocol):
 
 
 class NodeSnapshots(Generic[S]):
-    """The latest state of each node; a state does not change once it is here.
+    """The latest state of each node; a state that was stored does not change.
 
     Workers call `add` and `drop`, any other thread `take`.
     """

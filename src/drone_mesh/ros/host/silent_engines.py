@@ -39,11 +39,11 @@ class SilentEngines(Periodic):
         return len(self._silent)
 
     def holds(self, gps: Gps) -> bool:
-        """Whether this engine does not answer, or the process that flies its drone."""
+        """Whether this engine, or the process that flies its drone, does not answer."""
         return gps.server in self._silent or gps.name in self._silent
 
     def add(self, gps: Gps, error: ServiceGone) -> None:
-        """It did not answer."""
+        """Ask this engine, which did not answer, again and again."""
         hangs = bool(gps.server) and isinstance(error, ServiceSilent)
         with self._lock:
             self._silent[gps.server if hangs else gps.name] = gps

@@ -101,7 +101,7 @@ class FlyActions:
             work()
 
     def _later(self, work: Callable[..., None], *first: object) -> Callable[[object], None]:
-        """A handler for a thread of rospy: it lets the thread of `run` do the work."""
+        """Make a handler for rospy that leaves the work to the thread of `run`."""
         return lambda came: self._work.put(functools.partial(work, *first, came))
 
     # The thread of `run` ---------------------------------------------------------------------

@@ -141,7 +141,7 @@ class StandingLayouts:
         return given
 
     def preview(self, orders: Sequence[Order], at_once: bool) -> FormationPreview | None:
-        """What would happen if these were ordered now; None: the state of the mesh is unknown."""
+        """Preview an order to these drones; None: the state of the mesh is unknown."""
         mesh = self._mesh
         if mesh is None:
             return None
@@ -219,14 +219,14 @@ class StandingLayouts:
                 self._save()
 
     def _save(self) -> None:
-        """For a restart. The caller holds the lock."""
+        """Store what is left to order, for a restart. The caller holds the lock."""
         left = json.dumps(self._orders.saved())
         if left != self._saved:
             self._saved = left
             self._later(_store, left)
 
     def _later(self, work: Callable[..., None], *what: object) -> None:
-        """Let the reporter's thread do it. The caller holds the lock."""
+        """Leave this work to the reporter's thread. The caller holds the lock."""
         self._reporter.submit(work, *what).add_done_callback(_log_failure)
 
     # The reporter's thread -------------------------------------------------------------------

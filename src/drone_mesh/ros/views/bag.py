@@ -65,7 +65,7 @@ def read_packets(path: Path) -> Iterator[RecordedDots]:
 
 
 def readable(items: Iterator[T], damage: list[BagDamaged]) -> Iterator[T]:
-    """What can be read of these; the error behind it is added to `damage` instead of raised."""
+    """The items that can be read; the error that ends them is added to `damage`, not raised."""
     try:
         yield from items
     except BagDamaged as error:

@@ -25,7 +25,7 @@ class BagUnusable(MeshError):
 
 
 class BagDamaged(BagUnusable):
-    """Parts of a recording cannot be read. Raised behind all that can be read."""
+    """Parts of a recording cannot be read. Raised after everything readable was yielded."""
 
 
 def open_bag(path: Path) -> rosbag.Bag:

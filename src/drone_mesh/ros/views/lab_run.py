@@ -53,7 +53,7 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _wait(process: subprocess.Popen[bytes]) -> int:
-    """Wait for it. A terminal sends Ctrl-C to roslaunch as well, which then ends its nodes."""
+    """Wait for roslaunch. A terminal sends Ctrl-C to it as well, and it then ends its nodes."""
     while True:
         with contextlib.suppress(KeyboardInterrupt):
             return process.wait()

@@ -106,7 +106,7 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _drawn(file: Path, origin: str) -> list[Order]:
-    """The orders in a file. Raises MeshError."""
+    """The orders that a file of places stands for. Raises MeshError."""
     text = read_text(file)
     if not is_earth_file(file.name):
         return read_layout(text, str(file))

@@ -78,7 +78,7 @@ class _Newcomers(rospy.SubscribeListener):
         self._new.put(send)
 
     def take(self) -> list[Send]:
-        """Those since the last call."""
+        """The subscribers that came since the last call."""
         taken = []
         with contextlib.suppress(queue.Empty):
             while True:

@@ -114,7 +114,7 @@ class MeshStatePublisher(Periodic):
             self._events.publish(event_msg(self._happened.popleft()))
 
     def _note_progress(self, progress: LayoutProgress) -> None:
-        """What is over stays until there is other news."""
+        """Take the progress of layouts; what is over stays until there is other news."""
         self._layouts = {n: other for n, other in self._layouts.items() if not other.over}
         self._layouts[progress.id] = progress
 
