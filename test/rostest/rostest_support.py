@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
+import runpy
 import signal
 import socket
+import subprocess
+import sys
+import tempfile
 import time
+from pathlib import Path
 from typing import Callable, Iterable
 from xmlrpc.client import ServerProxy
 
 import rosgraph
+import rospkg
 import rospy
 from rosgraph_msgs.msg import Log
 
@@ -20,6 +27,9 @@ PAYLOAD_BYTES = 32
 STANDSTILL_S = 20.0  # wall; if simulated time stands still for longer, the world has died
 POLL_PERIOD_S = 0.01
 WALL_LIMIT_S = 60.0  # for what takes a moment on an idle machine
+FORKS = multiprocessing.get_context("forkserver")
+PRELOADED = ["__main__", "drone_mesh.ros.views.report", "matplotlib.pyplot"]
+FORKS.set_forkserver_preload(PRELOADED)
 
 
 def wait_for(what: str, within_s: float, condition: Callable[[], object]) -> None:
@@ -35,6 +45,34 @@ def call(service: str, service_class: type, *arguments: object) -> object:
     """Call a service as soon as it is offered."""
     rospy.wait_for_service(service, timeout=WALL_LIMIT_S)
     return rospy.ServiceProxy(service, service_class)(*arguments)
+
+
+def run_program(
+    program: str, *arguments: str, **environment: str
+) -> subprocess.CompletedProcess[str]:
+    """Run a program of the package that registers no node, in a fork of one process.
+
+    That process has imported what most of them need: nearly all of their time.
+    """
+    path = Path(rospkg.RosPack().get_path("drone_mesh")) / "nodes" / program
+    with tempfile.TemporaryDirectory() as folder:
+        out, errors = Path(folder) / "out", Path(folder) / "errors"
+        words = [str(path), *arguments]
+        process = FORKS.Process(target=_run_fork, args=(words, environment, out, errors))
+        process.start()
+        process.join(WALL_LIMIT_S)
+        assert process.exitcode is not None, f"{program} did not end"
+        return subprocess.CompletedProcess(
+            words, process.exitcode, out.read_text("utf-8"), errors.read_text("utf-8")
+        )
+
+
+def _run_fork(words: list[str], environment: dict[str, str], out: Path, errors: Path) -> None:
+    for number, path in ((1, out), (2, errors)):
+        os.dup2(os.open(path, os.O_WRONLY | os.O_CREAT), number)
+    os.environ.update(environment)
+    sys.argv = words
+    runpy.run_path(words[0], run_name="__main__")
 
 
 def free_port() -> int:

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import signal
 import subprocess
@@ -20,32 +19,40 @@ import rosbag
 import rospkg
 import rospy
 import rostest
-from rostest_support import WALL_LIMIT_S, call, receives, wait_for
+from rostest_support import (
+    FORKS,
+    PRELOADED,
+    WALL_LIMIT_S,
+    call,
+    receives,
+    run_program,
+    wait_for,
+)
 
 from drone_mesh.msg import HostReport, MeshEvent, MeshState, NodeState
 from drone_mesh.ros.views.bag import playable, read_events, read_states, topics_in_bag
 from drone_mesh.srv import PowerSwitch, SetSpeed
 
 TOOLS = ("status", "snapshot", "report")
-NODES = (
-    "drone_factory",
-    "drone_manager",
-    "wireless_signal_simulator",
-    "mesh_host",
-    "fly_actions",
-    "mesh_markers",
-    "console",
-)
+NODES = {
+    "drone_factory": "world.drone_factory_node",
+    "drone_manager": "services.drone_manager",
+    "wireless_signal_simulator": "services.wireless_signal_simulator",
+    "mesh_host": "host.mesh_host_node",
+    "fly_actions": "services.fly_actions",
+    "mesh_markers": "views.markers_node",
+    "console": "views.console_node",
+}
+FORKS.set_forkserver_preload([*PRELOADED, *(f"drone_mesh.ros.{m}" for m in NODES.values())])
 TOOL_LIMIT_S = 60.0
 OLD_DETAIL = "order 7 to x 1.00 m, y 2.00 m, z 3 m: battery at 9 %"
 
 
-def run(tool: str, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    """Run a tool as rosrun does, without the time that rosrun takes to find it."""
+def run_beside(tool: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run a tool that joins the graph, as rosrun does, without the time to find it."""
     program = Path(rospkg.RosPack().get_path("drone_mesh")) / "nodes" / tool
     return subprocess.run(
         [sys.executable, str(program), *arguments],
-        env={**os.environ, **environment},
         capture_output=True,
         text=True,
         timeout=TOOL_LIMIT_S,
@@ -155,42 +162,36 @@ class ToolsTest(unittest.TestCase):
 
     def test_1_each_tool_explains_itself(self) -> None:
         for tool in TOOLS:
-            finished = subprocess.run(
-                ["rosrun", "drone_mesh", tool, "--help"],
-                capture_output=True,
-                text=True,
-                timeout=TOOL_LIMIT_S,
-                check=False,
-            )
+            finished = run_program(tool, "--help")
             self.assertEqual(finished.returncode, 0, finished.stderr)
             self.assertIn(f"usage: rosrun drone_mesh {tool}", finished.stdout)
             self.assertIn("Exit code", finished.stdout)
 
     def test_1_each_node_explains_itself_and_leaves_the_one_that_runs_alone(self) -> None:
         for node in NODES:
-            finished = run(node, "--help")
+            finished = run_program(node, "--help")
             self.assertEqual(finished.returncode, 0, finished.stderr)
             self.assertIn(f"usage: rosrun drone_mesh {node}", finished.stdout)
-            refused = run(node, "--nonsense")
+            refused = run_program(node, "--nonsense")
             self.assertEqual(refused.returncode, 2)
             self.assertIn("unrecognized arguments: --nonsense", refused.stderr)
 
     def test_2_without_a_master_no_node_waits_for_one(self) -> None:
         for node in NODES:
-            finished = run(node, ROS_MASTER_URI="http://127.0.0.1:9")
+            finished = run_program(node, ROS_MASTER_URI="http://127.0.0.1:9")
             self.assertEqual(finished.returncode, 2)
             self.assertIn(f"{node}: no ROS master at http://127.0.0.1:9", finished.stderr)
             self.assertNotIn("Traceback", finished.stderr)
 
     def test_2_without_a_master_there_is_one_line_that_says_so(self) -> None:
         for arguments in (["status"], ["status", "--watch"], ["snapshot", "picture.png"]):
-            finished = run(*arguments, ROS_MASTER_URI="http://127.0.0.1:9")
+            finished = run_program(*arguments, ROS_MASTER_URI="http://127.0.0.1:9")
             self.assertEqual(finished.returncode, 2)
             self.assertIn("no ROS master at http://127.0.0.1:9", finished.stderr)
             self.assertNotIn("Traceback", finished.stderr)
 
     def test_2_without_a_screen_there_is_one_line_that_says_so(self) -> None:
-        finished = run("rviz_window", DISPLAY="")
+        finished = run_program("rviz_window", DISPLAY="")
         self.assertEqual(finished.returncode, 2)
         line = "rviz_window: rviz: no screen (DISPLAY is not set); use rviz:=false"
         self.assertIn(line, finished.stderr)
@@ -199,34 +200,34 @@ class ToolsTest(unittest.TestCase):
     def test_2_a_recording_of_an_older_definition_is_read(self) -> None:
         bag = self.folder / "older.bag"
         record_in_an_older_definition(bag)
-        finished = run("status", "--bag", str(bag))
+        finished = run_program("status", "--bag", str(bag))
         self.assertEqual(finished.stderr, "")
         heading, _columns, row = finished.stdout.splitlines()
         self.assertNotIn("routing", heading)
         self.assertRegex(row, r"^4 .* 1\.0, 2\.0, 0\.0 ")
         (event,) = read_events(bag)
         self.assertEqual((event.order, event.place, event.explanation()), (0, None, OLD_DETAIL))
-        report = run("report", str(bag), "-o", f"{self.folder}/older.html")
+        report = run_program("report", str(bag), "-o", f"{self.folder}/older.html")
         self.assertEqual(report.returncode, 0, report.stderr)
 
     def test_2_the_record_of_a_gateway_is_read_in_the_place_of_a_bag(self) -> None:
         record = self.folder / "flight.jsonl"
         record.write_text("".join(f"{line}\n" for line in gateway_record()))
-        status = run("status", "--bag", str(record))
+        status = run_program("status", "--bag", str(record))
         self.assertIn("0 of 1 routers connected", status.stdout, status.stderr)
-        report = run("report", str(record), "--csv", str(self.folder))
+        report = run_program("report", str(record), "--csv", str(self.folder))
         self.assertEqual(report.returncode, 0, report.stderr)
         self.assertIn("disconnected", (self.folder / "events.csv").read_text(encoding="utf-8"))
-        trace = run("flight_trace", str(record), f"{self.folder}/flown.csv")
+        trace = run_program("flight_trace", str(record), f"{self.folder}/flown.csv")
         self.assertIn("2 drones, 4.0 s", trace.stdout, trace.stderr)
         tracks = self.folder / "flown.geojson"
-        refused = run("flight_trace", str(record), str(tracks))
+        refused = run_program("flight_trace", str(record), str(tracks))
         self.assertIn("needs --origin", refused.stderr)
         lines = [{**json.loads(line), "origin": [52.0, 5.0, 3.0]} for line in gateway_record()]
         known = self.folder / "known.jsonl"
         known.write_text("".join(f"{json.dumps(line)}\n" for line in lines))
         for given in ([str(known)], [str(record), "--origin", "52,5,3"]):
-            written = run("flight_trace", *given[:1], str(tracks), *given[1:])
+            written = run_program("flight_trace", *given[:1], str(tracks), *given[1:])
             self.assertEqual(written.returncode, 0, written.stderr)
             (track,) = json.loads(tracks.read_text(encoding="utf-8"))["features"]
             self.assertEqual(track["properties"]["drone"], 3)
@@ -249,19 +250,19 @@ class ToolsTest(unittest.TestCase):
             wait_for("a bag", WALL_LIMIT_S, lambda: list(self.folder.glob("*.bag.active")))
             wait_for("the recorder listens", WALL_LIMIT_S, recorder_listens)
             self.pause_when("all connected", connected(0, 1, 2, 3))
-            finished = run("status")
+            finished = run_beside("status")
             self.assertEqual(finished.returncode, 0, finished.stdout + finished.stderr)
             self.assertIn("3 of 3 routers connected", finished.stdout)
             self.assertNotIn("\x1b", finished.stdout)
-            self.assertEqual(run("snapshot", f"{self.folder}/live.png").returncode, 0)
+            self.assertEqual(run_beside("snapshot", f"{self.folder}/live.png").returncode, 0)
             call("/Nodes/2/powerSwitch", PowerSwitch, False)
             # At full speed the repair could mend it before the world is paused.
             self.go_on(1.0)
             self.pause_when("3 is lost", connected(0, 1), lost(3))
-            self.assertEqual(run("status").returncode, 1)
+            self.assertEqual(run_beside("status").returncode, 1)
             self.go_on(8.0)
             self.pause_when("the repair", connected(0, 1, 3))
-            self.assertEqual(run("status").returncode, 0)
+            self.assertEqual(run_beside("status").returncode, 0)
         finally:
             recorder.send_signal(signal.SIGINT)
             recorder.wait(timeout=WALL_LIMIT_S)
@@ -269,34 +270,36 @@ class ToolsTest(unittest.TestCase):
         self._look_into(bag)
 
     def _look_into(self, bag: Path) -> None:
-        finished = run("status", "--bag", str(bag))
+        finished = run_program("status", "--bag", str(bag))
         self.assertEqual(finished.returncode, 0, finished.stderr)
         self.assertIn("2 of 2 routers connected, 1 switched off", finished.stdout)
-        early = run("status", "--bag", str(bag), "--at", "0")
+        early = run_program("status", "--bag", str(bag), "--at", "0")
         self.assertEqual(early.returncode, 2)
         self.assertRegex(early.stderr, r"no state up to 0 s; the recording starts at \d+\.\d s")
-        late = run("status", "--bag", str(bag), "--at", "100000")
+        late = run_program("status", "--bag", str(bag), "--at", "100000")
         self.assertEqual(late.returncode, 2)
         self.assertRegex(late.stderr, r"no state at 100000 s; the recording ends at \d+\.\d s")
-        self.assertEqual(run("snapshot", "--bag", str(bag), f"{self.folder}/bag.png").returncode, 0)
+        self.assertEqual(
+            run_program("snapshot", "--bag", str(bag), f"{self.folder}/bag.png").returncode, 0
+        )
         small = f"{self.folder}/small.png"
-        sized = run("snapshot", "--bag", str(bag), "--size", "320x200", small)
+        sized = run_program("snapshot", "--bag", str(bag), "--size", "320x200", small)
         self.assertEqual(sized.returncode, 0, sized.stderr)
         size = Path(small).read_bytes()[16:24]  # of the PNG's header
         self.assertEqual(size, bytes.fromhex("00000140 000000c8"))
         for when, coloured in (("always", True), ("never", False)):
-            table = run("status", "--bag", str(bag), "--colour", when).stdout
+            table = run_program("status", "--bag", str(bag), "--colour", when).stdout
             self.assertEqual("\x1b[" in table, coloured)
-        trace = run("flight_trace", str(bag), f"{self.folder}/flight.csv")
+        trace = run_program("flight_trace", str(bag), f"{self.folder}/flight.csv")
         self.assertEqual(trace.returncode, 0, trace.stderr)
         self.assertEqual(Path(f"{self.folder}/flight.csv").read_text()[:11], "t,id,x,y,z\n")
-        picture = run("snapshot", "--bag", str(bag), f"{self.folder}/bag.xyz")
+        picture = run_program("snapshot", "--bag", str(bag), f"{self.folder}/bag.xyz")
         self.assertEqual(picture.returncode, 2)
         self.assertIn("must end in .png", picture.stderr)
         self.assertFalse((self.folder / "bag.xyz").exists())
         for picture in ("live.png", "bag.png"):
             self.assertEqual((self.folder / picture).read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
-        finished = run(
+        finished = run_program(
             *("report", str(bag), "-o", f"{self.folder}/run.html", "--csv", str(self.folder)),
             *("--title", "A field day"),
         )
@@ -312,7 +315,7 @@ class ToolsTest(unittest.TestCase):
         nonsense.write_bytes(b"\x89 this is not a bag")
         for path in (nonsense, self.folder / "missing.bag"):
             for arguments, given in ((["status", "--bag"], "--bag "), (["report"], "report: ")):
-                finished = run(*arguments, str(path))
+                finished = run_program(*arguments, str(path))
                 self.assertEqual(finished.returncode, 2)
                 self.assertRegex(
                     finished.stderr, f"{given}{path}: no(t a complete bag| such file);"
