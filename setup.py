@@ -41,6 +41,7 @@ setup(
             "*.yaml",
             "py.typed",
             "leaflet/*",
+            "meshes/*",
             "static/*",
         ]
     },

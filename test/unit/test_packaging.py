@@ -64,9 +64,10 @@ def test_each_program_in_nodes_is_installed() -> None:
 
 def test_each_folder_that_ros_reads_is_installed() -> None:
     cmake = (ROOT / "CMakeLists.txt").read_text(encoding="utf-8")
-    (folders,) = re.findall(r"^install\(DIRECTORY ([\w ]+)$", cmake, flags=re.MULTILINE)
+    (folders,) = re.findall(r"^install\(DIRECTORY ([\w/ ]+)$", cmake, flags=re.MULTILINE)
     read_by_ros = {"config", "launch", "meshes", "rviz"} & {path.name for path in ROOT.iterdir()}
-    assert set(folders.split()) >= read_by_ros
+    assert {Path(folder).name for folder in folders.split()} >= read_by_ros
+    assert all((ROOT / folder).is_dir() for folder in folders.split())
 
 
 def third_party_imports(source: Path) -> set[str]:

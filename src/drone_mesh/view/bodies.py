@@ -2,35 +2,31 @@
 
 from __future__ import annotations
 
-import functools
-from typing import Sequence, Tuple
+from pathlib import Path
+from typing import Sequence
 
 import numpy as np
 import pybullet
 from PIL import Image
 
-from drone_mesh.drone.flight_path import Vector
-from drone_mesh.drone.roles import Role
 from drone_mesh.state.model import ObstacleStatus
 from drone_mesh.view.camera import Camera
-from drone_mesh.view.palette import FRAME, LIGHT, ROTOR, Colour, rgb
-from drone_mesh.view.quadrocopter import BodyPart, solid_of
+from drone_mesh.view.palette import FRAME, LIGHT, Colour, rgb
+from drone_mesh.view.quadrocopter import frame_file, lamp_file
 from drone_mesh.view.scene import DronePicture, Scene, Shape
-from drone_mesh.view.solids import normal
 from drone_mesh.world.bullet_world import UPRIGHT
 
+MESHES = Path(__file__).with_name("meshes")
 LIGHT_FROM = (-3.0, -6.0, 12.0)
 OBSTACLE_OPACITY = 0.7
 NOTHING = -1  # pybullet's body number for pixels without a body
 BASE = -1  # pybullet's number for a body without its links
 
-_Triangles = Tuple[Sequence[Vector], Sequence[Vector]]  # corners, and the normal at each
-
 
 class Bodies:
     """Creates bodies in one pybullet client; belongs to that client's thread.
 
-    A quadrocopter is one body: its frame is the base, and each part of another colour is a link.
+    A quadrocopter is one body: its frame is the base, and its lamp, of another colour, is a link.
     """
 
     def __init__(self, client: int, shape: Shape) -> None:
@@ -43,13 +39,9 @@ class Bodies:
         if self._shape is Shape.BOX:
             box = self._box_shape(drone.size_m(scale), drone.colour)
             return self._add(box, (), drone.centre(scale))
-        frame = self._part_shape(BodyPart.FRAME, drone, FRAME, scale)
-        lamp = self._part_shape(BodyPart.LAMP, drone, drone.colour, scale)
-        if drone.is_flying:
-            rotors = self._part_shape(BodyPart.DISCS, drone, ROTOR, scale)
-        else:
-            rotors = self._part_shape(BodyPart.BLADES, drone, FRAME, scale)
-        return self._add(frame, (lamp, rotors), drone.underside(scale))
+        frame = self._part_shape(frame_file(drone.is_flying), FRAME, scale)
+        lamp = self._part_shape(lamp_file(drone.role), drone.colour, scale)
+        return self._add(frame, (lamp,), drone.underside(scale))
 
     def move_drone(self, body: int, drone: DronePicture, scale: float) -> None:
         """Move a drone's body to its current position."""
@@ -111,29 +103,20 @@ class Bodies:
             )
         )
 
-    def _part_shape(self, part: BodyPart, drone: DronePicture, colour: Colour, scale: float) -> int:
-        key = (part, drone.role, colour, scale)
+    def _part_shape(self, file: str, colour: Colour, scale: float) -> int:
+        key = (file, colour, scale)
         if key not in self._shapes:
-            corners, normals = _triangles(drone.role, part)
             self._shapes[key] = int(
                 pybullet.createVisualShape(
                     pybullet.GEOM_MESH,
-                    vertices=(np.array(corners) * scale).tolist(),
-                    indices=list(range(len(corners))),
-                    normals=normals,
+                    fileName=str(MESHES / file),
+                    meshScale=[scale] * 3,
                     rgbaColor=(*rgb(colour), 1.0),
                     specularColor=(0, 0, 0),
                     physicsClientId=self._client,
                 )
             )
         return self._shapes[key]
-
-
-@functools.lru_cache(maxsize=None)
-def _triangles(role: Role, part: BodyPart) -> _Triangles:
-    solid = solid_of(role, part)
-    corners = [corner for triangle in solid for corner in triangle]
-    return corners, [normal(triangle) for triangle in solid for _ in triangle]
 
 
 def paste_bodies(image: Image.Image, camera: Camera, scene: Scene, scale: float) -> None:

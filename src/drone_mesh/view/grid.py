@@ -8,9 +8,9 @@ from drone_mesh.drone.flight_path import Vector
 from drone_mesh.view.palette import AXIS, GRID, LIGHT, SHADOW
 from drone_mesh.view.scene import Scene, Shape
 from drone_mesh.view.sketch import OVERSAMPLING, Sketch
-from drone_mesh.view.solids import polygon
 
 SHADOW_SHARE = 0.42  # radius of a round shadow, as a share of the width
+SHADOW_CORNERS = 24  # of the polygon that is drawn for it
 GRID_LINES = 12  # approximate number of lines across the picture
 
 
@@ -36,7 +36,9 @@ def draw_ground(sketch: Sketch, scene: Scene, scale: float) -> None:
 
 def _shadow(size: Vector, shape: Shape) -> list[tuple[float, float]]:
     if shape is Shape.QUADROCOPTER:
-        return polygon((0.0, 0.0), SHADOW_SHARE * max(size), 24)
+        radius_m = SHADOW_SHARE * max(size)
+        angles = [2 * math.pi * i / SHADOW_CORNERS for i in range(SHADOW_CORNERS)]
+        return [(radius_m * math.cos(angle), radius_m * math.sin(angle)) for angle in angles]
     half_x, half_y = size[0] / 2, size[1] / 2
     return [(-half_x, -half_y), (half_x, -half_y), (half_x, half_y), (-half_x, half_y)]
 

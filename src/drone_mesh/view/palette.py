@@ -81,7 +81,6 @@ GRID: Colour = "#d6dbd6"
 AXIS: Colour = "#a8b2ad"
 SHADOW: Colour = "#ccd1cc"
 FRAME: Colour = "#3a424d"  # of a drone
-ROTOR: Colour = "#aab3bd"  # of a drone in flight
 
 _LINK_COLOUR_NAMES: Mapping[LinkUse, str] = {
     LinkUse.ROUTE: "connected",

@@ -1,30 +1,26 @@
-"""What a drone looks like, and that the meshes for rviz are what the code makes."""
+"""What a drone looks like."""
 
 from __future__ import annotations
-
-import runpy
-from collections import Counter
-from pathlib import Path
 
 import pytest
 
 from drone_mesh.drone.roles import Role
-from drone_mesh.view.quadrocopter import BodyPart, solid_of
-from drone_mesh.view.solids import dome, normal, polygon, prism
-
-ROOT = Path(__file__).parents[3]
-MESHES = ROOT / "meshes"
+from drone_mesh.view.bodies import MESHES
+from drone_mesh.view.quadrocopter import MOTORS, ROTOR_HIGH_M, blade_ends, frame_file, lamp_file
 
 
-def test_the_meshes_of_rviz_are_those_that_the_code_makes() -> None:
-    on_disk = {path.name: path.read_text("ascii") for path in MESHES.iterdir()}
-    script = runpy.run_path(str(ROOT / "scripts" / "meshes"))
-    assert on_disk == script["mesh_files"](), "run scripts/meshes"
+def corners_of(*files: str) -> list[tuple[float, ...]]:
+    """The corners of all triangles in these files, in metres."""
+    lines = [line for file in files for line in (MESHES / file).read_text("ascii").splitlines()]
+    return [tuple(map(float, line.split()[1:])) for line in lines if line.startswith("v ")]
 
 
 @pytest.mark.parametrize("role", list(Role))
-def test_a_drone_stands_on_its_origin_and_is_about_as_large_as_its_box(role: Role) -> None:
-    corners = [c for part in BodyPart for triangle in solid_of(role, part) for c in triangle]
+@pytest.mark.parametrize("is_flying", [False, True])
+def test_a_drone_stands_on_its_origin_and_is_about_as_large_as_its_box(
+    role: Role, is_flying: bool
+) -> None:
+    corners = corners_of(frame_file(is_flying), lamp_file(role))
     assert min(z for _, _, z in corners) == 0.0
     assert max(z for _, _, z in corners) == pytest.approx(role.size_m[2])
     for axis in (0, 1):
@@ -33,19 +29,12 @@ def test_a_drone_stands_on_its_origin_and_is_about_as_large_as_its_box(role: Rol
 
 
 def test_a_gateway_looks_different_from_a_router() -> None:
-    lamps = {role: solid_of(role, BodyPart.LAMP) for role in Role}
-    assert lamps[Role.GATEWAY] != lamps[Role.ROUTER]
+    assert corners_of(lamp_file(Role.GATEWAY)) != corners_of(lamp_file(Role.ROUTER))
 
 
-def test_a_prism_is_closed_and_faces_outwards() -> None:
-    solid = prism(polygon((1.0, 2.0), 0.5, 6), 0.0, 3.0)
-    edges = Counter((t[i], t[(i + 1) % 3]) for t in solid for i in range(3))
-    assert all(count == 1 and edges[end, start] == 1 for (start, end), count in edges.items())
-    for triangle in solid:
-        middle = [sum(corner[i] for corner in triangle) / 3 for i in range(3)]
-        outward = [here - center for here, center in zip(middle, (1.0, 2.0, 1.5))]
-        assert sum(a * b for a, b in zip(normal(triangle), outward)) > 0
-
-
-def test_a_dome_faces_upwards() -> None:
-    assert all(normal(triangle)[2] > 0 for triangle in dome(1.0, 0.0, 0.5, 12, 4))
+def test_the_blades_of_a_drone_in_flight_turn_above_its_discs_and_about_its_motors() -> None:
+    discs = corners_of(frame_file(True))
+    assert max(z for _, _, z in discs) <= ROTOR_HIGH_M
+    for x, y in MOTORS:
+        (x0, y0), (x1, y1) = blade_ends((x, y), 0.7)
+        assert ((x0 + x1) / 2, (y0 + y1) / 2) == pytest.approx((x, y))

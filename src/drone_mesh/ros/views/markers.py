@@ -30,13 +30,15 @@ from drone_mesh.view.quadrocopter import (
     MOTORS,
     ROTOR_HIGH_M,
     blade_ends,
+    frame_file,
+    lamp_file,
     turned_rad,
 )
 from drone_mesh.view.scene import Shape, shape_named
 
 MOST_LINKS = 1500  # per use: 254 drones 1 m apart have 18,000 links
 TIMES_LARGER = 4.0  # how much larger than life drones are drawn
-MESHES = "package://drone_mesh/meshes/"  # written by scripts/meshes
+MESHES = "package://drone_mesh/meshes/"  # of drone_mesh.view
 FRAME_COLOUR = DARK.muted
 BOX_RADIUS_M = TIMES_LARGER * Role.ROUTER.size_m[0] / math.sqrt(2)
 LABEL_M = 0.5
@@ -108,8 +110,7 @@ class MarkerMaker:
         for node in nodes:
             colour = DARK.of_node(node.role, condition_of(node))
             flying = _is_in_flight(node)
-            frame = MESHES + ("flying.obj" if flying else "standing.obj")
-            lamp = f"{MESHES}{Role(node.role).word}_lamp.obj"
+            frame, lamp = MESHES + frame_file(flying), MESHES + lamp_file(Role(node.role))
             looks = (("frames", frame, FRAME_COLOUR), ("lamps", lamp, colour))
             for name, mesh, tint in looks:
                 content = [positions[node.id], mesh, tint]
