@@ -109,7 +109,7 @@ class ExecutorSlot:
         """As MeshExecutor.request."""
         self._executor.request(function, self)
 
-    def take(self, driven: Driven) -> None:
+    def drive(self, driven: Driven) -> None:
         """Drive this component from now on. Only on the worker's thread."""
         self._driven = driven
 
@@ -202,7 +202,7 @@ class MeshExecutor:
         """Call `function` once per period, first after one; returns a function to stop it."""
         periodic = _Periodic(period_s, function, self._clock() + period_s)
         slot = self.slot()
-        slot.submit(lambda _now_s: slot.take(periodic))
+        slot.submit(lambda _now_s: slot.drive(periodic))
         return periodic.cancel
 
     def time_advanced(self) -> None:
@@ -233,7 +233,7 @@ class MeshExecutor:
                         continue
                     self._on_idle()
                     self.idle = True
-                waiting = self._take(block)
+                waiting = self._next_request(block)
                 self.idle = False
             now_s = self._clock()
             due_s = deadlines[0][0] if deadlines else math.inf
@@ -263,7 +263,7 @@ class MeshExecutor:
         self._run(function, now_s, slot)
         self._note_progress()
 
-    def _take(self, block: bool) -> tuple[float, Work, ExecutorSlot | None] | None:
+    def _next_request(self, block: bool) -> tuple[float, Work, ExecutorSlot | None] | None:
         """The next submitted function; None: check the deadlines again."""
         timeout_s = None
         if block and self._requests:

@@ -49,8 +49,8 @@ def recorded(options: argparse.Namespace) -> History:
         state, happened = mesh.read()
         states.append(state)
         events += happened
-        packets.append(RecordedDots.of(state.stamp_s, *mesh.packets(0.5)))
-    history = History.of(states, events)
+        packets.append(RecordedDots.pack(state.stamp_s, *mesh.packets(0.5)))
+    history = History.of_run(states, events)
     history.add_packets(packets)
     return history
 

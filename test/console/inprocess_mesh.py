@@ -54,7 +54,7 @@ class InProcessMesh:
     def packets(self, within_s: float) -> tuple[int, list[Dot]]:
         """The packets since the last call, as if they had been carried within so many seconds."""
         with self._lock:
-            carried, sample = self._sampler.take()
+            carried, sample = self._sampler.drain()
             now_s = self._network.now_s()
         passed_s, self._sampled_s = now_s - self._sampled_s, now_s
         scale = within_s / passed_s if passed_s else 0.0
@@ -88,7 +88,7 @@ class InProcessMesh:
                 achieved_real_time_factor=achieved,
                 paused=self.paused,
             )
-            return mesh, self._batcher.take()
+            return mesh, self._batcher.drain()
 
     def place_of(self, node: int) -> tuple[float, float]:
         """x, y in metres."""

@@ -71,7 +71,7 @@ def advance(executor, clock, now_s):
 
 def slot_with(executor, driven):
     slot = executor.slot()
-    slot.submit(lambda _now_s: slot.take(driven))
+    slot.submit(lambda _now_s: slot.drive(driven))
     settle(executor)
     return slot
 

@@ -52,7 +52,7 @@ class Casting:
     was_off: Sequence[int]  # of the gateway and the cast
 
     @classmethod
-    def of(cls, mesh: MeshStatus) -> Casting:
+    def choose(cls, mesh: MeshStatus) -> Casting:
         """Choose the routers with the shortest routes. Raises OrderRefused if there are too few."""
         known = [node for node in mesh.nodes if position_is_known(node)]
         gateways = [node for node in known if node.role == Role.GATEWAY]
@@ -129,7 +129,7 @@ class RepairDemonstration:
     def _play(self) -> Script:
         mesh = yield []
         self._factor_before = mesh.real_time_factor
-        self.plan = plan = Casting.of(mesh)
+        self.plan = plan = Casting.choose(mesh)
         chain, group = plan.cast[:_CHAIN], plan.cast[_CHAIN:]
         lost = chain[-1]
         self.story.add(

@@ -34,7 +34,7 @@ class RecordedDots(NamedTuple):
     ages_s: Sequence[float]  # of each: seconds since it arrived
 
     @classmethod
-    def of(cls, stamp_s: float, carried: int, dots: Sequence[Dot]) -> RecordedDots:
+    def pack(cls, stamp_s: float, carried: int, dots: Sequence[Dot]) -> RecordedDots:
         """Pack the packets of a sample."""
         packets = bytes(byte for dot in dots for byte in dot[:3])
         return cls(stamp_s, carried, packets, array("f", (dot.age_s for dot in dots)))

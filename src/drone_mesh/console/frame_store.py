@@ -134,8 +134,8 @@ class FrameStore:
         """Add new events, oldest first."""
         events = list(events)
         self._next_version()
-        self._orders.take(events)
-        self._alarms.take(events)
+        self._orders.on_events(events)
+        self._alarms.on_events(events)
         self._replace("alarms", self._alarms.groups())
         if self.history is not None:
             self.history.add_events(events)

@@ -60,13 +60,13 @@ class GatewayFeed:
             self._seen, last, events = 0, 0, []
         self._seen, self._uptime_s = last, mesh.stamp_s
 
-        def take() -> None:
+        def show() -> None:
             self._store.origin = origin
             self._store.update_mesh(mesh, time.monotonic(), more)
             if events:
                 self._store.add_events(events)
 
-        self._runner.in_loop(take)
+        self._runner.in_loop(show)
 
 
 @ends_as("drone_mesh_console")

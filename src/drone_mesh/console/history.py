@@ -51,7 +51,7 @@ class History:
         self.marks: list[dict[str, Any]] = []  # what a time line shows: t, node and kind
 
     @classmethod
-    def of(cls, states: Iterable[MeshStatus], events: Iterable[EventRecord]) -> History:
+    def of_run(cls, states: Iterable[MeshStatus], events: Iterable[EventRecord]) -> History:
         """The history of a whole recorded run, oldest first."""
         history = cls(math.inf, math.inf)
         history.extend(states)

@@ -106,8 +106,8 @@ class Guard:
         host = connection.headers.get("host", "")
         try:
             self._access.check_host(host)
-            given = connection.query_params.get("token") or connection.cookies.get(COOKIE)
-            if not self._access.is_right(given, _address_of(connection)):
+            token = connection.query_params.get("token") or connection.cookies.get(COOKIE)
+            if not self._access.is_right(token, _address_of(connection)):
                 raise AccessDenied(
                     "token missing or invalid: open the console with the address that it printed"
                 )
@@ -127,8 +127,8 @@ class Guard:
 
         async def send_with_headers(message: Message) -> None:
             if message["type"] == "http.response.start":
-                given = {name for name, _value in message["headers"]}
-                ours = [header for header in self._headers if header[0] not in given]
+                theirs = {name for name, _value in message["headers"]}
+                ours = [header for header in self._headers if header[0] not in theirs]
                 message["headers"] = [*message["headers"], *ours]
             await send(message)
 

@@ -30,7 +30,7 @@ class Stage:
         """What a demonstration would do, as a question. Raises OrderRefused if it cannot begin."""
         if self._store.mesh is None:
             raise OrderRefused("no state of a mesh yet")
-        return Casting.of(self._store.mesh).in_words()
+        return Casting.choose(self._store.mesh).in_words()
 
     def begin(self) -> str:
         """Begin a demonstration; returns words for the page. Raises OrderRefused."""

@@ -93,11 +93,11 @@ def _add(found: Placemarks, feature: Any, origin: Origin) -> None:
 
 
 def _drone(properties: Mapping[str, Any]) -> int | None:
-    named = properties.get("drone")
-    if named is not None:
-        drone = drone_with(str(named))
+    drone_id = properties.get("drone")
+    if drone_id is not None:
+        drone = drone_with(str(drone_id))
         if drone is None:
-            raise ConfigurationError(f"the property drone is {reprlib.repr(named)}, not an id")
+            raise ConfigurationError(f"the property drone is {reprlib.repr(drone_id)}, not an id")
         return drone
     number = properties.get("id")  # other programs keep words and large numbers in it, too
     if type(number) is int and 0 <= number < MAX_DRONES:

@@ -184,7 +184,7 @@ class StandingOrders:
         order = self._orders.pop(number, None)
         return None if order is None else order.progress()
 
-    def take(self, event: EventRecord) -> None:
+    def on_event(self, event: EventRecord) -> None:
         """Process an event: a drone refused its order, or somebody else sent it elsewhere."""
         if len(event.peers) != 1:
             return

@@ -241,8 +241,8 @@ class InProcessAir(IInProcessAir):
     def _arrive(self, packets: list[tuple[InProcessAntenna, bytes]]) -> None:
         self._left_s = -math.inf  # without a delay, the answers leave at this time, too
         for antenna, payload in packets:
-            take = antenna.take  # calling a local is faster than antenna.take(...)
-            take(payload)
+            deliver = antenna.deliver  # calling a local is faster than antenna.deliver(...)
+            deliver(payload)
 
 
 class InProcessAntenna(IInProcessAntenna):
@@ -255,7 +255,7 @@ class InProcessAntenna(IInProcessAntenna):
         self._air = air
         self._host = host
         self._mesh: IMeshNetwork | None = None
-        self.take: Deliver = _ignore  # called with each packet that arrives
+        self.deliver: Deliver = _ignore  # called with each packet that arrives
 
     def start_antenna(self, mesh: IMeshNetwork) -> None:
         self._mesh = mesh
@@ -289,4 +289,4 @@ class InProcessAntenna(IInProcessAntenna):
             self._host.submit(lambda now_s: mesh.on_antenna_power(on, now_s))
 
     def _listen(self) -> None:
-        self.take = self._host.hear if self.powered and self._mesh is not None else _ignore
+        self.deliver = self._host.hear if self.powered and self._mesh is not None else _ignore

@@ -29,7 +29,7 @@ def event_records(events: Iterable[MeshEvent]) -> list[EventRecord]:
     records: list[EventRecord] = []
     for event in events:
         batcher.observe(event)
-        records += batcher.take()
+        records += batcher.drain()
     return records
 
 

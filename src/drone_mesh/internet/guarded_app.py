@@ -99,13 +99,13 @@ def guarded_app(title: str, description: str, access: Access, router: APIRouter)
         request: Request,
         credentials: Annotated[Optional[HTTPAuthorizationCredentials], Depends(bearer)],
     ) -> None:
-        given = credentials.credentials if credentials is not None else ""
+        token = credentials.credentials if credentials is not None else ""
         address = request.client.host if request.client else "unknown client"
         status, headers = 401, {"WWW-Authenticate": "Bearer"}
         try:
-            if access.is_right(given, address):
+            if access.is_right(token, address):
                 return
-            reason = "invalid token" if given else "token missing: send Authorization: Bearer"
+            reason = "invalid token" if token else "token missing: send Authorization: Bearer"
         except TooManyGuesses as error:
             status, headers, reason = 429, {"Retry-After": "1"}, str(error)
         if refusals.count("refused", time.monotonic()):

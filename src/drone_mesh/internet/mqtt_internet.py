@@ -214,7 +214,7 @@ class MqttInternet(IInternetConnection):
         try:
             node = self._topics.node_of_state(message.topic)
             if node is None:
-                self._take(message)
+                self._receive(message)
             elif message.retain and _is_online(message.payload, by=self._node):
                 self._submit(lambda _now_s: self._left_online.add(node))
         except Exception as error:  # a topic, for example, that no broker lets pass
@@ -223,7 +223,7 @@ class MqttInternet(IInternetConnection):
                 self._unacknowledged.pop(message.mid, None)
             self._client.ack(message.mid, message.qos)
 
-    def _take(self, message: mqtt.MQTTMessage) -> None:
+    def _receive(self, message: mqtt.MQTTMessage) -> None:
         with self._lock:
             known = self._unacknowledged.get(message.mid)
             # A restored broker may reuse the packet id for another message.

@@ -175,10 +175,10 @@ def _add_workers(parser: argparse.ArgumentParser) -> None:
 
 
 def _shard(text: str) -> tuple[int, int]:
-    part, slash, of = text.partition("/")
-    if not (slash and is_up_to(of, MOST) and is_up_to(part, int(of) - 1)):
+    part, slash, parts = text.partition("/")
+    if not (slash and is_up_to(parts, MOST) and is_up_to(part, int(parts) - 1)):
         raise argparse.ArgumentTypeError(f"expected I/N with 0 <= I < N, not {text}")
-    return int(part), int(of)
+    return int(part), int(parts)
 
 
 def _new(options: argparse.Namespace) -> int:

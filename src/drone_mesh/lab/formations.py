@@ -83,7 +83,7 @@ class Formations:
     def _look(self, _: object) -> None:
         network = self._network
         for event in event_records(network.events[self._events_read :]):
-            self._orders.take(event)
+            self._orders.on_event(event)
         self._events_read = len(network.events)
         for drone, to in self._orders.update(network.status()):
             self._order(drone, to.longitude, to.latitude, round(to.height))

@@ -164,12 +164,12 @@ def run_ideal(scenario: Scenario, streams: Streams) -> tuple[dict[str, float], s
     kill = scenario.faults[0].kill if len(scenario.faults) == 1 else None
     if kill is None or kill.pick not in ("random", "cut_vertex") or kill.ids is not None:
         raise ConfigurationError("model ideal: faults must be one random kill or cut vertices")
-    starts = draw_places(scenario.layout, scenario.range_m, streams.of("layout"))
+    starts = draw_places(scenario.layout, scenario.range_m, streams.generator("layout"))
     places = np.array([(start.x, start.y) for start in starts])
     gateways = [index for index, start in enumerate(starts) if start.gateway]
     fit = [i for i in range(len(starts)) if not (kill.spare == "gateways" and i in gateways)]
     number = kill.number if kill.number is not None else round((kill.share or 0.0) * len(fit))
-    rng = streams.of("fault 0")
+    rng = streams.generator("fault 0")
     if kill.pick == "cut_vertex":  # as in a run with packets, which draws the same victims
         graph = Graph(within(dict(enumerate(places.tolist())), scenario.range_m))
         order = rng.sample(range(len(starts)), len(starts))

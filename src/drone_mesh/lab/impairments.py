@@ -30,7 +30,7 @@ class OneWay:
         self.mute: set[int] = set()  # these send nothing
         self.deaf: set[int] = set()  # and these receive nothing
         self._reach_m: dict[int, float] = {}
-        most_db, rng = scenario.radio.asymmetry_db, streams.of("asymmetry")
+        most_db, rng = scenario.radio.asymmetry_db, streams.generator("asymmetry")
         faded = scenario.obstacles.fading != "none"
         exponent = _OUTDOORS if scenario.radio.links == "distance" or faded else _FREE_SPACE
         for node in range(MAX_DRONES if most_db else 0):

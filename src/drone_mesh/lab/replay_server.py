@@ -21,7 +21,7 @@ def serve_replay(
     states: Sequence[MeshStatus], events: Sequence[EventRecord], title: str, port: int
 ) -> None:
     """Serve until Ctrl-C. Raises ConfigurationError if the port is not available."""
-    whole = History.of(states, events)
+    whole = History.of_run(states, events)
     server = ConsoleServer(
         FrameStore(), RecordingControls(), Access(), recording=title, whole=whole, is_played=False
     )

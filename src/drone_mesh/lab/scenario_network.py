@@ -43,7 +43,7 @@ def network_of(
         positions=PositionErrors(**scenario.positions.model_dump()),
         **_radio(scenario, streams, one_way),
     )
-    grounded = streams.of("grounded")
+    grounded = streams.generator("grounded")
     for place in places:
         if place.gateway:
             network.add_gateway(place.node_id, place.x, place.y)
@@ -56,7 +56,7 @@ def network_of(
 
 def places_of(scenario: Scenario, streams: Streams) -> list[StartPoint]:
     obstacles = obstacles_of(scenario.obstacles) if scenario.obstacles.boxes else None
-    return draw_places(scenario.layout, scenario.range_m, streams.of("layout"), obstacles)
+    return draw_places(scenario.layout, scenario.range_m, streams.generator("layout"), obstacles)
 
 
 def _radio(scenario: Scenario, streams: Streams, one_way: OneWay) -> dict[str, Any]:
@@ -79,11 +79,11 @@ def _links(scenario: Scenario, rate: str, streams: Streams, one_way: OneWay) -> 
     links: LinkModel = IdealDisc(scenario.range_m)
     if scenario.radio.links == "distance" or scenario.obstacles.fading != "none":
         links = LogDistance.with_edge_at(
-            scenario.range_m, streams.of("links"), bits_per_s=data_rate(rate).value
+            scenario.range_m, streams.generator("links"), bits_per_s=data_rate(rate).value
         )
     if one_way.occurs:
         links = ScriptedLoss(links, one_way.loses)
     if scenario.radio.loss:
-        rng = streams.of("frames")
+        rng = streams.generator("frames")
         return ScriptedLoss(links, lambda _hop: rng.random() < scenario.radio.loss)
     return links

@@ -41,7 +41,7 @@ class SequenceRun(Simulation):
 
     def __init__(self, scenario: Scenario, streams: Streams) -> None:
         """Raises ConfigurationError for a layout that cannot be drawn."""
-        self._rng = streams.of("sequence")
+        self._rng = streams.generator("sequence")
         super().__init__(_drawn(scenario, self._rng), streams)
 
     def samples(self) -> Times:

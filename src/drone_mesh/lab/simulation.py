@@ -53,7 +53,9 @@ class Simulation:
         places = places_of(scenario, streams)
         one_way = OneWay(scenario, streams)
         self.network = network_of(scenario, streams, places, one_way)
-        self.impairments = Impairments(self.network, streams.of, scenario.radio.loss, one_way)
+        self.impairments = Impairments(
+            self.network, streams.generator, scenario.radio.loss, one_way
+        )
         self._planner = put_obstacles(self.network, self.impairments, scenario)
         self.flights = Flights(self.network)
         self.timeline = Timeline(
@@ -61,7 +63,7 @@ class Simulation:
         )
         self._move(tracks(scenario, places, streams))
         self._probes = ProbeSender(
-            self.network, scenario.probes, scenario.duration_s, streams.of("probes")
+            self.network, scenario.probes, scenario.duration_s, streams.generator("probes")
         )
         churns = any(fault.churn is not None for fault in scenario.faults)
         self._is_watched = bool(churns or scenario.probes.per_s or scenario.mobility.kind != "none")

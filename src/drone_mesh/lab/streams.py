@@ -15,10 +15,10 @@ class Streams:
     def __init__(self, seed: int, repetition: int) -> None:
         self._root = f"{seed}/{repetition}"
 
-    def of(self, purpose: str) -> random.Random:
+    def generator(self, purpose: str) -> random.Random:
         """A generator for this purpose; equal for equal seed, repetition and purpose."""
         return random.Random(f"{self._root}/{purpose}")  # seeded by SHA-512, equal in each Python
 
     def number(self, purpose: str) -> int:
         """A 32-bit seed for a part that wants a number."""
-        return self.of(purpose).getrandbits(32)
+        return self.generator(purpose).getrandbits(32)

@@ -116,7 +116,7 @@ class Timeline:
 
     def _start(self, index: int) -> None:
         fault = self._scenario.faults[index]
-        rng = self._streams.of(f"fault {index}")
+        rng = self._streams.generator(f"fault {index}")
         act = getattr(self, f"_{fault.action}")
         if fault.action in HEALING_STARTS_WITH:
             nodes: list[int] = []

@@ -149,7 +149,7 @@ class RadioNode:
         """Start the radio and the mesh software; RadioError if the chip does not answer."""
         self.component.start(time.monotonic())  # before the thread, so that errors reach the caller
         self._started = True
-        self._slot.submit(lambda _now_s: self._slot.take(self.component))
+        self._slot.submit(lambda _now_s: self._slot.drive(self.component))
         self._executor.start()
         if self._socket is not None:
             self._socket.start()

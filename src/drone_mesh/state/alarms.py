@@ -53,7 +53,7 @@ class AlarmBook:
             if key not in now and not (_of_order(alarm.text) and alarm.node in ids):
                 self._end(key, mesh.stamp_s)
 
-    def take(self, events: Iterable[EventRecord]) -> None:
+    def on_events(self, events: Iterable[EventRecord]) -> None:
         """Process new events: a failed order is an alarm until a later one succeeds."""
         for event in events:
             if len(event.peers) != 1:

@@ -31,7 +31,7 @@ class EventBatcher:
         """A MeshObserver. Beyond EVENTS_KEPT the oldest events are dropped."""
         self._waiting.append(event)
 
-    def take(self) -> list[EventRecord]:
+    def drain(self) -> list[EventRecord]:
         """All events since the last call, oldest first."""
         batch: list[tuple[MeshEvent, list[int]]] = []  # each with all its peers
         latest_of: dict[int, tuple[MeshEvent, list[int]]] = {}

@@ -122,7 +122,7 @@ class OrderProgress:
         """Its state, with the way that is left if `node` is its drone now."""
         return self._latest.in_words(node)
 
-    def take(self, event: EventRecord) -> None:
+    def on_event(self, event: EventRecord) -> None:
         """Process a new event; events of other orders are ignored."""
         order = _order_in(event)
         if order is None or event.peers != (self._drone,) or self.is_over:
@@ -161,7 +161,7 @@ class OrderWatch:
             drone: other for drone, other in self._expected.items() if other != ticket
         }
 
-    def take(self, events: Iterable[EventRecord]) -> None:
+    def on_events(self, events: Iterable[EventRecord]) -> None:
         """Process new events, oldest first. The end of an older order changes nothing."""
         for event in events:
             if event.kind in _DEEDS and event.node in self._latest:
@@ -169,9 +169,9 @@ class OrderWatch:
                 latest.deeds = (*latest.deeds, _DEEDS[event.kind])[-2:]
             order = _order_in(event)
             if order is not None:
-                self._take(event.peers[0], order)
+                self._follow(event.peers[0], order)
 
-    def _take(self, drone: int, order: FollowedOrder) -> None:
+    def _follow(self, drone: int, order: FollowedOrder) -> None:
         latest = self._latest.get(drone, order)
         is_new = order.state in (OrderState.SENT, OrderState.NO_ROUTE)
         if latest.gateway == order.gateway:

@@ -44,7 +44,7 @@ class PacketSampler:
         sampled = SampledPacket(sender(packet), receiver(packet), type_of(packet), at_s)
         self._sample[place : place + 1] = [sampled]
 
-    def take(self) -> tuple[int, Sequence[SampledPacket]]:
+    def drain(self) -> tuple[int, Sequence[SampledPacket]]:
         """The number of packets that arrived, and the sample of them, oldest first."""
         carried, sample = self._carried, self._sample
         self._carried, self._sample = 0, []

@@ -41,22 +41,22 @@ class Palette:
 
     def of_node(self, role: int, condition: Condition) -> Colour:
         """The colour of a node."""
-        return self.named(node_colour_name(role, condition))
+        return self.colour(node_colour_name(role, condition))
 
     def of_link(self, use: LinkUse) -> Colour:
         """The colour of a link."""
-        return self.named(_LINK_COLOUR_NAMES[use])
+        return self.colour(_LINK_COLOUR_NAMES[use])
 
     def of_packet(self, kind: PacketKind) -> Colour:
         """The colour of a packet."""
-        return self.named(_PACKET_COLOUR_NAMES[kind])
+        return self.colour(_PACKET_COLOUR_NAMES[kind])
 
     @property
     def path(self) -> Colour:
         """The colour of a flight path."""
         return self.flying
 
-    def named(self, name: str) -> Colour:
+    def colour(self, name: str) -> Colour:
         """The colour with this field's name."""
         colour: Colour = getattr(self, name)
         return colour
@@ -129,7 +129,7 @@ def rgb(colour: Colour) -> tuple[float, float, float]:
 
 def css_variables(palette: Palette) -> str:
     """The body of a CSS rule that sets `color-scheme` and a variable for each colour."""
-    colours = {_variable(field.name): palette.named(field.name) for field in fields(palette)}
+    colours = {_variable(field.name): palette.colour(field.name) for field in fields(palette)}
     colours.update(
         {f"{use.name.lower()}-link": palette.of_link(use) for use in LinkUse}, path=palette.path
     )
@@ -141,7 +141,7 @@ def css_variables(palette: Palette) -> str:
 def variable_names(palette: Palette) -> dict[Colour, str]:
     """The CSS variable, without its dashes, that has each colour of a palette."""
     # If two names share a colour the first is used; the second is for text on another colour.
-    return {palette.named(f.name): _variable(f.name) for f in reversed(fields(palette))}
+    return {palette.colour(f.name): _variable(f.name) for f in reversed(fields(palette))}
 
 
 def _variable(name: str) -> str:

@@ -63,8 +63,8 @@ def _row(node: NodeStatus, trouble: Trouble | None) -> tuple[str, ...]:
 
 def _names(mesh: MeshStatus) -> str:
     """The techniques in use, as text; old recordings do not contain them."""
-    named = {"routing": mesh.routing, "repair": mesh.repair_strategy}
-    return "".join(f"; {what} {name}" for what, name in named.items() if name)
+    techniques = {"routing": mesh.routing, "repair": mesh.repair_strategy}
+    return "".join(f"; {what} {name}" for what, name in techniques.items() if name)
 
 
 def _channel(node: NodeStatus) -> tuple[str, ...]:

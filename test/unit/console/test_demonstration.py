@@ -117,7 +117,7 @@ def test_it_can_be_ended_at_any_moment_and_puts_everything_back(after_s):
 
 
 def test_it_asks_with_what_it_will_do():
-    words = Casting.of(Fleet().network.status()).in_words()
+    words = Casting.choose(Fleet().network.status()).in_words()
     assert words.startswith("This sends drones 1, 2, 3, 4 and 5 to places beside gateway 0, and")
     assert "switches 12 others off. Then it switches 2 off" in words
 
@@ -126,7 +126,7 @@ def test_its_places_are_where_no_other_drone_stands():
     fleet = Fleet(routers=6)
     fleet.network.order(6, -1.0, 4.0, 0)
     fleet.network.run_for(20.0)
-    plan = Casting.of(fleet.network.status())
+    plan = Casting.choose(fleet.network.status())
     assert all(y <= 0.0 for _x, y, _z in plan.places.values())
 
 

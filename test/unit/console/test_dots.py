@@ -26,8 +26,8 @@ def test_a_page_that_falls_behind_is_sent_the_newest_packets_and_the_number_of_a
 
 def page_with_packets() -> Page:
     """A page that draws packets, of a run of ten seconds with a sample of packets each second."""
-    history = History.of([MeshStatus(float(t), [NodeStatus(1)]) for t in range(10)], [])
-    history.add_packets(RecordedDots.of(t + 0.5, 7, [Dot(t, 2, 4, 0.1)]) for t in range(10))
+    history = History.of_run([MeshStatus(float(t), [NodeStatus(1)]) for t in range(10)], [])
+    history.add_packets(RecordedDots.pack(t + 0.5, 7, [Dot(t, 2, 4, 0.1)]) for t in range(10))
     store = FrameStore()
     store.update_mesh(MeshStatus(9.0, [NodeStatus(1)]), 0.0)
     page = Page(None, store, history, is_live=True)

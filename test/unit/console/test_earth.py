@@ -21,5 +21,5 @@ def test_the_places_are_those_of_routers_whose_position_is_known():
 
 
 def test_a_spread_of_states_ends_with_the_last():
-    history = History.of([MeshStatus(float(t), []) for t in range(10)], [])
+    history = History.of_run([MeshStatus(float(t), []) for t in range(10)], [])
     assert [unpacked(state).stamp_s for state in history.spread(4)] == [0.0, 3.0, 6.0, 9.0]

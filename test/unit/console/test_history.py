@@ -18,7 +18,7 @@ def mesh(stamp_s: float, hops: int = 1, size: int = 1) -> MeshStatus:
 def filled(seconds: int = 20) -> History:
     """One state per second, whose hops are its second, and two events."""
     events = [EventRecord(5.0, 0, "power off"), EventRecord(12.0, 0, "connected", (9,))]
-    return History.of([mesh(float(s), hops=s) for s in range(seconds)], events)
+    return History.of_run([mesh(float(s), hops=s) for s in range(seconds)], events)
 
 
 def shown(player: Player) -> dict:
@@ -112,14 +112,14 @@ def test_the_store_fills_the_history_that_it_is_given():
 
 
 def test_a_recording_keeps_one_state_of_each_time_and_none_that_goes_back():
-    history = History.of([mesh(1.0), mesh(1.0), mesh(2.0), mesh(1.5), mesh(3.0)], [])
+    history = History.of_run([mesh(1.0), mesh(1.0), mesh(2.0), mesh(1.5), mesh(3.0)], [])
     assert history.times == [1.0, 2.0, 3.0]
 
 
 def test_a_jump_in_time_is_no_loss_of_links():
     alone = [NodeStatus(0), NodeStatus(1)]
     linked = [NodeStatus(0, neighbours=b"\x01"), NodeStatus(1, neighbours=b"\x00")]
-    history = History.of([MeshStatus(1.0, alone), MeshStatus(2.0, linked)], [])
+    history = History.of_run([MeshStatus(1.0, alone), MeshStatus(2.0, linked)], [])
     player = Player(history, 2.0)
     assert shown(player)["nodes"]["0"]["known_links"] != "0"
     player.show(1.0)

@@ -165,10 +165,10 @@ def test_a_flight_ordered_at_a_gateway_replaces_the_drones_goal():
     orders = StandingOrders()
     orders.give("layout 7", {4: NORTH}, now_s=10.0)
     elsewhere = Location.from_vector((9.0, 0.0, 0.0))
-    orders.take(EventRecord(5.0, 0, "order sent", (4,), "", 2, elsewhere))  # an older one
-    orders.take(EventRecord(10.0, 0, "order sent", (4,), "", 3, NORTH))
+    orders.on_event(EventRecord(5.0, 0, "order sent", (4,), "", 2, elsewhere))  # an older one
+    orders.on_event(EventRecord(10.0, 0, "order sent", (4,), "", 3, NORTH))
     assert words(orders) == ["0 of 1 at their place, 1 without a route: 4"]
-    orders.take(EventRecord(11.0, 0, "order sent", (4,), "", 4, elsewhere))
+    orders.on_event(EventRecord(11.0, 0, "order sent", (4,), "", 4, elsewhere))
     assert words(orders) == ["0 of 1 at their place, 1 replaced by a later order: 4"]
 
 
@@ -181,7 +181,7 @@ def test_a_drone_is_never_replaced_by_its_own_order_whatever_its_decimals(x, at_
     assert len(orders.update(state(1.0, drone(4)))) == 1
     carried = Location(*struct.unpack("<ffh", struct.pack("<ffh", 2.045, x, 2)))
     for kind in ("order sent", "order accepted", "order arrived"):
-        orders.take(EventRecord(1.5, 0, kind, (4,), "", 3, carried))
+        orders.on_event(EventRecord(1.5, 0, kind, (4,), "", 3, carried))
     orders.update(state(9.0, drone(4, at=carried)))
     assert words(orders) == ["1 of 1 at their place"]
 
@@ -189,7 +189,7 @@ def test_a_drone_is_never_replaced_by_its_own_order_whatever_its_decimals(x, at_
 def test_a_refusal_is_shown_with_its_reason_and_tried_again():
     orders = StandingOrders()
     orders.give("layout 7", {4: EAST}, now_s=0.0)
-    orders.take(EventRecord(1.0, 0, "order refused", (4,), "battery at 9 %", 3, EAST))
+    orders.on_event(EventRecord(1.0, 0, "order refused", (4,), "battery at 9 %", 3, EAST))
     assert words(orders) == ["0 of 1 at their place, 4 refused: battery at 9 %"]
     assert orders.update(state(6.0, drone(4))) == [(4, EAST)]
 
@@ -235,7 +235,7 @@ def follow(network, orders, seconds):
     for _ in range(int(seconds)):
         network.run_for(1.0)
         for event in network.event_records():
-            orders.take(event)
+            orders.on_event(event)
         for node_id, goal in orders.update(network.status()):
             network.order(node_id, goal.longitude, goal.latitude, int(goal.height))
 

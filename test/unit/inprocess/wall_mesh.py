@@ -53,7 +53,7 @@ class WallMesh:
         )
 
         def start(now_s: float) -> None:
-            slot.take(component)
+            slot.drive(component)
             component.start(now_s)
 
         self.chips.append(chip)

@@ -51,7 +51,7 @@ def test_uniform_layouts_are_connected_and_as_dense_as_asked() -> None:
     degrees = []
     for repetition in range(10):
         layout = Layout(kind="uniform", drones=100, mean_degree=8)
-        places = draw_places(layout, 9.0, Streams(1, repetition).of("layout"))
+        places = draw_places(layout, 9.0, Streams(1, repetition).generator("layout"))
         points = [(place.x, place.y) for place in places]
         near = {
             i: [j for j, q in enumerate(points) if j != i and math.dist(p, q) < 9.0]
@@ -63,7 +63,7 @@ def test_uniform_layouts_are_connected_and_as_dense_as_asked() -> None:
 
 
 def test_the_gateway_stands_in_the_middle_and_has_the_lowest_id() -> None:
-    places = draw_places(Layout(drones=50), 9.0, Streams(1, 0).of("layout"))
+    places = draw_places(Layout(drones=50), 9.0, Streams(1, 0).generator("layout"))
     assert [place.gateway for place in places] == [True] + [False] * 49
     middle_x = (min(p.x for p in places) + max(p.x for p in places)) / 2
     middle_y = (min(p.y for p in places) + max(p.y for p in places)) / 2
@@ -82,7 +82,7 @@ def test_the_gateway_stands_in_the_middle_and_has_the_lowest_id() -> None:
     ],
 )
 def test_every_kind_of_layout_gives_ids_and_gateways(layout: dict[str, Any]) -> None:
-    places = draw_places(Layout.model_validate(layout), 9.0, Streams(1, 0).of("layout"))
+    places = draw_places(Layout.model_validate(layout), 9.0, Streams(1, 0).generator("layout"))
     assert len({place.node_id for place in places}) == len(places)
     assert sum(place.gateway for place in places) == layout.get("gateways", 1)
 
@@ -90,7 +90,7 @@ def test_every_kind_of_layout_gives_ids_and_gateways(layout: dict[str, Any]) -> 
 def test_a_layout_that_is_never_connected_is_an_error() -> None:
     layout = Layout(kind="uniform", drones=3, width_m=5000.0)
     with pytest.raises(ConfigurationError, match="none of 2000 draws was connected"):
-        draw_places(layout, 9.0, Streams(1, 0).of("layout"))
+        draw_places(layout, 9.0, Streams(1, 0).generator("layout"))
 
 
 # Faults

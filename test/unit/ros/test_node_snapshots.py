@@ -38,7 +38,7 @@ def test_a_node_is_described_by_the_thread_that_drives_it(worker, component):
         return True
 
     snapshots.add(component, worker, lambda: NodeStatus(1), antenna_on)
-    (state,) = snapshots.take()
+    (state,) = snapshots.collect()
     assert state.connected
     assert len(state.neighbours) == 3
     assert threading.current_thread() not in threads
@@ -47,10 +47,10 @@ def test_a_node_is_described_by_the_thread_that_drives_it(worker, component):
 def test_a_state_that_was_taken_does_not_change(worker, component):
     snapshots = NodeSnapshots(wait_s=60.0)
     snapshots.add(component, worker, lambda: NodeStatus(1), lambda: True)
-    (state,) = snapshots.take()
+    (state,) = snapshots.collect()
     before = copy.deepcopy(state)
     component.on_antenna_power(False, 20.0)
-    (later,) = snapshots.take()
+    (later,) = snapshots.collect()
     assert state == before
     assert not later.connected
 
@@ -58,11 +58,11 @@ def test_a_state_that_was_taken_does_not_change(worker, component):
 def test_a_busy_worker_delays_nobody_and_its_node_keeps_its_state(worker, component):
     snapshots = NodeSnapshots(wait_s=0.01)
     snapshots.add(component, worker, lambda: NodeStatus(1), lambda: True)
-    while not snapshots.take():
+    while not snapshots.collect():
         pass
     free = threading.Event()
     worker.submit(lambda _now_s: free.wait(60.0))
-    (state,) = snapshots.take()
+    (state,) = snapshots.collect()
     free.set()
     assert state.connected
 
@@ -71,6 +71,6 @@ def test_a_dropped_node_is_in_no_later_report(worker, component):
     snapshots = NodeSnapshots(wait_s=60.0)
     snapshots.add(component, worker, lambda: NodeStatus(1), lambda: True)
     assert len(snapshots) == 1
-    snapshots.take()
+    snapshots.collect()
     snapshots.drop(1)
-    assert snapshots.take() == []
+    assert snapshots.collect() == []

@@ -64,10 +64,10 @@ def test_an_acknowledged_alarm_stays_until_it_is_over_and_comes_back_as_new():
 
 def test_a_failed_order_is_an_alarm_until_a_later_order_is_accepted():
     book = AlarmBook()
-    book.take([EventRecord(1.0, 0, "order refused", (4,), "battery at 9 %", 7, PLACE)])
+    book.on_events([EventRecord(1.0, 0, "order refused", (4,), "battery at 9 %", 7, PLACE)])
     book.update(state(2.0, well(4)))
     assert said(book) == [("refused an order: battery at 9 %", [4], False, False)]
-    book.take([EventRecord(3.0, 0, "order accepted", (4,), "", 8, PLACE)])
+    book.on_events([EventRecord(3.0, 0, "order accepted", (4,), "", 8, PLACE)])
     assert said(book) == [("refused an order: battery at 9 %", [4], True, False)]
 
 
@@ -75,7 +75,9 @@ def test_of_the_failed_orders_of_a_drone_the_last_one_is_an_alarm():
     book = AlarmBook()
     for second in range(100):
         reason = f"battery at {100 - second} %"
-        book.take([EventRecord(float(second), 0, "order refused", (4,), reason, second, PLACE)])
+        book.on_events(
+            [EventRecord(float(second), 0, "order refused", (4,), reason, second, PLACE)]
+        )
     assert said(book) == [("refused an order: battery at 1 %", [4], False, False)]
 
 

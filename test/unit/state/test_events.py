@@ -12,7 +12,7 @@ def batch(*events: MeshEvent) -> list[tuple[int, str, tuple[int, ...]]]:
     batcher = EventBatcher()
     for event in events:
         batcher.observe(event)
-    return [(event.node, event.kind, event.peers) for event in batcher.take()]
+    return [(event.node, event.kind, event.peers) for event in batcher.drain()]
 
 
 def test_neighbours_found_one_after_the_other_are_one_event():
@@ -43,6 +43,6 @@ def test_an_event_without_another_node_has_no_peers():
 def test_each_event_is_taken_once():
     batcher = EventBatcher()
     batcher.observe(MeshEvent(MeshEventKind.LANDED, 4, 12.5, detail="soft"))
-    (event,) = batcher.take()
+    (event,) = batcher.drain()
     assert (event.stamp_s, event.detail) == (12.5, "soft")
-    assert batcher.take() == []
+    assert batcher.drain() == []

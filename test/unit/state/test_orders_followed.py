@@ -29,7 +29,7 @@ def event(stamp_s, gateway, kind, number, goal, reason=""):
 def watch(*events):
     """(gateway, kind, number, goal, reason) of drone 5."""
     watch = OrderWatch()
-    watch.take(event(1.0, *given) for given in events)
+    watch.on_events(event(1.0, *given) for given in events)
     return watch
 
 
@@ -97,10 +97,10 @@ def test_a_drone_that_flies_on_to_its_old_place_is_not_said_to_stay():
 def test_what_a_drone_did_after_its_arrival_is_told():
     followed = watch(SENT, ACCEPTED, ARRIVED)
     assert followed.since(NodeStatus(5, position=(1.0, 2.0, 3.0))) == ""
-    followed.take([EventRecord(9.0, 5, "flight decided", (2,))])
+    followed.on_events([EventRecord(9.0, 5, "flight decided", (2,))])
     away = NodeStatus(5, position=(1.0, 190.0, 3.0))
     assert followed.since(away) == "flew to repair the mesh, is 188 m from there"
-    followed.take([event(10.0, *SENT_EIGHT)])
+    followed.on_events([event(10.0, *SENT_EIGHT)])
     assert followed.since(away) == ""
 
 
@@ -108,7 +108,7 @@ def progress(*events):
     """(seconds, gateway, kind, number, goal, reason) of drone 5, ordered after 10 s."""
     progress = OrderProgress(5, HERE, since_s=10.0)
     for given in events:
-        progress.take(event(*given))
+        progress.on_event(event(*given))
     return progress
 
 
@@ -134,7 +134,7 @@ def test_an_order_is_known_by_its_place_as_the_wire_carries_it():
     goal = Location(2.005, 1.125, 3.4)
     carried = Location(*struct.unpack("<ffh", struct.pack("<ffh", *goal[:2], 3)))
     progress = OrderProgress(5, goal, since_s=10.0)
-    progress.take(event(11.0, 0, "order sent", 7, carried))
+    progress.on_event(event(11.0, 0, "order sent", 7, carried))
     assert progress.was_sent
 
 

@@ -38,8 +38,8 @@ def test_a_few_packets_are_all_in_the_sample_oldest_first():
     sampler = PacketSampler(random.Random(1), most=3)
     sampler.note(packet(1, 2, 4), 0.25)
     sampler.note(packet(2, 0, 7), 0.5)
-    assert sampler.take() == (2, [SampledPacket(1, 2, 4, 0.25), SampledPacket(2, 0, 7, 0.5)])
-    assert sampler.take() == (0, [])
+    assert sampler.drain() == (2, [SampledPacket(1, 2, 4, 0.25), SampledPacket(2, 0, 7, 0.5)])
+    assert sampler.drain() == (0, [])
 
 
 def test_each_packet_of_a_crowd_is_as_likely_in_the_sample_as_any_other():
@@ -49,7 +49,7 @@ def test_each_packet_of_a_crowd_is_as_likely_in_the_sample_as_any_other():
         sampler = PacketSampler(rng, most=10)
         for sender in range(100):
             sampler.note(packet(sender, 200, 4), float(sender))
-        carried, sample = sampler.take()
+        carried, sample = sampler.drain()
         assert carried == 100
         assert len({one.sender for one in sample}) == 10
         seen.update(one.sender for one in sample)

@@ -40,7 +40,7 @@ def contrast(one: str, other: str) -> float:
 @pytest.mark.parametrize("name", TEXT_COLOURS)
 def test_text_is_legible_in_every_colour(palette: Palette, name: str):
     for background in (palette.card, palette.hover, palette.page):
-        assert contrast(palette.named(name), background) >= ENOUGH, background
+        assert contrast(palette.colour(name), background) >= ENOUGH, background
 
 
 @pytest.mark.parametrize("palette", [LIGHT, DARK], ids=["light", "dark"])

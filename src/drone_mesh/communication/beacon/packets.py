@@ -134,7 +134,7 @@ class Beacon(NamedTuple):
             return True
         return as_child and (node in self.below.listed or node in self.below.new)
 
-    def named(self) -> tuple[int, ...]:
+    def named_nodes(self) -> tuple[int, ...]:
         """The nodes that the sender hears or leads to, as far as they fit this beacon."""
         return (*self.below.listed, *self.below.new, *self.near)
 

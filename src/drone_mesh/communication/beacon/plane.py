@@ -70,7 +70,7 @@ class BeaconPlane(IControlPlane):
             self._antenna,
             self._deadlines,
             basics.timing.send_attempts,
-            self._verdicts.of,
+            self._verdicts.verdict_on,
             self._took,
             self._failed,
             lambda from_, node: self._routes.leads_not_to(node, from_),
@@ -286,7 +286,7 @@ class BeaconPlane(IControlPlane):
         """Update what depends on a neighbour's new beacon."""
         routes, now_s = self._routes, self._routes.now_s
         self._look_s = now_s + LOOK_S
-        self._basics.neighbours.named(beacon.named(), now_s)
+        self._basics.neighbours.note_known_elsewhere(beacon.named_nodes(), now_s)
         if is_new:
             self._trickle.reset(now_s)
         if self._below.has_news and not routes.is_root:

@@ -379,10 +379,10 @@ class BeaconRoutes(IRoutes):
             for _cost, _other, heard, neighbour in sorted(map(self._rank, self._candidates())):
                 yield Way(neighbour, -heard)
             return
-        named: set[int] = set()
+        seen: set[int] = set()
         for way in self._ways_down(node, came_from):
-            if way.neighbour not in named:
-                named.add(way.neighbour)
+            if way.neighbour not in seen:
+                seen.add(way.neighbour)
                 yield way
 
     def _ways_down(self, node: int, came_from: int) -> Iterator[Way]:

@@ -30,7 +30,7 @@ class Verdicts:
         # By drone: the neighbours that took orders for it, and when.
         self._ordered: dict[int, dict[int, float]] = {}
 
-    def of(self, transit: Transit) -> int:
+    def verdict_on(self, transit: Transit) -> int:
         """The next hop of a packet, HOLD or DROP."""
         routes = self._routes
         routes.now_s = now_s = self._deadlines.now_s

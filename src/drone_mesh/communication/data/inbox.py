@@ -77,7 +77,7 @@ class Inbox:
         reassembly.done(whole.head, now_s)
         if whole.head.reliable and self._acknowledge is not None:
             self._completed(whole, index, now_s)
-        return self._order(whole).take(whole, now_s)
+        return self._order(whole).add(whole, now_s)
 
     @property
     def unfinished(self) -> bool:

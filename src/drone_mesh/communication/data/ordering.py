@@ -30,7 +30,7 @@ class PortOrder:
         self._held: dict[int, tuple[Whole, float]] = {}  # complete, but earlier ones are missing
         self._given_up: deque[int] = deque(maxlen=MOST_BEHIND)  # places that were not waited for
 
-    def take(self, whole: Whole, now_s: float) -> list[Whole]:
+    def add(self, whole: Whole, now_s: float) -> list[Whole]:
         """Add a complete message; returns what can be delivered now. Ignores duplicates."""
         order = whole.head.order
         if not whole.head.reliable:

@@ -17,11 +17,11 @@ class CommonFrame:
     def __init__(self, digest: int) -> None:
         """`digest` is this node's own."""
         self.digest = digest
-        self._of: dict[int, int] = {}  # neighbour -> its digest
+        self._digests: dict[int, int] = {}  # neighbour -> its digest
 
     def heard(self, neighbour: int, digest: int) -> bool:
         """Record a neighbour's digest; returns whether its frame is this node's."""
-        self._of[neighbour] = digest
+        self._digests[neighbour] = digest
         return digest == self.digest
 
     def refuses(self, from_: int) -> bool:
@@ -30,8 +30,8 @@ class CommonFrame:
         A node with an origin waits for a neighbour's PRESENT; a node without one assumes that a
         neighbour that has not introduced itself has no origin either.
         """
-        return self._of.get(from_, NO_FRAME) != self.digest
+        return self._digests.get(from_, NO_FRAME) != self.digest
 
     def is_foreign(self, from_: int) -> bool:
         """Whether this neighbour has introduced itself with another frame."""
-        return from_ in self._of and self.refuses(from_)
+        return from_ in self._digests and self.refuses(from_)

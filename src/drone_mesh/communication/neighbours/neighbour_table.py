@@ -117,7 +117,7 @@ class Neighbours:
         """The current neighbours."""
         return frozenset(self._heard_s)
 
-    def named(self, nodes: Iterable[int], now_s: float) -> None:
+    def note_known_elsewhere(self, nodes: Iterable[int], now_s: float) -> None:
         """Another node knows these: one that fell silent long ago lives, its link here failed."""
         for node in self._fell_silent_s.keys() & nodes:
             if now_s - self._fell_silent_s[node] > NAMED_AFTER_DEATH_S:

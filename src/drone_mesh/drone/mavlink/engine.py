@@ -79,7 +79,7 @@ class MavlinkEngine(IDroneEngine):
     def set_goal(self, latitude: float, longitude: float, height: float) -> None:
         """Fly there, and land if the height is 0. Raises GoalRefused with the reason."""
         why_not = self.status().why_not_fly
-        self._take(Location(latitude, longitude, height), height <= 0.0, False, why_not)
+        self._queue_goal(Location(latitude, longitude, height), height <= 0.0, False, why_not)
 
     def step_back_to(self, latitude: float, longitude: float, height: float) -> None:
         """Fly there and hover: at --hover, or else at the drone's current height."""
@@ -95,7 +95,7 @@ class MavlinkEngine(IDroneEngine):
                 if here is not None and in_air
                 else self._limits.layer_height_m(self._node_id)
             )
-        self._take(Location(latitude, longitude, hover_m), False, True, status.why_not_repair)
+        self._queue_goal(Location(latitude, longitude, hover_m), False, True, status.why_not_repair)
 
     def get_location(self) -> Location:
         status = self.status()
@@ -142,7 +142,7 @@ class MavlinkEngine(IDroneEngine):
         self._ended.set()
         self._thread.join()
 
-    def _take(self, goal: Location, lands: bool, for_repair: bool, why_not: str) -> None:
+    def _queue_goal(self, goal: Location, lands: bool, for_repair: bool, why_not: str) -> None:
         if why_not:
             raise GoalRefused(f"the drone cannot fly: {why_not}")
         home = self.status().home

@@ -86,7 +86,7 @@ class Telemetry:
         self.is_outside_fence = False  # as the autopilot reports
         self._sticks_at_rest: tuple[int, ...] | None = None
         self._sticks_moved_s = -math.inf
-        self._takes: dict[str, Callable[[Message, float], None]] = {
+        self._readers: dict[str, Callable[[Message, float], None]] = {
             "HEARTBEAT": self._take_heartbeat,
             "GLOBAL_POSITION_INT": self._take_position,
             "GPS_RAW_INT": self._take_fix,
@@ -110,9 +110,9 @@ class Telemetry:
             self.sender = sender_of(message)
         if self.autopilot is None or sender_of(message) != self.sender:
             return False
-        take = self._takes.get(message.get_type())
-        if take is not None:
-            take(message, now_s)
+        read = self._readers.get(message.get_type())
+        if read is not None:
+            read(message, now_s)
         return True
 
     # Conclusions -----------------------------------------------------------------------------

@@ -115,7 +115,9 @@ class Frame:
         """The address, as a number, for a receiver with this address width."""
         address = self._addresses.get(address_bytes)
         if address is None:
-            address = self._addresses[address_bytes] = self._take(PREAMBLE_BITS, 8 * address_bytes)
+            address = self._addresses[address_bytes] = self._bits_at(
+                PREAMBLE_BITS, 8 * address_bytes
+            )
         return address
 
     def decode(self, form: FrameFormat) -> Packet | None:
@@ -138,7 +140,7 @@ class Frame:
         padding = -self.bit_count % 8
         return (self.bits << padding).to_bytes((self.bit_count + padding) // 8, "big")
 
-    def _take(self, position: int, width: int) -> int:
+    def _bits_at(self, position: int, width: int) -> int:
         return self.bits >> (self.bit_count - position - width) & ((1 << width) - 1)
 
     def _find_packet(self, form: FrameFormat) -> Packet | None:
@@ -147,14 +149,14 @@ class Frame:
         if form.enhanced:
             if position + PCF_BITS > self.bit_count:
                 return None
-            control = self._take(position, PCF_BITS)
+            control = self._bits_at(position, PCF_BITS)
             position += PCF_BITS
             if length is None:
                 length = control >> 3
         if length is None or position + 8 * (length + form.crc_bytes) > self.bit_count:
             return None  # the rest would be noise
-        payload = self._take(position, 8 * length).to_bytes(length, "big")
-        crc = self._take(position + 8 * length, 8 * form.crc_bytes)
+        payload = self._bits_at(position, 8 * length).to_bytes(length, "big")
+        crc = self._bits_at(position + 8 * length, 8 * form.crc_bytes)
         if form.crc_bytes:
             address = self.address(form.address_bytes).to_bytes(form.address_bytes, "big")
             if crc != frame_crc(address, control, payload, form.crc_bytes):

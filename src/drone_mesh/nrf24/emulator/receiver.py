@@ -31,7 +31,7 @@ class Receiver:
         if chip.rx_fifo.full:
             return True  # ignored, and not acknowledged
         if self._is_new(pipe, packet):
-            self._take(pipe, packet)
+            self._store(pipe, packet)
         wants_answer = packet.no_ack_bit != chip.variant.no_ack_bit
         if registers.auto_ack[pipe] and wants_answer:
             chip.overtake()
@@ -52,7 +52,7 @@ class Receiver:
         self._last[memory] = identity
         return True
 
-    def _take(self, pipe: int, packet: Packet) -> None:
+    def _store(self, pipe: int, packet: Packet) -> None:
         chip = self._chip
         flags = RX_DR.mask
         answered = chip.tx_fifo.for_pipe(pipe)

@@ -18,10 +18,10 @@ class FiguresPublisher(Periodic):
     Publishes: /diagnostics (DiagnosticArray), one status "<node>: <task>" with level OK
     """
 
-    def __init__(self, task: str, take: Callable[[], Mapping[str, float]]) -> None:
-        """`take` is called in the thread of this object."""
+    def __init__(self, task: str, measure: Callable[[], Mapping[str, float]]) -> None:
+        """`measure` is called in the thread of this object."""
         super().__init__("figures", PERIOD_S)
-        self._take = take
+        self._measure = measure
         self._updater = Updater()
         self._updater.setHardwareID(HARDWARE_ID)
         self._updater.add(task, self._fill_in)
@@ -31,6 +31,6 @@ class FiguresPublisher(Periodic):
 
     def _fill_in(self, status: DiagnosticStatusWrapper) -> DiagnosticStatusWrapper:
         status.summary(DiagnosticStatusWrapper.OK, "figures")
-        for name, value in self._take().items():
+        for name, value in self._measure().items():
             status.add(name, repr(value))
         return status

@@ -47,7 +47,7 @@ class PacketSamples(Periodic):
 
     def _work(self) -> None:
         with self._lock:  # always: a later subscriber must not get what is left from before
-            carried, packets = self._sampler.take()
+            carried, packets = self._sampler.drain()
         if not self.watched:
             return
         now_s = time.monotonic()

@@ -44,15 +44,17 @@ def factory_configuration(*keys: str) -> FactoryConfiguration:
 def configured_obstacles(configuration: FactoryConfiguration) -> Obstacles | None:
     """The boxes that the configuration names, or None. Raises ConfigurationError."""
     blocks = configuration.obstacle_radio == "block"
-    return _named("obstacles", configuration.obstacles, lambda path: read_obstacles(path, blocks))
+    return _read_named_file(
+        "obstacles", configuration.obstacles, lambda path: read_obstacles(path, blocks)
+    )
 
 
 def configured_missions(configuration: FactoryConfiguration) -> dict[int, Mission]:
     """The missions that the configuration names, by drone. Raises ConfigurationError."""
-    return _named("missions", configuration.missions, read_missions) or {}
+    return _read_named_file("missions", configuration.missions, read_missions) or {}
 
 
-def _named(key: str, given: str, read: Callable[[Path], Result]) -> Result | None:
+def _read_named_file(key: str, given: str, read: Callable[[Path], Result]) -> Result | None:
     """Read the file that this key names; None if it names none. Raises ConfigurationError."""
     if not given:
         return None

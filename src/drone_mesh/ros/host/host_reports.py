@@ -72,6 +72,6 @@ class HostReports(Periodic):
         now_s = rospy.get_time()
         report = HostReport(host=rospy.get_name())
         report.header.stamp = ros_time(now_s)
-        report.nodes = self._snapshots.take()
-        report.events = [event_msg(event) for event in self._batcher.take()]
+        report.nodes = self._snapshots.collect()
+        report.events = [event_msg(event) for event in self._batcher.drain()]
         self._publisher.publish(report)

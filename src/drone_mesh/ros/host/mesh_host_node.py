@@ -126,7 +126,9 @@ def main() -> None:
         fleet = get_fleet_parameter()
         ids = or_exit(lambda: share_of_host(fleet, get_present_drones()))
         _log.info("serving %s", f"drones {ids.start}..{ids.stop - 1}" if ids else "no drones")
-        settings = or_exit(lambda: MeshSettings.of(fleet, run, _obstacles_of(fleet)))
+        settings = or_exit(
+            lambda: MeshSettings.from_configuration(fleet, run, _obstacles_of(fleet))
+        )
         places = ReportedPlaces()
         host = MeshHost(settings, lambda: clock.now_s, stop.fail, places.place_of)
         # The world waits for declared hosts only.

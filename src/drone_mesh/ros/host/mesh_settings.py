@@ -30,7 +30,7 @@ class MeshSettings:
     key: MeshKey | None  # None: packets are not sealed
 
     @classmethod
-    def of(
+    def from_configuration(
         cls, configuration: FactoryConfiguration, run: Run, obstacles: Obstacles | None = None
     ) -> MeshSettings:
         """The settings of this configuration, in this run. Raises ConfigurationError.

@@ -61,7 +61,7 @@ class NodeSnapshots(Generic[S]):
         self._fills.pop(node_id, None)
         self._latest.pop(node_id, None)
 
-    def take(self) -> list[S]:
+    def collect(self) -> list[S]:
         """The present state of each node; of a node whose worker is busy, its last one."""
         done: queue.SimpleQueue[int] = queue.SimpleQueue()
         fills = list(self._fills.values())

@@ -72,7 +72,7 @@ class VirtualRaspberryPi(abc.ABC):
         self.users.open(self.component.data)
         self._users_of_node.start(self.component.data)
         self.component.start(now_s)
-        self.slot.take(self.component)
+        self.slot.drive(self.component)
 
     def stop(self, _now_s: float) -> None:
         """Switch off."""

@@ -29,7 +29,7 @@ from drone_mesh.ros.graph.present_drones import PresentDrones
 from drone_mesh.ros.graph.waiting import comes_true
 from drone_mesh.ros.services.order_answers import OrderAnswers, Outcomes
 from drone_mesh.ros.services.order_summary import OrderSummary
-from drone_mesh.ros.services.standing_layouts import Given, StandingLayouts, flight_rules
+from drone_mesh.ros.services.standing_layouts import LayoutStart, StandingLayouts, flight_rules
 
 WAIT_FOR_GATEWAY_S = 3.0  # of wall time (docs/ros.md, "Drone manager")
 ANSWERS_TIMEOUT_S = 1.0  # wall: a gateway answers in milliseconds, if it answers
@@ -172,16 +172,16 @@ class DroneManager:
         known, missing = _in_fleet(orders, fleet)
         if not self._gateway_is_there():
             raise rospy.ServiceException("no gateway is running")
-        given = self._standing.give(name, orders, at_once, handle)
-        if given.is_followed:
-            summary = self._order_first(given, fleet, missing)
+        start = self._standing.give(name, orders, at_once, handle)
+        if start.is_followed:
+            summary = self._order_first(start, fleet, missing)
         else:
             summary = self._order_all(known, fleet, missing)
         words = summary.in_words()
         level = logging.INFO if summary.is_complete else logging.WARNING
         _log.log(level, "%s: %s", name, words)
         return srv.OrderLayoutResponse(
-            given.progress.number,
+            start.progress.number,
             summary.sent,
             summary.later,
             [*summary.there, *summary.flying],
@@ -191,11 +191,11 @@ class DroneManager:
         )
 
     def _order_first(
-        self, given: Given, fleet: PresentDrones | None, missing: Sequence[int]
+        self, start: LayoutStart, fleet: PresentDrones | None, missing: Sequence[int]
     ) -> OrderSummary:
         """Give the first orders of a standing order, to drones that may set out now."""
-        drones, reasons = given.progress.drones, dict(given.progress.reasons)
-        first = [order for order in given.orders if order.node_id not in missing]
+        drones, reasons = start.progress.drones, dict(start.progress.reasons)
+        first = [order for order in start.orders if order.node_id not in missing]
         ordered = {order.node_id for order in first}
         outcomes = self._order(first, fleet, allow_shared_place=True)
         reasons.update({drone: answer.reason for drone, answer in outcomes.refused.items()})

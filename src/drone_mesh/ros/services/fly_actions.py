@@ -186,7 +186,7 @@ class FlyActions:
     def _take_event(self, event: MeshEvent) -> None:
         record = event_record(event)
         for flight in list(self._flights):
-            flight.progress.take(record)
+            flight.progress.on_event(record)
             if flight.progress.is_over:
                 arrived = flight.progress.state is OrderState.ARRIVED
                 words = "" if arrived else flight.progress.in_words()

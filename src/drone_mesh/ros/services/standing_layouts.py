@@ -59,7 +59,7 @@ def progress_msg(progress: StandingProgress, over: bool) -> LayoutProgress:
     )
 
 
-class Given(NamedTuple):
+class LayoutStart(NamedTuple):
     """A standing order at its start."""
 
     progress: StandingProgress
@@ -120,7 +120,7 @@ class StandingLayouts:
         orders: Sequence[Order],
         at_once: bool,
         handle: actionlib.ServerGoalHandle | None,
-    ) -> Given:
+    ) -> LayoutStart:
         """Make a standing order of these. The caller publishes the first ones next.
 
         Without a state of the mesh, as beside the world of another program, that is all of them.
@@ -136,9 +136,9 @@ class StandingLayouts:
                 sent = self._orders.update(self._mesh, rules)
                 first = [Order(drone, goal) for drone, goal in sent]
             (progress,) = [p for p in self._orders.all_progress() if p.number == number]
-            given = Given(progress, first, self._mesh is not None)
+            start = LayoutStart(progress, first, self._mesh is not None)
         self._show()
-        return given
+        return start
 
     def preview(self, orders: Sequence[Order], at_once: bool) -> FormationPreview | None:
         """Preview an order to these drones; None: the state of the mesh is unknown."""
@@ -171,7 +171,7 @@ class StandingLayouts:
 
     def _event_came(self, event: MeshEvent) -> None:
         with self._lock:
-            self._orders.take(event_record(event))
+            self._orders.on_event(event_record(event))
 
     def _state_came(self, state: MeshState) -> None:
         mesh = mesh_status(state)

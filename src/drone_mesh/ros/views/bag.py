@@ -163,7 +163,7 @@ def no_states(path: Path) -> BagUnusable:
 
 def _dots(message: Any, at_s: float) -> RecordedDots:
     dots = make_dots(message.senders, message.receivers, message.types, message.ages)
-    return RecordedDots.of(at_s, message.carried, dots)
+    return RecordedDots.pack(at_s, message.carried, dots)
 
 
 def _recorded(path: Path, convert: Callable[[dict[str, Any]], T]) -> Iterator[T]:

@@ -114,13 +114,13 @@ class MeshFeed:
 def layout_offers(layouts: Layouts) -> list[LayoutOffer]:
     """All layouts: first those of several drones, then those of one."""
     known = {FIELD_CASE: "field case", GRID_CASE: "10 x 10 grid"}
-    named = []
+    offers = []
     for case in layouts.cases:
         places = places_of(layouts.orders(case))
         drones = len(places)
         what = known.get(case, f"{drones} drones") if drones > 1 else f"drone {case} of case 0"
-        named.append((drones == 1, LayoutOffer(case, f"{case}: {what}", places)))
-    return [offer for _single, offer in sorted(named)]
+        offers.append((drones == 1, LayoutOffer(case, f"{case}: {what}", places)))
+    return [offer for _single, offer in sorted(offers)]
 
 
 def main() -> None:
@@ -153,11 +153,11 @@ def _run() -> int:
     recording = str(rospy.get_param("~recording", ""))
     origin = earth_origin(str(rospy.get_param("~origin", "")), is_live=not recording)
     whole = History(math.inf, math.inf) if recording else None
-    given = str(rospy.get_param("~tiles", ""))
-    if given and origin is None:
+    chosen = str(rospy.get_param("~tiles", ""))
+    if chosen and origin is None:
         raise ConfigurationError("tiles:= needs origin:=LAT,LON,ALT: where the world is on the map")
-    with naming_argument("tiles:=", given.partition("#")[0]):
-        tiles = open_tiles(given) if given else None
+    with naming_argument("tiles:=", chosen.partition("#")[0]):
+        tiles = open_tiles(chosen) if chosen else None
     store = FrameStore(History() if whole is None else None, origin)
     layouts = layout_offers(manager_layouts())
     access = token.access(address)
@@ -202,8 +202,8 @@ def _token(address: str) -> PageToken:
         )
     path = str(rospy.get_param("~token_file", ""))
     with naming_argument("token_file:=", path):
-        given = read_secret(Path(path), "token") if path else ""
-    return PageToken.needed(address, given, path)
+        token = read_secret(Path(path), "token") if path else ""
+    return PageToken.needed(address, token, path)
 
 
 def _port(value: object) -> int:

@@ -92,7 +92,7 @@ def _follow(heard: queue.Queue[MeshEvent | MeshState], progress: OrderProgress, 
         except queue.Empty:
             continue
         if isinstance(message, MeshEvent):
-            progress.take(event_record(message))
+            progress.on_event(event_record(message))
             continue
         now_s = message.header.stamp.to_sec()
         if now_s - shown_s >= SHOW_EVERY_S or progress.state is not shown:

@@ -48,7 +48,7 @@ class MeshMarkers:
     def _show(self, state: MeshState) -> None:
         now_s = time.monotonic()
         stamp = state.header.stamp
-        newcomers = self._new_listeners.take()
+        newcomers = self._new_listeners.drain()
         moved = self._moved.select(state.nodes, stamp.to_sec(), now_s)
         if moved:
             self._frames.publish(_frames(moved, stamp))
@@ -60,7 +60,7 @@ class MeshMarkers:
                 send(rest)
         if self._markers.get_num_connections() == 0:
             return
-        if self._new_viewers.take():
+        if self._new_viewers.drain():
             self._maker.forget_shown()
         markers = self._maker.markers(state, now_s)
         if markers.markers:
@@ -77,7 +77,7 @@ class _Newcomers(rospy.SubscribeListener):
     def peer_subscribe(self, _topic: str, _send_to_all: Send, send: Send) -> None:
         self._new.put(send)
 
-    def take(self) -> list[Send]:
+    def drain(self) -> list[Send]:
         """The subscribers that came since the last call."""
         taken = []
         with contextlib.suppress(queue.Empty):

@@ -82,11 +82,11 @@ def _watch(colours: bool) -> int:
     latest: list[tuple[MeshStatus, float]] = []
     came = threading.Event()
 
-    def take(message: MeshState) -> None:
+    def keep(message: MeshState) -> None:
         latest[:] = [(mesh_status(message), time.monotonic())]
         came.set()
 
-    rospy.Subscriber(names.STATE_TOPIC, MeshState, take, queue_size=1)
+    rospy.Subscriber(names.STATE_TOPIC, MeshState, keep, queue_size=1)
     MasterWatch().start()  # states arrive again after a restart of the master
     if not came.wait(WAIT_S):
         raise NoState

@@ -73,7 +73,7 @@ class FactoryParameters:
             )
         if configuration.radio == "nrf24":
             _check_emulated_radio(configuration, int(hosts))
-        settings = MeshSettings.of(configuration, new_run(), obstacles)
+        settings = MeshSettings.from_configuration(configuration, new_run(), obstacles)
         return cls(configuration, settings, fleet, obstacles, missions, int(hosts))
 
 

@@ -37,7 +37,7 @@ class Sender:
         self.deadlines.now_s += after_s
         self.claim()
         packet = messages.packet(kind, GATEWAY, GATEWAY, NO_ROUTE, DRONE)
-        return self.verdicts.of(Transit(packet, came_from, self.deadlines.now_s))
+        return self.verdicts.verdict_on(Transit(packet, came_from, self.deadlines.now_s))
 
 
 @pytest.mark.parametrize("came_from", [NO_ROUTE, 7], ids=["made here", "of another node"])

@@ -29,7 +29,7 @@ class Node:
 
     def verdict(self, transit, now_s=0.0):
         self.deadlines.now_s = now_s
-        return self.verdicts.of(transit)
+        return self.verdicts.verdict_on(transit)
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ def message(order, behind=0, reliable=True):
 
 
 def taken(order, *wholes, now_s=0.0):
-    return [[whole.head.order for whole in order.take(whole, now_s)] for whole in wholes]
+    return [[whole.head.order for whole in order.add(whole, now_s)] for whole in wholes]
 
 
 def test_a_message_waits_for_an_earlier_one():
@@ -41,7 +41,7 @@ def test_a_message_before_the_first_that_arrived_is_delivered_once():
 def test_a_place_that_comes_again_after_the_wrap_is_delivered_once():
     order = PortOrder()
     for place in range(1 << 16):
-        order.take(message(place), 0.0)
+        order.add(message(place), 0.0)
     assert taken(order, message(65521), message(65535), message(0), message(0)) == [[], [], [0], []]
 
 

@@ -184,6 +184,6 @@ def test_a_few_messages_under_one_number_are_repeated_once_and_the_others_not_at
 def test_a_message_waits_for_earlier_ones_for_longer_than_their_sender_tries_and_not_for_ever():
     order = PortOrder()
     for number, behind in ((7, 0), (9, 1)):
-        order.take(Whole(Head(0, 0, 0, 1, True, behind, number, 0), b"."), 0.0)
+        order.add(Whole(Head(0, 0, 0, 1, True, behind, number, 0), b"."), 0.0)
     assert order.overdue(LIFETIME_S + 30.0) == []
     assert [whole.head.order for whole in order.overdue(2.0 * LIFETIME_S)] == [9]

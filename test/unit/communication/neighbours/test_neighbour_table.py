@@ -21,26 +21,26 @@ def neighbours() -> Neighbours:
 
 
 def test_one_that_others_know_long_after_is_out_of_reach(neighbours):
-    neighbours.named((7, 3), 161.0)
+    neighbours.note_known_elsewhere((7, 3), 161.0)
     assert neighbours.out_of_reach() == {3}
 
 
 def test_one_that_others_still_name_at_first_may_be_dead(neighbours):
-    neighbours.named((3,), 159.0)
+    neighbours.note_known_elsewhere((3,), 159.0)
     assert neighbours.out_of_reach() == set()
 
 
 def test_it_is_no_longer_out_of_reach_once_it_is_heard(neighbours):
-    neighbours.named((3,), 161.0)
+    neighbours.note_known_elsewhere((3,), 161.0)
     neighbours.heard(3, 162.0)
     assert neighbours.out_of_reach() == set()
 
 
 @pytest.mark.parametrize("leaves", [Neighbours.forget_all, lambda known: known.takes_off(True)])
 def test_after_a_flight_all_links_are_new(neighbours, leaves):
-    neighbours.named((3,), 161.0)
+    neighbours.note_known_elsewhere((3,), 161.0)
     leaves(neighbours)
-    neighbours.named((3,), 200.0)
+    neighbours.note_known_elsewhere((3,), 200.0)
     assert neighbours.out_of_reach() == set()
 
 
