@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 from typing import Callable
 
@@ -10,6 +11,7 @@ Main = Callable[[], int]
 
 def run_with_extra(program: str, extra: str, load: Callable[[], Main]) -> int:
     """Run what `load` imports; the exit status, 1 if a package is missing."""
+    before = signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C leaves no traceback
     try:
         main = load()
     except ImportError as error:
@@ -18,4 +20,6 @@ def run_with_extra(program: str, extra: str, load: Callable[[], Main]) -> int:
             file=sys.stderr,
         )
         return 1
+    finally:
+        signal.signal(signal.SIGINT, before)
     return main()

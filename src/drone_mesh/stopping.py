@@ -80,12 +80,14 @@ def ends_as(program: str, failed: int = 1) -> Callable[[Main], Main]:
     """Decorates `main` of a program, which returns its exit status.
 
     A MeshError becomes one line, and the status `failed`. The program ends quietly on Ctrl-C, and
-    when the reader of its output has ended.
+    when the reader of its output has ended. During its imports, SIGINT may have ended it at once.
     """
 
     def decorate(main: Main) -> Main:
         @functools.wraps(main)
         def ending_main(*args: Any, **kwargs: Any) -> int:
+            if signal.getsignal(signal.SIGINT) is signal.SIG_DFL:
+                signal.signal(signal.SIGINT, signal.default_int_handler)
             try:
                 try:
                     return main(*args, **kwargs)

@@ -36,6 +36,17 @@ def test_a_lasso_selects_the_drones_inside(page):
     assert count(page) == "2 drones: 13, 14"
 
 
+def test_a_lasso_takes_no_gateway(page):
+    page.page.keyboard.press("l")
+    corners = [(-1.8, -1.0), (-1.8, 12.8), (31.0, 12.8), (31.0, -1.0)]
+    page.page.mouse.move(*on_screen(page, *corners[0]))
+    page.page.mouse.down()
+    for corner in corners[1:]:
+        page.page.mouse.move(*on_screen(page, *corner), steps=3)
+    page.page.mouse.up()
+    page.wait_for("all routers", lambda: count(page).startswith("17 drones: 1, 2, 3"))
+
+
 def test_a_rule_or_a_named_group_selects_drones(page):
     page.page.select_option("#rule", "rule all routers")
     page.wait_for("all", lambda: count(page).startswith("17 drones: 1, 2, 3"))

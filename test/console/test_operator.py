@@ -85,6 +85,40 @@ def test_a_held_layout_says_who_would_be_out_of_reach(start_console, visit):
     page.wait_for("who", lambda: page.page.inner_text("#held-text").startswith(words))
 
 
+def test_all_places_of_a_held_layout_come_into_view_although_the_user_has_moved_the_map(page):
+    for _ in range(4):
+        page.page.click("#zoom-in")
+    page.page.select_option("#layout", "100")
+    page.page.click("#layout-form button")
+    page.page.wait_for_selector("#held:visible")
+    canvas = page.page.locator("#map").bounding_box()
+    tools = page.page.locator("#map-top").bounding_box()
+    assert canvas is not None
+    assert tools is not None
+
+    def in_view(x: float, y: float) -> bool:
+        px, py = on_screen(page, x, y)
+        across = canvas["x"] < px < canvas["x"] + canvas["width"]
+        return across and tools["y"] + tools["height"] < py < canvas["y"] + canvas["height"]
+
+    corners = [(5.0, 0.0), (5.0, 45.0), (10.0, 30.0)]  # of the goals of 1 to 17
+    page.wait_for("all of it in view", lambda: all(in_view(*corner) for corner in corners))
+
+
+def test_a_drone_is_sent_from_where_it_is_and_not_from_where_it_was_selected(page):
+    page.page.click("#nodes tr[data-id='17']")
+    page.page.fill("#fly-y", "11")
+    page.answer_held("#held-now")
+    drag(page, 17, *FAR_FROM_17)
+    page.page.select_option("#speed", "10")
+    shown = page.page.locator("#fly-x")
+    page.wait_for("its goal", lambda: abs(float(shown.input_value()) - FAR_FROM_17[0]) < 0.3)
+    assert page.page.input_value("#fly-y") == "11"  # what was typed stays
+    page.answer_held("#held-undo")
+    page.page.press("#fly-y", "Enter")
+    assert page.wait_for_held() == f"Drone 17 will leave to {shown.input_value()}, 11"
+
+
 def test_power_and_speed_are_restored_from_the_toast(page):
     page.page.click("#nodes tr[data-id='5']")
     page.undo_next()

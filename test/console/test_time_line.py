@@ -88,6 +88,7 @@ def test_the_whole_of_a_recording_can_be_viewed_while_it_is_played(start_console
     page.wait_for_drones(18)
     page.wait_for("the badge", lambda: page.page.is_visible("#badge"))
     assert page.page.title() == "run.bag: recording"
+    assert "Drag" not in page.page.inner_text("#node-none")
     page.page.click("#nodes tr[data-id='5']")
     for order in ORDERS:
         assert not page.page.is_visible(order)

@@ -41,6 +41,8 @@ class AlarmBook:
     def update(self, mesh: MeshStatus) -> None:
         """Compare with a state of the mesh: alarms begin and end."""
         now: set[tuple[int, str]] = set()
+        switched_off = {node.id for node in mesh.nodes if not node.on and node.battery != 0.0}
+        self._was_connected -= switched_off
         for node in mesh.nodes:
             now.update((node.id, text) for text in self._troubles(node))
             if node.connected:
@@ -50,7 +52,11 @@ class AlarmBook:
             if key not in self._alarms or self._alarms[key].until_s < math.inf:
                 self._alarms[key] = Alarm(*key, since_s=mesh.stamp_s)
         for key, alarm in list(self._alarms.items()):
-            if key not in now and not (_of_order(alarm.text) and alarm.node in ids):
+            if key in now or (_of_order(alarm.text) and alarm.node in ids):
+                continue
+            if alarm.node in switched_off:
+                del self._alarms[key]  # whoever did that knows that it has no gateway
+            else:
                 self._end(key, mesh.stamp_s)
 
     def on_events(self, events: Iterable[EventRecord]) -> None:

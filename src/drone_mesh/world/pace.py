@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 CATCH_UP_S = 0.5  # a delay up to this is caught up; the rest of a longer one is lost
+MEASURED_OVER_S = 10.0  # wall; a shorter time says little about a machine that is busy now and then
 
 
 class Pace:
@@ -13,11 +14,23 @@ class Pace:
         self.factor = factor
         self._simulated_s = self._wall_s = 0.0
         self._started = False
+        self._measured_from: tuple[float, float] | None = None  # simulated, wall
 
     def restart(self, factor: float) -> None:
         """Continue at this factor from now on; earlier delays are not caught up."""
         self.factor = factor
         self._started = False
+        self._measured_from = None
+
+    def achieved(self, simulated_s: float, wall_s: float) -> float | None:
+        """The factor since this last returned one, or since the restart; None: not long enough."""
+        if self._measured_from is None:
+            self._measured_from = simulated_s, wall_s
+        from_simulated_s, from_wall_s = self._measured_from
+        if wall_s - from_wall_s < MEASURED_OVER_S:
+            return None
+        self._measured_from = simulated_s, wall_s
+        return (simulated_s - from_simulated_s) / (wall_s - from_wall_s)
 
     def wait_s(self, simulated_s: float, wall_s: float) -> float:
         """Wall seconds until the step after `simulated_s` is due; 0: now."""

@@ -50,6 +50,24 @@ def test_an_alarm_that_is_over_stays_until_it_is_acknowledged():
     assert said(book) == []
 
 
+def test_a_node_that_was_switched_off_leaves_no_alarm_that_it_lost_its_gateway_before_or_after():
+    book = AlarmBook()
+    book.update(state(1.0, well(1), well(2)))
+    book.update(state(2.0, lost(1), well(2)))
+    book.update(state(3.0, NodeStatus(1, on=False), NodeStatus(2, on=False)))
+    assert said(book) == []
+    book.update(state(4.0, lost(1), lost(2)))  # on again, they look for a gateway
+    assert said(book) == []
+
+
+def test_a_node_whose_battery_is_empty_was_not_switched_off():
+    book = AlarmBook()
+    book.update(state(1.0, well(1)))
+    book.update(state(2.0, lost(1)))
+    book.update(state(3.0, NodeStatus(1, on=False, battery=0.0)))
+    assert ("lost the gateway", [1], True, False) in said(book)
+
+
 def test_an_acknowledged_alarm_stays_until_it_is_over_and_comes_back_as_new():
     book = AlarmBook()
     book.update(state(1.0, well(1, battery=12.0)))

@@ -46,3 +46,15 @@ def test_a_new_factor_counts_from_where_it_was_set():
     wall_s = run(pace, 0.0, 0.0, until_s=1.0) + 60.0
     pace.restart(2.0)
     assert run(pace, 1.0, wall_s, until_s=3.0) == pytest.approx(wall_s + 1.0, abs=0.02)
+
+
+def test_the_factor_is_measured_at_one_speed_for_long_enough():
+    pace = Pace(1.0)
+    assert pace.achieved(0.0, 100.0) is None
+    assert pace.achieved(9.0, 109.0) is None
+    pace.restart(5.0)  # what was before does not count
+    assert pace.achieved(10.0, 110.0) is None
+    assert pace.achieved(55.0, 119.0) is None
+    assert pace.achieved(58.0, 120.0) == 4.8
+    assert pace.achieved(63.0, 121.0) is None
+    assert pace.achieved(108.0, 130.0) == 5.0

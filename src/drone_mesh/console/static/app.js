@@ -11,7 +11,7 @@ import { Flights, names } from "./flights.js";
 import { EventLog } from "./log.js";
 import { keepFocus } from "./focus.js";
 import { MapView } from "./map.js";
-import { Mesh } from "./mesh.js";
+import { goalOf, Mesh } from "./mesh.js";
 import { Missions } from "./missions.js";
 import { PacketDots } from "./packets.js";
 import { NodePanel } from "./panel.js";
@@ -84,16 +84,13 @@ const flights = new Flights(mesh, (request) => connection.order(request), toast)
 /** The height of a drone's goal, or of the drone itself if it does not fly, in whole metres. */
 function heightOf(id) {
   const node = mesh.nodes.get(id);
-  return Math.round(node?.path.length ? node.path.at(-1) : (node?.position?.[2] ?? 0));
+  return Math.round((node && goalOf(node)?.[2]) ?? 0);
 }
 
 const map = new MapView(mesh, byId("map-card"), (moves) =>
   flights.hold(moves.map((move) => ({ ...move, z: heightOf(move.id) }))),
 );
-flights.addEventListener("change", () => {
-  map.held = flights.held;
-  map.redraw();
-});
+flights.addEventListener("change", () => map.showHeld(flights.held));
 const table = new NodeTable(mesh, byId("nodes"), byId("filter"), byId("only-problems"));
 const panel = new NodePanel(
   mesh,
@@ -314,16 +311,18 @@ async function switchGroup(on, button) {
   button.disabled = false;
 }
 
+/** The farthest from a gateway goes off first, so that those that wait keep their routes. */
 async function switchAll(ids, on, canUndo = true) {
   const [changed, failed] = [[], []];
-  for (const id of ids) {
+  const hops = (id) => mesh.nodes.get(id)?.hops ?? 0;
+  for (const id of on ? ids : ids.sort((a, b) => hops(b) - hops(a))) {
     const was = mesh.nodes.get(id)?.on;
     await connection
       .order({ do: "power", node: id, on })
       .then(() => was !== on && changed.push(id))
       .catch((error) => failed.push(error.message));
   }
-  const undo = canUndo && changed.length && (() => switchAll(changed, !on, false));
+  const undo = canUndo && changed.length && (() => switchAll(changed.reverse(), !on, false));
   const done = ids.length - failed.length;
   if (failed.length) toast(failed[0], true);
   if (done) toast(`${done} nodes are ${on ? "on" : "off"}`, false, undo);

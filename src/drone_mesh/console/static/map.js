@@ -134,6 +134,14 @@ export class MapView {
     this.redraw();
   }
 
+  /** Shows where these drones [{id, x, y}], which are about to leave, will fly; all of it comes into view. */
+  showHeld(moves) {
+    this.held = moves;
+    if (!moves.every(({ x, y }) => this.#inView([x, y], OUT_OF_VIEW_PX)))
+      this.camera.fit(this.#points(), this.#covered());
+    this.redraw();
+  }
+
   /** Shows where these drones [{id, x, y}] would fly. */
   showMoves(moves) {
     this.shownMoves = moves;
@@ -147,10 +155,14 @@ export class MapView {
     this.redraw();
   }
 
+  /** Selects the routers inside the lasso. A gateway, on which the mesh hangs, is only selected by itself. */
   #catch() {
     const radius = droneRadius(this.camera, this.mesh);
     const caught = [...this.mesh.nodes.values()].filter(
-      (node) => node.position && isInside(onScreen(this.camera, node, radius), this.lasso),
+      (node) =>
+        node.role === 0 &&
+        node.position &&
+        isInside(onScreen(this.camera, node, radius), this.lasso),
     );
     this.mesh.selectGroup(caught.map((node) => node.id));
     this.lasso = [];
@@ -178,7 +190,7 @@ export class MapView {
       const shown = nodes.filter((node) => cast.has(node.id) && node.role === 1 && node.position);
       return [...places, ...shown.map((node) => node.position)];
     }
-    const planned = this.shownMoves.map(({ x, y }) => [x, y]);
+    const planned = [...this.held, ...this.shownMoves].map(({ x, y }) => [x, y]);
     const present = nodes.flatMap((node) => [
       ...(node.position ? [node.position] : []),
       ...(node.path.length ? [node.path.slice(-3)] : []),
@@ -390,8 +402,10 @@ export class MapView {
     if (Math.hypot(event.offsetX - pointer.startX, event.offsetY - pointer.startY) > DRAG_AFTER_PX)
       pointer.moved = true;
     if (this.pointers.size > 1) this.#pinch(pointer, event);
-    else if (pointer.moved && this.lasso) this.lasso.push([event.offsetX, event.offsetY]);
-    else if (pointer.moved && pointer.mayDrag) {
+    else if (pointer.moved && this.lasso) {
+      if (!this.lasso.length) this.lasso.push([pointer.startX, pointer.startY]);
+      this.lasso.push([event.offsetX, event.offsetY]);
+    } else if (pointer.moved && pointer.mayDrag) {
       const [x, y] = this.camera.toWorld(event.offsetX, event.offsetY);
       this.drag = { id: pointer.node, x, y };
       this.mesh.select(pointer.node);

@@ -190,6 +190,11 @@ export class Mesh extends EventTarget {
   }
 }
 
+/** Where a drone flies to, or where it is, [x, y, z] in metres; null: unknown. */
+export function goalOf({ path, position }) {
+  return path.length ? path.slice(-3) : position;
+}
+
 /** A number as text; 255 means unknown. */
 export function orDash(value) {
   return value === UNKNOWN || value === undefined ? "–" : String(value);

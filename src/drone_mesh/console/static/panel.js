@@ -2,7 +2,7 @@
 
 import { arrowKeys } from "./arrows.js";
 import { inDegrees, toEarth, toFrame } from "./earth.js";
-import { orDash, UNKNOWN } from "./mesh.js";
+import { goalOf, orDash, UNKNOWN } from "./mesh.js";
 import { typedNumber } from "./numbers.js";
 
 export class NodePanel {
@@ -11,15 +11,19 @@ export class NodePanel {
     this.mesh = mesh;
     this.power = power;
     this.fly = fly;
+    this.typed = new Set(); // fields of the goal that the user filled in
+    this.sentFrom = null; // the place in the other fields when the goal was sent
     for (const what of ["frame", "select", "detail"])
       mesh.addEventListener(what, () => this.#show());
-    mesh.addEventListener("select", () => this.#fillGoal());
+    mesh.addEventListener("select", () => this.#emptyGoal());
+    mesh.addEventListener("frame", () => this.#fillGoal());
     byId("power").addEventListener("click", () => this.switchPower());
     byId("node-close").addEventListener("click", () => mesh.select(null));
     byId("fly-form").addEventListener("submit", (event) => this.#send(event));
+    byId("fly-form").addEventListener("input", (event) => this.typed.add(event.target));
     byId("degrees").addEventListener("change", () => {
       this.#show();
-      this.#fillGoal();
+      this.#emptyGoal();
     });
   }
 
@@ -144,22 +148,39 @@ export class NodePanel {
     return box;
   }
 
-  #fillGoal() {
-    const node = this.mesh.nodes.get(this.mesh.selected);
-    const goal = node?.path.length ? node.path.slice(-3) : node?.position;
+  #emptyGoal() {
+    this.typed.clear();
+    this.sentFrom = null;
     setText(byId("fly-error"), "");
-    const origin = this.#origin;
-    byId("fly-form").toggleAttribute("data-degrees", Boolean(origin));
-    const names = origin ? ["latitude", "longitude"] : ["x", "y"];
+    const names = this.#origin ? ["latitude", "longitude"] : ["x", "y"];
+    byId("fly-form").toggleAttribute("data-degrees", Boolean(this.#origin));
     names.forEach((name, index) =>
       setText(byId(`fly-${"xy"[index]}`).previousElementSibling, name),
     );
+    for (const input of byId("fly-form").querySelectorAll("input"))
+      input.removeAttribute("aria-invalid");
+    this.#fillGoal();
+  }
+
+  /** The fields that nobody typed in show where the drone is now, or where it flies to. */
+  #fillGoal() {
+    const node = this.mesh.nodes.get(this.mesh.selected);
+    const goal = node && goalOf(node);
+    const place = String(goal);
+    if (this.sentFrom !== null && place !== this.sentFrom) {
+      this.typed.clear(); // it flies
+      this.sentFrom = null;
+    }
+    const origin = this.#origin;
     const texts = origin
       ? toEarth(origin, ...(goal ?? [0, 0])).map((angle) => angle.toFixed(6))
       : goal?.slice(0, 2).map((value) => String(Number(value.toFixed(1))));
     ["x", "y", "z"].forEach((axis, index) => {
-      byId(`fly-${axis}`).removeAttribute("aria-invalid");
-      byId(`fly-${axis}`).value = goal ? (texts[index] ?? String(Math.round(goal[index]))) : "";
+      const input = byId(`fly-${axis}`);
+      const text = goal ? (texts[index] ?? String(Math.round(goal[index]))) : "";
+      if (this.typed.has(input) || input.value === text) return;
+      input.value = text;
+      if (document.activeElement === input) input.select(); // what is typed next replaces it
     });
   }
 
@@ -182,7 +203,11 @@ export class NodePanel {
     const farText = `more than ${coordinate} m east or north of the origin, west or south of it`;
     setText(byId("fly-error"), wrong?.error ?? (far ? farText : ""));
     if (wrong || far) (wrong?.input ?? x).select();
-    else this.fly(this.mesh.selected, ...place, z);
+    else {
+      const node = this.mesh.nodes.get(this.mesh.selected);
+      this.sentFrom = String(goalOf(node));
+      this.fly(node.id, ...place, z);
+    }
   }
 }
 

@@ -28,7 +28,6 @@ from drone_mesh.world.pace import Pace
 # Wall: the kernel buffers minutes of /clock for a subscriber before a send blocks.
 STUCK_SUBSCRIBER_S = 0.02
 _MEASURE_PERIOD_S = 1.0  # wall
-_LOG_PERIOD_S = 10.0  # wall
 _TOO_SLOW = 0.95  # of the requested factor
 _NAP_S = 0.001  # wall; while the mesh processes what is due
 _TASK_POLL_S = 0.2  # wall; how soon a waiting caller notices the end of the simulation
@@ -86,16 +85,13 @@ class WorldRunner:
         """Step until `is_over` returns True."""
         pace = Pace(self.wanted_factor)
         measured_s = self._world.now_s, time.monotonic()
-        logged_s = measured_s
         try:
             while not is_over():
                 self._run_tasks()
                 self._step_when_due(pace)
                 if time.monotonic() - measured_s[1] >= _MEASURE_PERIOD_S:
                     measured_s = self._measure(measured_s)
-                    if measured_s[1] - logged_s[1] >= _LOG_PERIOD_S:
-                        self._log_factor(logged_s, measured_s)
-                        logged_s = measured_s
+                    self._log_factor(pace, *measured_s)
         finally:
             self._over.set()
 
@@ -132,14 +128,14 @@ class WorldRunner:
         self._factor.publish((now_s[0] - before_s[0]) / (now_s[1] - before_s[1]))
         return now_s
 
-    def _log_factor(self, before_s: tuple[float, float], now_s: tuple[float, float]) -> None:
-        achieved = (now_s[0] - before_s[0]) / (now_s[1] - before_s[1])
-        if self.paused:
+    def _log_factor(self, pace: Pace, simulated_s: float, wall_s: float) -> None:
+        achieved = pace.achieved(simulated_s, wall_s)
+        if achieved is None:
             return
-        if self.wanted_factor == 0.0:
+        if pace.factor == 0.0:
             _log.info("real-time factor %.1f", achieved)
-        elif achieved < _TOO_SLOW * self.wanted_factor:
-            _log.warning("real-time factor %.2f instead of %g", achieved, self.wanted_factor)
+        elif achieved < _TOO_SLOW * pace.factor:
+            _log.warning("real-time factor %.2f instead of %g", achieved, pace.factor)
 
     def _set_speed(self, request: SetSpeedRequest) -> SetSpeedResponse:
         factor = request.real_time_factor
