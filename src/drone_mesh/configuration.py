@@ -6,18 +6,15 @@ import difflib
 import logging
 import random
 import reprlib
+from dataclasses import MISSING
 from pathlib import Path
 from typing import Any, Literal, Mapping, get_args
 
-from pydantic import AfterValidator, ConfigDict, Field, ValidationError, field_validator
+from pydantic import ConfigDict, ValidationError, field_validator
 from pydantic.dataclasses import dataclass
-from pydantic.fields import FieldInfo
-from typing_extensions import Annotated
 
-from drone_mesh.air.reach import MAX_DISTANCE_M
-from drone_mesh.communication.node.named_techniques import DEFAULT_ROUTING
-from drone_mesh.communication.repair.options import CLEARANCE_M, DEFAULT_REPAIR
-from drone_mesh.communication.timing.mesh_timing import MIN_REPORT_PERIOD_S, MeshTiming
+from drone_mesh.communication.node.node_configuration import NodeConfiguration
+from drone_mesh.communication.repair.options import RANGE_M
 from drone_mesh.drone.fleet import (
     DEFAULT_GRIDSIZE,
     DEFAULT_ROUTERS,
@@ -26,6 +23,8 @@ from drone_mesh.drone.fleet import (
 )
 from drone_mesh.drone.goal import MAX_HEIGHT_M
 from drone_mesh.errors import ConfigurationError
+from drone_mesh.nrf24.settings import DEFAULT_RATE
+from drone_mesh.settings import Setting, setting, settings_of, with_settings
 from drone_mesh.yaml_file import read_mapping
 
 MIN_REAL_TIME_FACTOR = 0.001  # one step of the world in 10 s
@@ -33,99 +32,211 @@ MAX_REAL_TIME_FACTOR = 1000.0  # above it the steps of the clock are too large
 MAX_SEED = 2**32 - 1
 RANDOM_SEED = "random"  # requests a new seed although the file has a fixed one
 
+# The world decides the range. How often a packet is tried is for experiments.
+_NOT_OF_A_SIMULATION = ("range_m", "send_attempts")
+_NODE = {
+    one.key: one for one in settings_of(NodeConfiguration()) if one.name not in _NOT_OF_A_SIMULATION
+}
+
 _log = logging.getLogger(__name__)
 
 
-def _zero_or(lowest: float, highest: float) -> AfterValidator:
-    def check(value: float) -> float:
-        if value != 0 and not lowest <= value <= highest:
-            raise ValueError("out of bounds")
-        return value
+def type_of(declared: Setting) -> Any:
+    """The type of a setting for pydantic. The words of an Enum are their text."""
+    return Literal[declared.words] if declared.words else type(declared.default)
 
-    return AfterValidator(check)
+
+def default_of(declared: Setting) -> Any:
+    """The default of a setting, in that type."""
+    return declared.default.value if declared.words else declared.default
+
+
+def _with_settings_of_a_node(cls: type) -> type:
+    """Declare the settings of a node as well."""
+    for key, one in _NODE.items():
+        cls.__annotations__[key] = type_of(one)
+        setattr(cls, key, default_of(one))
+    return cls
 
 
 @dataclass(frozen=True, config=ConfigDict(extra="forbid", str_strip_whitespace=True))
+@_with_settings_of_a_node
 class FactoryConfiguration:
-    """Every setting of a simulation; config/factory.yaml documents the same defaults.
+    """Every setting of a simulation, with those of NodeConfiguration.
 
-    Values may have their own type or be text ("3", "true"), as launch arguments are. Error messages
-    quote the descriptions.
+    Values may have their own type or be text ("3", "true"), as launch arguments are.
     """
 
-    # Seeds everything random; load_configuration chooses one if none is given.
-    seed: int = Field(ge=0, le=MAX_SEED, description="a whole number")
-    gateways: int = Field(1, ge=0, le=MAX_DRONES, description="a whole number of drones")
-    routers: int = Field(
-        DEFAULT_ROUTERS, ge=0, le=MAX_DRONES, description="a whole number of drones"
+    seed: int = setting(
+        MISSING,  # load_configuration chooses one
+        "seed of all random choices; random: a new seed, which the log shows",
+        "a whole number",
+        least=0,
+        most=MAX_SEED,
     )
-    gridsize: int = Field(
-        DEFAULT_GRIDSIZE, ge=1, le=MAX_DRONES, description="a whole number of routers in a row"
+    gateways: int = setting(
+        1,
+        "number of gateways; they start at x = -1 m, 1 m apart along y",
+        "a whole number of drones",
+        least=0,
+        most=MAX_DRONES,
     )
-    spacing: float = Field(
-        DEFAULT_SPACING_M, gt=0, le=1000, description="metres"
-    )  # between routers
-    gui: bool = Field(False)
-    drones: Literal["builtin", "external"] = Field("builtin")  # external: other nodes fly them
-    flight: Literal["kinematic", "dynamic"] = Field("kinematic")  # dynamic: physics moves drones
-    wind_x: float = Field(0.0, ge=-20, le=20, description="metres per second")
-    wind_y: float = Field(0.0, ge=-20, le=20, description="metres per second")
-    cruise_height: float = Field(
-        MAX_HEIGHT_M, gt=0, le=MAX_HEIGHT_M, description="metres"
-    )  # ceiling of ordered flights
-    missions: str = Field("", description="the absolute path of a file of missions, or empty")
+    routers: int = setting(
+        DEFAULT_ROUTERS,
+        f"number of routers; at most {MAX_DRONES} drones in total",
+        "a whole number of drones",
+        least=0,
+        most=MAX_DRONES,
+    )
+    gridsize: int = setting(
+        DEFAULT_GRIDSIZE,
+        "number of routers in a row of the start grid, along x from (0, 0)",
+        "a whole number of routers in a row",
+        least=1,
+        most=MAX_DRONES,
+    )
+    spacing: float = setting(
+        DEFAULT_SPACING_M,
+        "metres between routers in the start grid",
+        "metres",
+        above=0,
+        most=1000.0,
+    )
+    gui: bool = setting(
+        False, "true or false: whether to open a window on the world (needs a screen)"
+    )
+    drones: Literal["builtin", "external"] = setting(
+        "builtin",
+        "builtin: the world flies the drones; external: other nodes fly them "
+        "(docs/flying.md, Other engines)",
+    )
+    flight: Literal["kinematic", "dynamic"] = setting(
+        "kinematic",
+        "kinematic: drones follow their path exactly; dynamic: physics moves them, with mass, "
+        "drag, battery and collisions",
+    )
+    wind_x: float = setting(
+        0.0,
+        "wind along x in metres per second, with flight dynamic",
+        "metres per second",
+        least=-20.0,
+        most=20.0,
+    )
+    wind_y: float = setting(
+        0.0,
+        "wind along y in metres per second, with flight dynamic",
+        "metres per second",
+        least=-20.0,
+        most=20.0,
+    )
+    cruise_height: float = setting(
+        MAX_HEIGHT_M,
+        "ceiling of ordered flights in metres",
+        "metres",
+        above=0,
+        most=MAX_HEIGHT_M,
+    )
+    missions: str = setting(
+        "",
+        "absolute path of a YAML file of missions, which pilots fly; the mesh is not told "
+        "(docs/motion.md)",
+        "the absolute path of a file of missions, or empty",
+    )
     mobility: Literal[
         "none", "random_waypoint", "gauss_markov", "group", "patrol", "oval", "eight"
-    ] = Field("none")  # how pilots fly the routers
-    speed: float = Field(0.3, gt=0, le=20, description="metres per second")  # of mobility
-    shape: Literal["quadrocopter", "box"] = Field("quadrocopter")  # how drones are drawn
-    real_time_factor: Annotated[float, _zero_or(MIN_REAL_TIME_FACTOR, MAX_REAL_TIME_FACTOR)] = (
-        Field(
-            1.0,
-            description=(
-                f"a factor, {MIN_REAL_TIME_FACTOR:g}..{MAX_REAL_TIME_FACTOR:g}, "
-                "or 0 for as fast as possible"
-            ),
-        )
+    ] = setting(
+        "none",
+        "none, random_waypoint, gauss_markov, group, patrol, oval or eight: how pilots fly the "
+        "routers",
     )
-    max_distance: float = Field(MAX_DISTANCE_M, gt=0, le=10_000, description="metres")
-    obstacles: str = Field("", description="the absolute path of a file of boxes, or empty")
-    # block: a box between two nodes ends their link; wall: it attenuates, by its material
-    obstacle_radio: Literal["block", "wall"] = Field("block")
-    radio: Literal["virtual", "nrf24"] = Field("virtual")  # nrf24: the driver on emulated chips
-    data_rate: Literal["250k", "1M", "2M"] = Field("250k")  # of the channel, with radio nrf24
-    # http: gateways also take HTTP orders; mqtt: users' data goes to a broker
-    internet: Literal["mock", "http", "mqtt"] = Field("mock")
-    broker: str = Field("mqtt://127.0.0.1/simulation", min_length=1, description="mqtt://HOST/MESH")
-    key: str = Field("", description="the name of a key file")  # empty: nothing is sealed
-    routing: str = Field(
-        DEFAULT_ROUTING, min_length=1, description="the name of a routing technique"
+    speed: float = setting(
+        0.3, "metres per second of mobility", "metres per second", above=0, most=20.0
     )
-    repair: str = Field(DEFAULT_REPAIR, min_length=1, description="the name of a repair strategy")
-    clearance: float = Field(CLEARANCE_M, gt=0, le=100, description="metres")  # between drones
-    # where a repair ends if a silent drone may still be at the place; see LostPlace
-    lost_place: Literal["beside", "above", "below", "exact"] = Field("beside")
-    check_period: float = Field(MeshTiming.check_period_s, ge=0.1, le=3600, description="seconds")
-    connection_lost_after: Annotated[float, _zero_or(0.1, 3600)] = Field(
-        MeshTiming.connection_lost_after_s,
-        description="seconds, 0.1..3600, or 0 for those of the routing technique",
+    shape: Literal["quadrocopter", "box"] = setting(
+        "quadrocopter",
+        "quadrocopter or box: how the window, snapshots, rviz and the page draw a drone",
     )
-    report_period: Annotated[float, _zero_or(MIN_REPORT_PERIOD_S, 3600)] = Field(
-        MeshTiming.report_period_s,
-        description=f"seconds, {MIN_REPORT_PERIOD_S:g}..3600, or 0 for no reports",
+    real_time_factor: float = setting(
+        1.0,
+        "simulated seconds per wall second",
+        "a factor",
+        least=MIN_REAL_TIME_FACTOR,
+        most=MAX_REAL_TIME_FACTOR,
+        zero="as fast as possible",
     )
-    debug: bool = Field(True)
+    max_distance: float = setting(
+        RANGE_M,
+        "range of the radio in metres: nodes closer than this hear each other",
+        "metres",
+        above=0,
+        most=10_000.0,
+    )
+    obstacles: str = setting(
+        "",
+        "absolute path of a YAML file of boxes to place in the world; they block or attenuate the "
+        "radio, and drones fly over or round them",
+        "the absolute path of a file of boxes, or empty",
+    )
+    obstacle_radio: Literal["block", "wall"] = setting(
+        "block",
+        "block: a box between two nodes ends their link; wall: it attenuates the link, depending "
+        "on its material",
+    )
+    radio: Literal["virtual", "nrf24"] = setting(
+        "virtual",
+        "virtual: an ideal disc; nrf24: the real driver on an emulated nRF24L01+ chip per drone",
+    )
+    data_rate: Literal["250k", "1M", "2M"] = setting(
+        DEFAULT_RATE, "250k, 1M or 2M: bits per second of the channel, with radio nrf24"
+    )
+    internet: Literal["mock", "http", "mqtt"] = setting(
+        "mock",
+        "mock: gateways take orders from the DroneManager; http: also over HTTP, gateway G on "
+        "127.0.0.1, port 9080 + G; mqtt: users' data also goes to the broker",
+    )
+    broker: str = setting(
+        "mqtt://127.0.0.1/simulation",
+        "with internet mqtt: mqtt://HOST/MESH or mqtts://USER@HOST:PORT/MESH",
+        "mqtt://HOST/MESH",
+    )
+    key: str = setting(
+        "",
+        "absolute path of a file with a mesh key (raspberry_key new makes one), which seals all "
+        "packets",
+        "the name of a key file",
+    )
+    debug: bool = setting(
+        True,
+        "true or false: whether each node publishes /Nodes/ID/debug once per simulated second",
+    )
 
     @field_validator("*", mode="before")
     @classmethod
     def _not_a_switch_for_a_number(cls, value: object, info: Any) -> object:
-        if isinstance(value, bool) and info.field_name not in _SWITCHES:
+        if isinstance(value, bool) and not isinstance(SETTINGS[info.field_name].default, bool):
             raise ValueError("true and false are not numbers")
         return value
 
+    @field_validator("*")
+    @classmethod
+    def _is_allowed(cls, value: object, info: Any) -> object:
+        declared = SETTINGS[info.field_name]
+        if not declared.allows(value) or (value == "" and declared.default):
+            raise ValueError("out of bounds")
+        return value
 
-_SWITCHES = ("gui", "debug")
-_FIELDS: Mapping[str, FieldInfo] = vars(FactoryConfiguration)["__pydantic_fields__"]
+    @property
+    def node(self) -> NodeConfiguration:
+        """The configuration of each node."""
+        values = {one.name: getattr(self, key) for key, one in _NODE.items()}
+        return with_settings(NodeConfiguration, {**values, "range_m": self.max_distance})
+
+
+SETTINGS: dict[str, Setting] = {
+    **{one.name: one for one in settings_of(FactoryConfiguration)},
+    **_NODE,
+}
+"""By key, in the order of the file."""
 
 
 def load_configuration(
@@ -152,7 +263,7 @@ def load_configuration(
         return "argument" if name in given else file.where(name)
 
     for name in values:
-        if name not in _FIELDS:
+        if name not in SETTINGS:
             raise ConfigurationError(f"{where(name)}: unknown key {name}; {_hint(name)}")
     try:
         configuration = FactoryConfiguration(**values)
@@ -167,28 +278,15 @@ def load_configuration(
 
 
 def _hint(name: object) -> str:
-    close = difflib.get_close_matches(str(name), _FIELDS, n=1)
-    return f"did you mean {close[0]}?" if close else f"known are {', '.join(sorted(_FIELDS))}"
+    close = difflib.get_close_matches(str(name), SETTINGS, n=1)
+    return f"did you mean {close[0]}?" if close else f"known are {', '.join(sorted(SETTINGS))}"
 
 
 def _allowed(name: str) -> str:
     """The allowed values of a key, as text."""
-    field = _FIELDS[name]
-    if name in _SWITCHES:
+    if isinstance(SETTINGS[name].default, bool):
         return "true or false"
-    words = get_args(field.annotation)
+    words = get_args(vars(FactoryConfiguration)["__pydantic_fields__"][name].annotation)
     if words:
         return " or ".join(words)
-    text = field.description or ""
-    lowest, above, highest = (_bound(field, kind) for kind in ("ge", "gt", "le"))
-    if lowest is not None and highest is not None:
-        text += f", {lowest:.10g}..{highest:.10g}"
-    elif above is not None and highest is not None:
-        text += f", above {above:g}, at most {highest:g}"
-    return text + (f", or {RANDOM_SEED}" if name == "seed" else "")
-
-
-def _bound(field: FieldInfo, kind: str) -> float | None:
-    """The limit of this kind ("ge", "gt", "le") that the field was declared with."""
-    limits = (getattr(limit, kind, None) for limit in field.metadata)
-    return next((limit for limit in limits if limit is not None), None)
+    return SETTINGS[name].expected + (f", or {RANDOM_SEED}" if name == "seed" else "")

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import logging
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -12,7 +14,8 @@ import yaml
 from drone_mesh.configuration import FactoryConfiguration, load_configuration
 from drone_mesh.errors import ConfigurationError
 
-SHIPPED = Path(__file__).parents[2] / "config" / "factory.yaml"
+ROOT = Path(__file__).resolve().parents[2]
+SHIPPED = ROOT / "config" / "factory.yaml"
 
 
 @pytest.fixture
@@ -44,6 +47,16 @@ def test_the_shipped_file_holds_the_documented_numbers():
         report_period=0.0,
         debug=True,
     )
+
+
+def test_the_shipped_file_and_the_launch_file_say_what_is_declared():
+    check = subprocess.run(
+        [sys.executable, str(ROOT / "scripts" / "settings"), "--check"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert check.returncode == 0, check.stderr
 
 
 def test_the_shipped_file_names_every_key_with_a_comment_that_explains_it():

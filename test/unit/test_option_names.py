@@ -10,6 +10,8 @@ from typing import Iterator
 
 import pytest
 
+from drone_mesh.raspberry.options import NODE_SETTINGS
+
 ROOT = Path(__file__).resolve().parents[2]
 SOURCE, LAUNCH = ROOT / "src" / "drone_mesh", ROOT / "launch"
 KINDS = (".py", ".test", ".launch")
@@ -33,6 +35,11 @@ def options() -> Iterator[tuple[str, list[str]]]:
                     yield f"{path.relative_to(ROOT)}: {names[-1]}", names
 
 
+def settings() -> Iterator[tuple[str, list[str]]]:
+    for one in NODE_SETTINGS:
+        yield f"setting {one.name}", [f"--{one.key.replace('_', '-')}"]
+
+
 def launch_arguments() -> Iterator[tuple[str, str]]:
     for path in sorted(LAUNCH.glob("*.launch")):
         for argument in ET.parse(path).getroot().findall("arg"):
@@ -40,7 +47,9 @@ def launch_arguments() -> Iterator[tuple[str, str]]:
                 yield path.name, argument.attrib["name"]
 
 
-@pytest.mark.parametrize(("where", "names"), [pytest.param(*o, id=o[0]) for o in options()])
+@pytest.mark.parametrize(
+    ("where", "names"), [pytest.param(*o, id=o[0]) for o in (*options(), *settings())]
+)
 def test_a_test_gives_each_option(where: str, names: list[str]) -> None:
     given = "|".join(rf"{re.escape(name)}(?![\w-])" for name in names)
     assert re.search(rf"(?<![\w-])({given})", TESTS), f"{where}: no test gives it"

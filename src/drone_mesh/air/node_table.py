@@ -10,8 +10,8 @@ from typing import Sequence, Tuple
 import numpy as np
 
 from drone_mesh.air.obstacles import Obstacles
-from drone_mesh.air.reach import MAX_DISTANCE_M
 from drone_mesh.communication.interfaces import MAX_NODE_ID
+from drone_mesh.communication.repair.options import RANGE_M
 from drone_mesh.errors import MeshError
 
 _UNKNOWN: Position = (0.0, 0.0, 0.0)
@@ -65,9 +65,7 @@ class NodeTable:
     docs/ros.md, "Wireless signal simulator" and "Sources of DroneInfo".
     """
 
-    def __init__(
-        self, max_distance_m: float = MAX_DISTANCE_M, obstacles: Obstacles | None = None
-    ) -> None:
+    def __init__(self, max_distance_m: float = RANGE_M, obstacles: Obstacles | None = None) -> None:
         """Nodes within range of each other have a link unless `obstacles` cut it.
 
         Raises AirError unless the distance is a positive number.

@@ -8,7 +8,6 @@ from dataclasses import replace
 from typing import Callable, Iterable, Mapping
 
 from drone_mesh.air.graph import hops_from
-from drone_mesh.air.reach import MAX_DISTANCE_M
 from drone_mesh.communication.control.delivery import ITechnique
 from drone_mesh.communication.data.echo import OnEchoAnswer
 from drone_mesh.communication.data.ticket import Ticket
@@ -20,7 +19,7 @@ from drone_mesh.communication.node.gateway import MeshnetworkGateway
 from drone_mesh.communication.node.named_techniques import DEFAULT_ROUTING
 from drone_mesh.communication.node.node_configuration import NodeConfiguration
 from drone_mesh.communication.repair.interfaces import IRepairStrategy
-from drone_mesh.communication.repair.options import DEFAULT_REPAIR, RepairOptions
+from drone_mesh.communication.repair.options import DEFAULT_REPAIR, RANGE_M, RepairOptions
 from drone_mesh.communication.seals.keys import Keys
 from drone_mesh.communication.timing.mesh_timing import MeshTiming
 from drone_mesh.drone.fleet import (
@@ -63,7 +62,7 @@ class Network:
         seed: int = 0,
         timing: MeshTiming | None = None,
         routing: str | Callable[[], ITechnique] = DEFAULT_ROUTING,
-        max_distance_m: float = MAX_DISTANCE_M,
+        max_distance_m: float = RANGE_M,
         loss: float = 0.0,
         delay_s: float = HOP_DELAY_S,
         jitter_s: float = 0.0,

@@ -8,8 +8,8 @@ from typing import Callable, Iterable, Mapping
 
 import numpy as np
 
-from drone_mesh.air.reach import MAX_DISTANCE_M
 from drone_mesh.communication.interfaces import IMeshDebugInfo, IMeshNetwork
+from drone_mesh.communication.repair.options import RANGE_M
 from drone_mesh.communication.wire.messages import copies_for, hop
 from drone_mesh.drone.location import Location
 from drone_mesh.inprocess.clock import VirtualClock
@@ -34,7 +34,7 @@ class InProcessAir(IInProcessAir):
         self,
         clock: VirtualClock,
         rng: random.Random,
-        max_distance_m: float = MAX_DISTANCE_M,
+        max_distance_m: float = RANGE_M,
         loss: float = 0.0,
         delay_s: float = HOP_DELAY_S,
         jitter_s: float = 0.0,

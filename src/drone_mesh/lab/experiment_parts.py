@@ -3,10 +3,20 @@
 # Pydantic reads these annotations when the module is loaded, and Python 3.8 has no list[int].
 from typing import Any, ClassVar, Dict, FrozenSet, List
 
-from pydantic import BaseModel, ConfigDict, Field, model_serializer, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    create_model,
+    model_serializer,
+    model_validator,
+)
 from typing_extensions import Annotated
 
+from drone_mesh.configuration import default_of, type_of
 from drone_mesh.drone.fleet import MAX_DRONES
+from drone_mesh.settings import Setting, settings_of
 
 Share = Annotated[float, Field(ge=0, le=1)]
 Above0 = Annotated[float, Field(gt=0, le=1e6)]
@@ -19,6 +29,27 @@ class Part(BaseModel):
     """A part of an experiment file: unknown keys are errors, and no value changes its type."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+
+
+def value_of(declared: Setting) -> Any:
+    """The type of a key that is a setting."""
+
+    def check(value: object) -> object:
+        if not declared.allows(value):
+            raise ValueError(f"expected {declared.expected}")
+        return value
+
+    return Annotated[type_of(declared), AfterValidator(check)]
+
+
+def part_with_settings(settings: Any, leave_out: str) -> Any:
+    """A part whose keys are the settings of this dataclass, except for the one left out."""
+    keys: Any = {
+        one.name: (value_of(one), default_of(one))
+        for one in settings_of(settings)
+        if one.name != leave_out
+    }
+    return create_model("Part", __base__=Part, **keys)
 
 
 class PartOfKind(Part):

@@ -7,14 +7,22 @@ from pydantic import Field, field_validator, model_validator
 from typing_extensions import Annotated, Literal
 
 from drone_mesh.air.obstacle_file import BoxRow
-from drone_mesh.air.reach import MAX_DISTANCE_M
 from drone_mesh.communication.node.named_techniques import DEFAULT_ROUTING
-from drone_mesh.communication.repair.options import CLEARANCE_M, DEFAULT_REPAIR
+from drone_mesh.communication.repair.options import DEFAULT_REPAIR, RANGE_M, RepairOptions
 from drone_mesh.communication.timing.mesh_timing import MeshTiming
 from drone_mesh.drone.fleet import MAX_DRONES
 from drone_mesh.drone.goal import MAX_HEIGHT_M
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.lab.experiment_parts import Above0, AtLeast0, NodeId, Part, PartOfKind, Point, Share
+from drone_mesh.lab.experiment_parts import (
+    Above0,
+    AtLeast0,
+    NodeId,
+    Part,
+    PartOfKind,
+    Point,
+    Share,
+    part_with_settings,
+)
 from drone_mesh.lab.faults import Fault
 from drone_mesh.mobility import Mobility
 from drone_mesh.mobility.settings import Knot
@@ -187,19 +195,12 @@ class Positions(Part):
     outlier_m: AtLeast0 = 0.0
 
 
-class Timing(Part):
-    """The adjustable times of the protocol, as in MeshTiming."""
-
-    check_period_s: Above0 = MeshTiming.check_period_s
-    connection_lost_after_s: AtLeast0 = MeshTiming.connection_lost_after_s  # 0: the technique's
-    send_attempts: Annotated[int, Field(ge=1, le=20)] = MeshTiming.send_attempts
+class Timing(part_with_settings(MeshTiming, leave_out="report_period_s")):  # type: ignore[misc]
+    """The adjustable times of the protocol."""
 
 
-class Repair(Part):
-    """The adjustable numbers of a repair, as in RepairOptions; the range is range_m."""
-
-    clearance_m: Above0 = CLEARANCE_M
-    lost_place: Literal["beside", "above", "below", "exact"] = "beside"
+class Repair(part_with_settings(RepairOptions, leave_out="range_m")):  # type: ignore[misc]
+    """The adjustable numbers of a repair; the range is that of the scenario."""
 
 
 class ObstacleSettings(Part):
@@ -249,7 +250,7 @@ class Scenario(Part):
 
     model: Literal["mesh", "ideal"] = "mesh"
     layout: Layout = Layout()
-    range_m: Above0 = MAX_DISTANCE_M
+    range_m: Above0 = RANGE_M
     radio: Radio = Radio()
     key: bool = False  # a gateway has a mesh key, each router its own keys
     routing: str = DEFAULT_ROUTING

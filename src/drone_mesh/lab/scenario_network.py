@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from drone_mesh.communication.repair.options import LostPlace, RepairOptions
+from drone_mesh.communication.repair.options import RepairOptions
 from drone_mesh.communication.seals.keys import Keys, MeshKey
 from drone_mesh.communication.timing.mesh_timing import MeshTiming
 from drone_mesh.inprocess import Network
@@ -16,6 +16,7 @@ from drone_mesh.lab.scenario import Scenario
 from drone_mesh.lab.streams import Streams
 from drone_mesh.nrf24.emulator.links import IdealDisc, LinkModel, LogDistance, ScriptedLoss
 from drone_mesh.nrf24.settings import DEFAULT_RATE, data_rate
+from drone_mesh.settings import with_settings
 
 _KEY = MeshKey(b"the key of a lab")
 
@@ -34,10 +35,8 @@ def network_of(
         routing=scenario.routing,
         max_distance_m=scenario.range_m,
         repair=scenario.repair,
-        repair_options=RepairOptions(
-            clearance_m=scenario.repair_options.clearance_m,
-            range_m=scenario.range_m,
-            lost_place=LostPlace(scenario.repair_options.lost_place),
+        repair_options=with_settings(
+            RepairOptions, {**scenario.repair_options.model_dump(), "range_m": scenario.range_m}
         ),
         key=key_of if scenario.key else None,
         positions=PositionErrors(**scenario.positions.model_dump()),

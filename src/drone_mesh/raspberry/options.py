@@ -11,13 +11,12 @@ from typing import Mapping, Sequence
 from drone_mesh.arguments import decimal, whole
 from drone_mesh.channel.antenna import DEBUG_PERIOD_S
 from drone_mesh.communication.interfaces import MAX_NODE_ID
-from drone_mesh.communication.node.named_techniques import DEFAULT_ROUTING, ROUTING_TECHNIQUES
+from drone_mesh.communication.node.named_techniques import ROUTING_TECHNIQUES
 from drone_mesh.communication.node.node_configuration import NodeConfiguration
 from drone_mesh.communication.repair.named_strategies import REPAIR_STRATEGIES
-from drone_mesh.communication.repair.options import DEFAULT_REPAIR, LostPlace, RepairOptions
 from drone_mesh.communication.seals.key_file import read_key_file
 from drone_mesh.communication.seals.keys import MeshKey, NodeKeys
-from drone_mesh.communication.timing.mesh_timing import MIN_REPORT_PERIOD_S, MeshTiming
+from drone_mesh.communication.timing.mesh_timing import MIN_REPORT_PERIOD_S
 from drone_mesh.drone.engines import FlightOptions
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.location import Location
@@ -34,6 +33,7 @@ from drone_mesh.raspberry.wiring_options import (
     add_wiring_options,
     wired_hardware,
 )
+from drone_mesh.settings import Setting, settings_of, with_settings
 
 MOST_EMULATED = 17  # as in the field case, and what one machine can emulate
 CHECK_DRONE = "check-drone"  # the last argument of raspberry_router
@@ -41,8 +41,17 @@ LOG_LEVELS = ("debug", "info", "warning", "error")
 
 _BROADCASTS = {mode.value: mode for mode in BroadcastMode}
 
-OUTDOOR_CLEARANCE_M = 5.0  # satellite positions are accurate to a few metres
-OUTDOOR_RANGE_M = 100.0  # hardly any loss so near (nrf24/emulator/nrf24_range.csv)
+OUTDOORS = with_settings(
+    NodeConfiguration,
+    {
+        "clearance_m": 5.0,  # satellite positions are accurate to a few metres
+        "range_m": 100.0,  # hardly any loss so near (nrf24/emulator/nrf24_range.csv)
+        "report_period_s": MIN_REPORT_PERIOD_S,
+    },
+)
+_BUILT_IN = {"routing": sorted(ROUTING_TECHNIQUES), "repair": sorted(REPAIR_STRATEGIES)}
+# How often a packet is tried is for experiments.
+NODE_SETTINGS = [one for one in settings_of(OUTDOORS) if one.name != "send_attempts"]
 
 
 @dataclass(frozen=True)
@@ -155,64 +164,8 @@ def _parser(program: str, description: str) -> argparse.ArgumentParser:
         "(default: %(default)s)",
     )
     mesh = parser.add_argument_group("mesh")
-    mesh.add_argument(
-        "--check-period",
-        type=float,
-        default=MeshTiming.check_period_s,
-        metavar="SECONDS",
-        help="time between two checks of routes and connection (default: %(default)g)",
-    )
-    mesh.add_argument(
-        "--connection-lost-after",
-        type=float,
-        default=MeshTiming.connection_lost_after_s,
-        metavar="SECONDS",
-        help="time without a gateway before the node starts a repair; 0: as the routing "
-        "technique says, 30 s or with beacon 10 s (default: %(default)g)",
-    )
-    mesh.add_argument(
-        "--report-period",
-        type=float,
-        default=MIN_REPORT_PERIOD_S,
-        metavar="SECONDS",
-        help="period of a router's reports to its gateway, for GET /mesh and the web "
-        f"console: at least {MIN_REPORT_PERIOD_S:g}, 0 for never (default: %(default)g)",
-    )
-    mesh.add_argument(
-        "--routing",
-        default=DEFAULT_ROUTING,
-        help=f"routing technique: {', '.join(sorted(ROUTING_TECHNIQUES))}, or package.module:Class "
-        "(default: %(default)s)",
-    )
-    mesh.add_argument(
-        "--repair",
-        default=DEFAULT_REPAIR,
-        help=f"repair strategy: {', '.join(sorted(REPAIR_STRATEGIES))}, or package.module:Class "
-        "(default: %(default)s)",
-    )
-    mesh.add_argument(
-        "--clearance",
-        type=float,
-        default=OUTDOOR_CLEARANCE_M,
-        metavar="M",
-        help="minimum distance in metres between drones at rest after a repair "
-        "(default: %(default)g)",
-    )
-    mesh.add_argument(
-        "--lost-place",
-        choices=[lost_place.value for lost_place in LostPlace],
-        default=LostPlace.BESIDE.value,
-        help="where a repair ends if a silent drone may still be at the place; exact: at that very "
-        "place (default: %(default)s)",
-    )
-    mesh.add_argument(
-        "--range",
-        type=float,
-        default=OUTDOOR_RANGE_M,
-        metavar="M",
-        help="range of the radio in metres, which the repair uses; 'raspberry_radio range' shows "
-        "the loss at a distance (default: %(default)g, for 250k)",
-    )
+    for one in NODE_SETTINGS:
+        _add_setting(mesh, one)
     mesh.add_argument(
         "--key-file",
         type=Path,
@@ -256,6 +209,39 @@ def _parser(program: str, description: str) -> argparse.ArgumentParser:
     return parser
 
 
+def _add_setting(group: argparse._ArgumentGroup, one: Setting) -> None:
+    """The option of a setting of a node."""
+    option, kind = f"--{one.key.replace('_', '-')}", type(one.default)
+    known = f"; built in: {', '.join(_BUILT_IN[one.name])}" if one.name in _BUILT_IN else ""
+    text = ", ".join(filter(None, (one.text + known, one.bounds)))
+    if one.words:
+        group.add_argument(
+            option,
+            choices=one.words,
+            default=one.default.value,
+            help=f"{text} (default: %(default)s)",
+        )
+    elif kind is str:
+        group.add_argument(option, default=one.default, help=f"{text} (default: %(default)s)")
+    else:
+        group.add_argument(
+            option,
+            type=kind,
+            default=one.default,
+            metavar=one.what.upper(),
+            help=f"{text} (default: %(default)g)",
+        )
+
+
+def _node_configuration(parsed: argparse.Namespace) -> NodeConfiguration:
+    """Raises ConfigurationError."""
+    values = {one.name: getattr(parsed, one.key) for one in NODE_SETTINGS}
+    configuration = with_settings(NodeConfiguration, values)
+    for one in NODE_SETTINGS:
+        one.check(values[one.name])
+    return configuration
+
+
 def _add_emulated(node: argparse._MutuallyExclusiveGroup) -> None:
     node.add_argument(
         "--emulated",
@@ -297,20 +283,7 @@ def _options(
                 crc_bytes=parsed.crc // 8,
                 broadcast_mode=_BROADCASTS[parsed.broadcast],
             ),
-            mesh=NodeConfiguration(
-                parsed.routing,
-                parsed.repair,
-                MeshTiming(
-                    parsed.check_period,
-                    parsed.connection_lost_after,
-                    report_period_s=parsed.report_period,
-                ),
-                RepairOptions(
-                    clearance_m=parsed.clearance,
-                    range_m=parsed.range,
-                    lost_place=LostPlace(parsed.lost_place),
-                ),
-            ),
+            mesh=_node_configuration(parsed),
             location=location,
             flight=flight_options(parsed),
             air=air_options(parsed),

@@ -9,11 +9,11 @@ import math
 from dataclasses import dataclass
 from typing import Iterable, Iterator, Sequence
 
-from drone_mesh.air.reach import MAX_DISTANCE_M
 from drone_mesh.communication.control.router_states import RepairState
 from drone_mesh.communication.events.observer import explanation
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.repair.election import NO_BID
+from drone_mesh.communication.repair.options import RANGE_M
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
 
@@ -109,7 +109,7 @@ class MeshStatus:
 
     stamp_s: float
     nodes: Sequence[NodeStatus]  # ascending ids
-    max_distance: float = MAX_DISTANCE_M  # m
+    max_distance: float = RANGE_M  # m
     real_time_factor: float = 1.0
     achieved_real_time_factor: float = 0.0
     paused: bool = False

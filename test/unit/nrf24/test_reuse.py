@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from chip_lab import Lab
 
-from drone_mesh.air.reach import MAX_DISTANCE_M
+from drone_mesh.communication.repair.options import RANGE_M
 from drone_mesh.nrf24.emulator.air import CAPTURE_DB
 from drone_mesh.nrf24.emulator.links import IdealDisc
 from drone_mesh.nrf24.settings import DATA_RATES, RadioSettings
@@ -25,7 +25,7 @@ def reuse_distance(settings):
 
     def power_dbm(one, other):
         distance_m = SPACING_M * abs(one - other)
-        return IdealDisc(MAX_DISTANCE_M).received_dbm(distance_m, settings.power.value, 2400)
+        return IdealDisc(RANGE_M).received_dbm(distance_m, settings.power.value, 2400)
 
     def undisturbed(pair, others):
         return all(
@@ -45,7 +45,7 @@ def reuse_distance(settings):
 
 def lost(settings, distance):
     """How many packets of two pairs are not acknowledged, at different distances in time."""
-    lab = Lab(IdealDisc(MAX_DISTANCE_M))
+    lab = Lab(IdealDisc(RANGE_M))
     nodes = (0, 1, distance, distance + 1)
     driver = {
         node: lab.driver(node, SPACING_M * node, begin=True, settings=settings) for node in nodes

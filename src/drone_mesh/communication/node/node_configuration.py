@@ -14,14 +14,24 @@ from drone_mesh.communication.repair.interfaces import IRepairStrategy
 from drone_mesh.communication.repair.named_strategies import create_repair_strategy
 from drone_mesh.communication.repair.options import DEFAULT_REPAIR, RepairOptions
 from drone_mesh.communication.timing.mesh_timing import MeshTiming
+from drone_mesh.settings import setting
 
 
 @dataclass(frozen=True)
 class NodeConfiguration:
     """The settings of one node. All nodes of a mesh need the same `routing`."""
 
-    routing: str | Callable[[], ITechnique] = DEFAULT_ROUTING
-    repair: str | Callable[[], IRepairStrategy] = DEFAULT_REPAIR
+    routing: str | Callable[[], ITechnique] = setting(
+        DEFAULT_ROUTING,
+        "routing technique: a built-in name, or package.module:Class for your own",
+        "the name of a routing technique",
+    )
+    repair: str | Callable[[], IRepairStrategy] = setting(
+        DEFAULT_REPAIR,
+        "repair strategy: a built-in name (docs/strategies.md), or package.module:Class for "
+        "your own",
+        "the name of a repair strategy",
+    )
     timing: MeshTiming = MeshTiming()
     repair_options: RepairOptions = RepairOptions()
 

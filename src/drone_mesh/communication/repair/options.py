@@ -7,6 +7,7 @@ import math
 from dataclasses import dataclass
 
 from drone_mesh.errors import ConfigurationError
+from drone_mesh.settings import setting
 
 DEFAULT_REPAIR = "thesis"
 RANGE_M = 9.0  # docs/ros.md, "Wireless signal simulator": a node nearer than this is in range
@@ -26,9 +27,25 @@ class LostPlace(enum.Enum):
 class RepairOptions:
     """Adjustable numbers of the repair of one node."""
 
-    clearance_m: float = CLEARANCE_M  # least distance between drones at rest
-    range_m: float = RANGE_M  # range of the radio, as far as the node knows
-    lost_place: LostPlace = LostPlace.BESIDE
+    clearance_m: float = setting(
+        CLEARANCE_M,
+        "minimum distance in metres between drones at rest after a repair",
+        "metres",
+        above=0,
+        most=100.0,
+    )
+    range_m: float = setting(
+        RANGE_M,
+        "range of the radio in metres, as far as a repair knows",
+        "metres",
+        above=0,
+        most=10_000.0,
+    )
+    lost_place: LostPlace = setting(
+        LostPlace.BESIDE,
+        "where a repair ends if a silent drone may still be at the place: beside, above, below or "
+        "exact, which is that very place",
+    )
 
     def __post_init__(self) -> None:
         """Raise ConfigurationError for a number outside its range."""

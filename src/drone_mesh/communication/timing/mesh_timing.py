@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from drone_mesh.errors import ConfigurationError
+from drone_mesh.settings import setting
 
 HEARTBEAT_ANSWER_S = 0.5  # at most one heartbeat to the gateway within this time
 CIRCULATION_S = 0.5  # the same packet from another neighbour within this time circulates
@@ -17,11 +18,32 @@ LANDED_WITHIN_M = 0.1  # docs/repair.md, "Flight"
 class MeshTiming:
     """Adjustable numbers of one node; the defaults are those of docs/protocol.md."""
 
-    check_period_s: float = 10.0  # how often a node checks its routes and its connection
-    connection_lost_after_s: float = 0.0  # time without a gateway until the emergency; 0: as the
-    # routing technique says
-    send_attempts: int = 3  # failed transmissions of a packet, in total
-    report_period_s: float = 0.0  # how often a node reports to its gateway; 0: never
+    check_period_s: float = setting(
+        10.0,
+        "seconds between two checks of routes and connection",
+        "seconds",
+        least=0.1,
+        most=3600.0,
+    )
+    connection_lost_after_s: float = setting(
+        0.0,
+        "seconds without a gateway before a node starts a repair",
+        "seconds",
+        least=0.1,
+        most=3600.0,
+        zero="those of the routing technique: 30, or 10 with beacon",
+    )
+    send_attempts: int = setting(
+        3, "failed transmissions of a packet, in total", "a whole number", least=1, most=20
+    )
+    report_period_s: float = setting(
+        0.0,
+        "seconds between two reports of a router to its gateway, for GET /mesh and the web console",
+        "seconds",
+        least=MIN_REPORT_PERIOD_S,
+        most=3600.0,
+        zero="no reports",
+    )
 
     def __post_init__(self) -> None:
         """Raise ConfigurationError for a number outside its range."""

@@ -8,10 +8,8 @@ from pathlib import Path
 
 from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.communication.node.node_configuration import NodeConfiguration
-from drone_mesh.communication.repair.options import LostPlace, RepairOptions
 from drone_mesh.communication.seals.key_file import read_key_file
 from drone_mesh.communication.seals.keys import MeshKey
-from drone_mesh.communication.timing.mesh_timing import MeshTiming
 from drone_mesh.configuration import FactoryConfiguration
 from drone_mesh.errors import ConfigurationError, naming_argument
 from drone_mesh.internet.mqtt_topics import PASSWORD_VARIABLE, Broker, parse_broker
@@ -40,20 +38,7 @@ class MeshSettings:
         return cls(
             configuration,
             run,
-            NodeConfiguration(
-                configuration.routing,
-                configuration.repair,
-                MeshTiming(
-                    configuration.check_period,
-                    configuration.connection_lost_after,
-                    report_period_s=configuration.report_period,
-                ),
-                RepairOptions(
-                    clearance_m=configuration.clearance,
-                    range_m=configuration.max_distance,
-                    lost_place=LostPlace(configuration.lost_place),
-                ),
-            ),
+            configuration.node,
             obstacles=obstacles,
             key=_mesh_key(configuration.key),
             broker=parse_broker(configuration.broker, os.environ.get(PASSWORD_VARIABLE, "")),

@@ -302,4 +302,5 @@ def flight_rules() -> FlightRules:
     plan: PlanFlight = functools.partial(FlightPath, ceiling_m=fleet.cruise_height)
     if obstacles is not None:
         plan = obstacles.plan_flight
-    return FlightRules(plan, SWAY_M if fleet.flight == "dynamic" else 0.0, fleet.clearance)
+    sway_m = SWAY_M if fleet.flight == "dynamic" else 0.0
+    return FlightRules(plan, sway_m, fleet.node.repair_options.clearance_m)

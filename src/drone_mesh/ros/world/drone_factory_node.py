@@ -140,8 +140,8 @@ class RosSimulation:
             world.now_s,
             (),
             configuration.max_distance,
-            routing=configuration.routing,
-            repair_strategy=configuration.repair,
+            routing=str(configuration.node.routing),
+            repair_strategy=str(configuration.node.repair),
             obstacles=describe_obstacles(obstacles.boxes if obstacles else ()),
             shape=configuration.shape,
         )
