@@ -14,9 +14,8 @@ from typing_extensions import Annotated, Literal
 from drone_mesh.air import obstacle_file
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.lab import extensions, movement, places
-from drone_mesh.lab.dotted_path import NoSuchPlace, put
 from drone_mesh.lab.experiment_parts import Part
-from drone_mesh.lab.experiment_source import Source, nearest_name
+from drone_mesh.lab.experiment_source import NoSuchPlace, Source, nearest_name, put
 from drone_mesh.lab.expression import ExpressionError, Where
 from drone_mesh.lab.metrics import METRICS
 from drone_mesh.lab.scenario import Scenario

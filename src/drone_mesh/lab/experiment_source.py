@@ -1,12 +1,13 @@
-"""The source of an experiment's content, for errors that point into the file or at an argument."""
+"""The places in an experiment file: errors that point to them, and values put there by a path."""
 
 import difflib
 from pathlib import Path
-from typing import Any, Dict, List, Sequence
+from typing import Any, Dict, List, Sequence, Union
 
 from pydantic import BaseModel, ValidationError
 from typing_extensions import get_args
 
+from drone_mesh.arguments import MOST, is_up_to
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.yaml_file import KeyPath, YamlFile
 
@@ -67,3 +68,45 @@ def _model_in(annotation: Any) -> Any:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
     return next(filter(None, map(_model_in, get_args(annotation))), None)
+
+
+class NoSuchPlace(Exception):
+    """A dotted path that does not exist."""
+
+
+def put(content: Any, path: str, value: Any) -> KeyPath:
+    """Set the value at a dotted path. A step into the faults is an index or an action's name."""
+    place: List[Union[str, int]] = []
+    steps = path.split(".")
+    for index, step in enumerate(steps):
+        last = index == len(steps) - 1
+        key: Union[str, int] = step
+        if isinstance(content, list):
+            try:
+                key = _index_of(content, step)
+            except NoSuchPlace:
+                raise NoSuchPlace(f"{'.'.join(steps[:index])} has no entry {step}") from None
+            if not is_up_to(step, MOST):  # an action's name leads into the fault and the action
+                place.append(key)
+                content, key = content[int(key)], step
+        elif not isinstance(content, dict):
+            raise NoSuchPlace(f"{'.'.join(steps[:index])} is a value and has no key {step}")
+        place.append(key)
+        if last:
+            content[key] = value
+        elif isinstance(content, dict):
+            content = content.setdefault(str(key), {})
+        else:
+            content = content[int(key)]
+    return tuple(place)
+
+
+def _index_of(entries: Sequence[Any], step: str) -> int:
+    if is_up_to(step, MOST):
+        if int(step) >= len(entries):
+            raise NoSuchPlace
+        return int(step)
+    for index, entry in enumerate(entries):
+        if isinstance(entry, dict) and step in entry:
+            return index
+    raise NoSuchPlace

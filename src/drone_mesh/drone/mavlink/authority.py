@@ -3,18 +3,149 @@
 The human pilot always has priority. This program flies only while the autopilot is in the mode
 meant for it. It leaves a mode that somebody else chose only for an order, and only if the operator
 permits that; a repair never does. A drone that somebody else disarmed stays down until its pilot
-gives it back.
+gives it back: a pilot who disarms wants it to stay down, and an autopilot that does has a reason,
+such as a crash.
 """
 
 from __future__ import annotations
 
+import enum
+import math
+
 from drone_mesh.drone.mavlink.autopilots import Autopilot
-from drone_mesh.drone.mavlink.disarming import Disarming
 from drone_mesh.drone.mavlink.flight_area import FlightArea
 from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions
-from drone_mesh.drone.mavlink.mode_choice import Chooser, ModeChoice
 from drone_mesh.drone.mavlink.pilot_status import Phase
 from drone_mesh.drone.mavlink.telemetry import Telemetry
+
+FELL_M = 1.5  # above the noise of a height at rest
+FELL_WITHIN_S = 5.0  # a fall from 50 m takes 3.2 s
+ORDER_WITHIN_S = 5.0  # an order of this program has changed the mode by then
+ARMED_WITHIN_S = 0.5  # a heartbeat just after the acknowledgement may be older
+
+
+class Disarming:
+    """Whether anything but an ordered landing has disarmed the drone.
+
+    Follows the heartbeats, and what this program orders. While `by_others`, this program must not
+    arm it until somebody else does, or chooses its mode anew.
+    """
+
+    def __init__(self, telemetry: Telemetry) -> None:
+        self.by_others = False
+        self.is_settling = False  # after a landing: it may have been disarmed in the air
+        self._telemetry = telemetry
+        self._was_armed = False
+        self._armed_s = -math.inf  # when the autopilot accepted to arm
+        self._mode: int | None = None  # at the last heartbeat
+        self._ordered_s = -math.inf  # when this program last ordered its own mode
+        self._height_m = math.nan  # above sea level, when last seen armed
+        self._landed_s = -math.inf  # when a landing seemed to have ended
+
+    def ordered_own_mode(self, now_s: float) -> None:
+        """This program orders its own mode: that change is no choice of the pilot's."""
+        self._ordered_s = now_s
+
+    def accepted_to_arm(self, now_s: float) -> None:
+        """The autopilot acknowledges that it armed by this program's order."""
+        self._was_armed = True
+        self._armed_s = now_s
+
+    def on_heartbeat(self, now_s: float, lands: bool) -> None:
+        """Compare with the heartbeat before.
+
+        `lands`: this program is landing the drone, or has just landed it.
+        """
+        telemetry = self._telemetry
+        assert telemetry.autopilot is not None  # otherwise the heartbeat is not the drone's
+        place = telemetry.place(now_s)
+        height_m = math.nan if place is None else place.altitude_m
+        is_own = telemetry.mode == telemetry.autopilot.own_mode != self._mode
+        self._mode = telemetry.mode
+        if not telemetry.armed and self._was_armed and now_s - self._armed_s < ARMED_WITHIN_S:
+            return
+        if telemetry.armed:
+            self.by_others = self.is_settling = False
+            self._height_m = height_m
+        elif self._was_armed:
+            self.is_settling = lands and not math.isnan(self._height_m)
+            self.by_others = not self.is_settling
+            self._landed_s = now_s
+        elif is_own and now_s - self._ordered_s >= ORDER_WITHIN_S:
+            self.by_others = self.is_settling = False
+        elif self.is_settling and not math.isnan(height_m):
+            self.by_others = height_m < self._height_m - FELL_M
+            self.is_settling = not self.by_others and now_s - self._landed_s < FELL_WITHIN_S
+        self._was_armed = telemetry.armed
+
+
+class Chooser(enum.Enum):
+    """Whose choice the mode is."""
+
+    ENGINE = "this program, or somebody who chose the mode in which it flies"
+    OTHERS = "the pilot, a ground station or the autopilot"
+    NOBODY = "found at the first contact on a disarmed drone, which nobody has armed since"
+
+
+class ModeChoice:
+    """Who chose the mode: what this program has not commanded, somebody else has chosen.
+
+    A failsafe that acts in a mode of this program's makes that mode the autopilot's choice.
+    """
+
+    def __init__(self, telemetry: Telemetry) -> None:
+        self._telemetry = telemetry
+        self._mode: int | None = None  # at the last heartbeat
+        self._armed = False
+        self._commanded: int | None = None
+        self.by = Chooser.NOBODY
+        self.since_s = -math.inf  # when somebody else chose it
+
+    def was_made_after(self, time_s: float) -> bool:
+        """Whether somebody else chose the mode later than this."""
+        return self.by is Chooser.OTHERS and self.since_s > time_s
+
+    def command(self, mode: int) -> None:
+        """This program is about to order this mode."""
+        self._commanded = mode
+
+    def withdraw(self) -> None:
+        """Stop expecting the mode that this program ordered, unless it is reported already."""
+        if self._commanded != self._mode:
+            self._commanded = None
+
+    def accepted(self, mode: int) -> None:
+        """The autopilot acknowledges that it is in this mode, ordered by this program.
+
+        A later heartbeat with another mode therefore tells of a choice, even of the mode before.
+        """
+        self._mode = mode
+        self._commanded = None
+        self.by = Chooser.ENGINE
+
+    def on_heartbeat(self, now_s: float) -> None:
+        """Compare with the heartbeat before."""
+        telemetry = self._telemetry
+        assert telemetry.autopilot is not None  # otherwise the heartbeat is not the drone's
+        before, was_armed = self._mode, self._armed
+        mode, armed = telemetry.mode, telemetry.armed
+        self._mode, self._armed = mode, armed
+        if mode == telemetry.autopilot.own_mode:
+            self.by = Chooser.ENGINE
+            if before != mode:
+                self._commanded = None
+        elif before is None:
+            self._decide(Chooser.OTHERS if armed else Chooser.NOBODY, now_s)
+        elif mode != before:
+            self._decide(Chooser.ENGINE if mode == self._commanded else Chooser.OTHERS, now_s)
+        elif self.by is not Chooser.OTHERS and (telemetry.failsafe or armed and not was_armed):
+            self._decide(Chooser.OTHERS, now_s)
+
+    def _decide(self, by: Chooser, now_s: float) -> None:
+        self.by = by
+        if by is Chooser.OTHERS:
+            self.since_s = now_s
+            self._commanded = None
 
 
 class Authority:

@@ -1,6 +1,6 @@
 """The common part of the engines and SPI commands of an emulated chip.
 
-Variants, faults and states of chips; `ChipCore` with registers, FIFOs, flags, timers and the
+Pins, variants, faults and states of chips; `ChipCore` with registers, FIFOs, flags, timers and the
 antenna. `chip.py` decides on power states; receiver, transmitter and commands use ChipCore and do
 not depend on the whole chip.
 """
@@ -14,12 +14,65 @@ from typing import Callable
 
 from drone_mesh.nrf24.airtime import POWER_UP_NS, PREAMBLE_BITS, SETTLING_NS
 from drone_mesh.nrf24.emulator.air import RPD_DBM, Air, Transmission
+from drone_mesh.nrf24.emulator.clock import EmulatorClock
 from drone_mesh.nrf24.emulator.fading import Position
 from drone_mesh.nrf24.emulator.fifos import RxFifo, TxFifo
 from drone_mesh.nrf24.emulator.frames import Frame
-from drone_mesh.nrf24.emulator.pins import EmulatedCe, EmulatedIrq
 from drone_mesh.nrf24.emulator.register_bank import RegisterBank
 from drone_mesh.nrf24.registers import RX_FIFO_IS_EMPTY, RX_P_NO
+
+
+class EmulatedCe:
+    """Chip enable, an output of the host. Also usable as a DigitalInOut of CircuitPython."""
+
+    def __init__(self, clock: EmulatorClock, changed: Callable[[bool], None]) -> None:
+        self._clock = clock
+        self._changed = changed
+        self._value = False
+
+    @property
+    def value(self) -> bool:
+        """The level of the pin."""
+        return self._value
+
+    @value.setter
+    def value(self, high: bool) -> None:
+        with self._clock.access():
+            if bool(high) != self._value:
+                self._value = bool(high)
+                self._changed(self._value)
+
+    def switch_to_output(self, value: bool = False) -> None:
+        """Called by CircuitPython drivers at the start."""
+        self.value = value
+
+    def close(self) -> None:
+        """Does nothing; the level stays."""
+
+
+class EmulatedIrq:
+    """Interrupt request, an input of the host: low while an unmasked flag is set."""
+
+    def __init__(self, clock: EmulatorClock) -> None:
+        self._clock = clock
+        self._signal = clock.runtime.signal()
+        self.value = True  # the level of the pin
+        self.fell_ns: int | None = None  # when it last went low
+
+    def wait_low(self, timeout_s: float) -> bool:
+        """Wait until the pin is low; returns False if it is still high after the time-out."""
+        return self._signal.wait_for(lambda: not self.value, timeout_s)
+
+    def set(self, high: bool) -> None:
+        """Set the level, by the chip; called with access."""
+        if high != self.value:
+            self.value = high
+            if not high:
+                self.fell_ns = self._clock.now_ns
+                self._signal.notify()
+
+    def close(self) -> None:
+        """Does nothing."""
 
 
 @dataclass(frozen=True)
