@@ -149,9 +149,21 @@ alone() {
   ) 9>"$root/build/.lock" || exit
 }
 
+# compiler_for_pybullet: it has no wheel for Python 3.12 and newer. pip builds it once and keeps the
+# wheel in its cache, so that the next checkout has it at once.
+compiler_for_pybullet() {
+  "$venv/bin/python" - <<'PYTHON' && return
+import importlib.util, sys
+sys.exit(sys.version_info >= (3, 12) and importlib.util.find_spec("pybullet") is None)
+PYTHON
+  apt_install g++ python3-dev
+  say "pip builds pybullet from its source, unless it has done so before: some four minutes on two cores"
+}
+
 prepare_simulation() {
   apt_install "${ros_packages[@]}"
   make_venv
+  compiler_for_pybullet
   pip_install "${simulation_requirements[@]}"
   build
 }
@@ -163,6 +175,7 @@ prepare_lab() {
 
 prepare_unit_tests() {
   make_venv
+  compiler_for_pybullet
   pip_install "${simulation_requirements[@]}" requirements/{lab,test}.txt
   pip_install --no-deps requirements/test-bare.txt
 }
