@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Iterable
 
+from drone_mesh.drone.fleet import ids_in_words
 from drone_mesh.drone.goal import check_apart
 from drone_mesh.errors import GoalRefused
 from drone_mesh.formations.layouts import Layouts, UnknownCase
@@ -60,7 +60,7 @@ def _check_rings(scenario: Scenario, source: Source) -> None:
 
 def _check_ids(scenario: Scenario, source: Source) -> None:
     ids, gateways = _ids_of(scenario.layout)
-    layout_has = f"the layout has {_in_words(ids)}"
+    layout_has = f"the layout has {ids_in_words(ids)}"
     for node in sorted({int(node) for node, *_knot in scenario.mobility.knots or ()} - ids):
         raise source.error(
             ("base", "mobility", "path"),
@@ -93,11 +93,6 @@ def _ids_named_by(fault: Fault) -> set[int]:
     one: int | None = getattr(fault.what, "id", None)
     several = (getattr(fault.what, key, None) or () for key in ("ids", "between"))
     return {node for some in several for node in some} | (set() if one is None else {one})
-
-
-def _in_words(ids: Iterable[int]) -> str:
-    least, most = min(ids), max(ids)
-    return f"{least}..{most}" if len(set(ids)) == most - least + 1 else f"{sorted(ids)}"
 
 
 def _dotted(place: KeyPath) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 from typing import Callable, Collection, Dict, Mapping, NamedTuple, Sequence
 
+from drone_mesh.drone.fleet import ids_in_words
 from drone_mesh.drone.flight_path import Vector
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.mobility.area import Area
@@ -136,7 +137,7 @@ def _movers(
     if mobility.kind == "trace":  # the file says who moves
         unknown = sorted(mobility.knots.keys() - places.keys())
         if unknown:
-            ids = f"{min(places)}..{max(places)}" if places else "none"
+            ids = ids_in_words(places) or "none"
             raise ConfigurationError(f"the trace names drone {unknown[0]}; the drones are {ids}")
         return sorted(mobility.knots)
     movable = [node for node in sorted(places) if mobility.gateways or node not in gateways]

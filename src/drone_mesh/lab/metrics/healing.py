@@ -7,7 +7,7 @@ import statistics
 from typing import Iterable
 
 from drone_mesh.communication.events.observer import MeshEventKind
-from drone_mesh.lab.metrics.registry import NAN, metric, metrics
+from drone_mesh.lab.metrics.registry import NAN, metric, metrics, percentiles
 from drone_mesh.lab.record import RunRecord
 from drone_mesh.state.model import EventRecord
 
@@ -142,6 +142,6 @@ def outages(run: RunRecord) -> float:
     outage_p95_s="95th percentile of their lengths",
     outage_max_s="length of the longest of these outages",
 )
-def outage_lengths(run: RunRecord) -> tuple[float, float, float]:
-    lengths = sorted(gap.seconds(run.end_s) for gap in run.gaps()) or [0.0]
-    return statistics.median(lengths), lengths[math.ceil(0.95 * len(lengths)) - 1], lengths[-1]
+def outage_lengths(run: RunRecord) -> tuple[float, ...]:
+    lengths = [gap.seconds(run.end_s) for gap in run.gaps()] or [0.0]
+    return statistics.median(lengths), *percentiles(lengths, 0.95), max(lengths)

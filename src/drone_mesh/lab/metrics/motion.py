@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
-import math
 import statistics
-from typing import Sequence
 
-from drone_mesh.lab.metrics.registry import NAN, mean, metric, metrics, per_drone_and_s, ratio
+from drone_mesh.lab.metrics.registry import (
+    NAN,
+    mean,
+    metric,
+    metrics,
+    per_drone_and_s,
+    percentiles,
+    ratio,
+)
 from drone_mesh.lab.probes import KINDS
 from drone_mesh.lab.record import RunRecord
 
@@ -38,7 +44,7 @@ def served(run: RunRecord) -> float:
     served_p50="the same share, median over time",
 )
 def service(run: RunRecord) -> list[float]:
-    return _percentiles(run.links.service.shares, 0.05, 0.5)
+    return percentiles(run.links.service.shares, 0.05, 0.5)
 
 
 @metrics(
@@ -48,7 +54,7 @@ def service(run: RunRecord) -> list[float]:
     lapse_p99_s="99th percentile of these times",
 )
 def lapses(run: RunRecord) -> list[float]:
-    return _percentiles(run.links.service.lapses_s, 0.5, 0.99)
+    return percentiles(run.links.service.lapses_s, 0.5, 0.99)
 
 
 @metrics(
@@ -58,7 +64,7 @@ def lapses(run: RunRecord) -> list[float]:
     connected_p50="the same share, median over time",
 )
 def connection(run: RunRecord) -> list[float]:
-    return _percentiles(run.links.connection.shares, 0.05, 0.5)
+    return percentiles(run.links.connection.shares, 0.05, 0.5)
 
 
 @metrics(
@@ -68,7 +74,7 @@ def connection(run: RunRecord) -> list[float]:
     unconnected_p99_s="99th percentile of these times",
 )
 def unconnected(run: RunRecord) -> list[float]:
-    return _percentiles(run.links.connection.lapses_s, 0.5, 0.99)
+    return percentiles(run.links.connection.lapses_s, 0.5, 0.99)
 
 
 @metrics(
@@ -95,7 +101,7 @@ def delivered(run: RunRecord) -> list[float]:
 def delays(run: RunRecord) -> tuple[float, float]:
     messages = (probe.delay_s for probe in run.probes if probe.kind != "echo")
     found = [1000.0 * delay_s for delay_s in messages if delay_s is not None]
-    (p95_ms,) = _percentiles(found, 0.95)
+    (p95_ms,) = percentiles(found, 0.95)
     return statistics.median(found) if found else NAN, p95_ms
 
 
@@ -112,9 +118,3 @@ def frame_rate(run: RunRecord) -> float:
 @metric("1/s", "of these, frames that carry no data of users", better="less")
 def control_frame_rate(run: RunRecord) -> float:
     return NAN if run.frames is None else per_drone_and_s(run, run.frames["control"])
-
-
-def _percentiles(values: Sequence[float], *shares: float) -> list[float]:
-    """The percentiles of the values at these shares; NaN without values."""
-    ordered = sorted(values) or [NAN]
-    return [ordered[max(0, math.ceil(share * len(ordered)) - 1)] for share in shares]

@@ -60,6 +60,12 @@ def mean(values: Iterable[float]) -> float:
     return ratio(sum(found), len(found))
 
 
+def percentiles(values: Sequence[float], *shares: float) -> list[float]:
+    """The percentiles of the values at these shares; NaN without values."""
+    ordered = sorted(values) or [NAN]
+    return [ordered[max(0, math.ceil(share * len(ordered)) - 1)] for share in shares]
+
+
 def per_drone_and_s(record: RunRecord, count: float) -> float:
     """This count of a whole run, per drone and second."""
     return count / record.end_s / len(record.start.places)
