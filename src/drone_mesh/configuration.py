@@ -46,16 +46,11 @@ def type_of(declared: Setting) -> Any:
     return Literal[declared.words] if declared.words else type(declared.default)
 
 
-def default_of(declared: Setting) -> Any:
-    """The default of a setting, in that type."""
-    return declared.default.value if declared.words else declared.default
-
-
 def _with_settings_of_a_node(cls: type) -> type:
     """Declare the settings of a node as well."""
     for key, one in _NODE.items():
         cls.__annotations__[key] = type_of(one)
-        setattr(cls, key, default_of(one))
+        setattr(cls, key, one.plain_default)
     return cls
 
 
@@ -130,11 +125,7 @@ class FactoryConfiguration:
         most=20.0,
     )
     cruise_height: float = setting(
-        MAX_HEIGHT_M,
-        "ceiling of ordered flights in metres",
-        "metres",
-        above=0,
-        most=MAX_HEIGHT_M,
+        MAX_HEIGHT_M, "ceiling of ordered flights in metres", "metres", above=0, most=MAX_HEIGHT_M
     )
     missions: str = setting(
         "",
@@ -206,8 +197,7 @@ class FactoryConfiguration:
         "the name of a key file",
     )
     debug: bool = setting(
-        True,
-        "true or false: whether each node publishes /Nodes/ID/debug once per simulated second",
+        True, "true or false: whether each node publishes /Nodes/ID/debug once per simulated second"
     )
 
     @field_validator("*", mode="before")

@@ -44,6 +44,11 @@ class Setting:
         return tuple(word.value for word in kind) if issubclass(kind, enum.Enum) else ()
 
     @property
+    def plain_default(self) -> Any:
+        """The default as people write it: the word of a member of an Enum."""
+        return self.default.value if self.words else self.default
+
+    @property
     def bounds(self) -> str:
         """The bounds in words; empty: none."""
         if self.most == math.inf:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import ast
 import re
 import xml.etree.ElementTree as ET
@@ -10,7 +11,8 @@ from typing import Iterator
 
 import pytest
 
-from drone_mesh.raspberry.options import NODE_SETTINGS
+from drone_mesh.raspberry.flight_options import add_flight_options
+from drone_mesh.raspberry.options import add_node_settings
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCE, LAUNCH = ROOT / "src" / "drone_mesh", ROOT / "launch"
@@ -35,9 +37,13 @@ def options() -> Iterator[tuple[str, list[str]]]:
                     yield f"{path.relative_to(ROOT)}: {names[-1]}", names
 
 
-def settings() -> Iterator[tuple[str, list[str]]]:
-    for one in NODE_SETTINGS:
-        yield f"setting {one.name}", [f"--{one.key.replace('_', '-')}"]
+def options_from_tables() -> Iterator[tuple[str, list[str]]]:
+    """Those that a program for a Raspberry Pi adds in a loop."""
+    parser = argparse.ArgumentParser(add_help=False)
+    add_node_settings(parser)
+    add_flight_options(parser)
+    for action in parser._actions:
+        yield f"raspberry: {action.option_strings[0]}", list(action.option_strings)
 
 
 def launch_arguments() -> Iterator[tuple[str, str]]:
@@ -48,7 +54,7 @@ def launch_arguments() -> Iterator[tuple[str, str]]:
 
 
 @pytest.mark.parametrize(
-    ("where", "names"), [pytest.param(*o, id=o[0]) for o in (*options(), *settings())]
+    ("where", "names"), [pytest.param(*o, id=o[0]) for o in (*options(), *options_from_tables())]
 )
 def test_a_test_gives_each_option(where: str, names: list[str]) -> None:
     given = "|".join(rf"{re.escape(name)}(?![\w-])" for name in names)

@@ -14,7 +14,7 @@ from pydantic import (
 )
 from typing_extensions import Annotated
 
-from drone_mesh.configuration import default_of, type_of
+from drone_mesh.configuration import type_of
 from drone_mesh.drone.fleet import MAX_DRONES
 from drone_mesh.settings import Setting, settings_of
 
@@ -45,7 +45,7 @@ def value_of(declared: Setting) -> Any:
 def part_with_settings(settings: Any, leave_out: str) -> Any:
     """A part whose keys are the settings of this dataclass, except for the one left out."""
     keys: Any = {
-        one.name: (value_of(one), default_of(one))
+        one.name: (value_of(one), one.plain_default)
         for one in settings_of(settings)
         if one.name != leave_out
     }

@@ -33,7 +33,7 @@ from drone_mesh.raspberry.wiring_options import (
     add_wiring_options,
     wired_hardware,
 )
-from drone_mesh.settings import Setting, settings_of, with_settings
+from drone_mesh.settings import settings_of, with_settings
 
 MOST_EMULATED = 17  # as in the field case, and what one machine can emulate
 CHECK_DRONE = "check-drone"  # the last argument of raspberry_router
@@ -164,8 +164,7 @@ def _parser(program: str, description: str) -> argparse.ArgumentParser:
         "(default: %(default)s)",
     )
     mesh = parser.add_argument_group("mesh")
-    for one in NODE_SETTINGS:
-        _add_setting(mesh, one)
+    add_node_settings(mesh)
     mesh.add_argument(
         "--key-file",
         type=Path,
@@ -209,27 +208,19 @@ def _parser(program: str, description: str) -> argparse.ArgumentParser:
     return parser
 
 
-def _add_setting(group: argparse._ArgumentGroup, one: Setting) -> None:
-    """The option of a setting of a node."""
-    option, kind = f"--{one.key.replace('_', '-')}", type(one.default)
-    known = f"; built in: {', '.join(_BUILT_IN[one.name])}" if one.name in _BUILT_IN else ""
-    text = ", ".join(filter(None, (one.text + known, one.bounds)))
-    if one.words:
+def add_node_settings(group: argparse._ActionsContainer) -> None:
+    """Add an option for each setting of a node."""
+    for one in NODE_SETTINGS:
+        default = one.plain_default
+        built_in = f"; built in: {', '.join(_BUILT_IN[one.name])}" if one.name in _BUILT_IN else ""
+        shown = default if isinstance(default, str) else f"{default:g}"
         group.add_argument(
-            option,
-            choices=one.words,
-            default=one.default.value,
-            help=f"{text} (default: %(default)s)",
-        )
-    elif kind is str:
-        group.add_argument(option, default=one.default, help=f"{text} (default: %(default)s)")
-    else:
-        group.add_argument(
-            option,
-            type=kind,
-            default=one.default,
-            metavar=one.what.upper(),
-            help=f"{text} (default: %(default)g)",
+            f"--{one.key.replace('_', '-')}",
+            type=type(default),
+            choices=one.words or None,
+            default=default,
+            metavar=one.what.upper() if one.bounds else None,
+            help=f"{one.help}{built_in} (default: {shown})",
         )
 
 
