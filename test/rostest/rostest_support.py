@@ -27,6 +27,7 @@ PAYLOAD_BYTES = 32
 STANDSTILL_S = 20.0  # wall; if simulated time stands still for longer, the world has died
 POLL_PERIOD_S = 0.01
 WALL_LIMIT_S = 60.0  # for what takes a moment on an idle machine
+NODES = Path(rospkg.RosPack().get_path("drone_mesh")) / "nodes"
 FORKS = multiprocessing.get_context("forkserver")
 PRELOADED = ["__main__", "drone_mesh.ros.views.report", "matplotlib.pyplot"]
 FORKS.set_forkserver_preload(PRELOADED)
@@ -47,21 +48,23 @@ def call(service: str, service_class: type, *arguments: object) -> object:
     return rospy.ServiceProxy(service, service_class)(*arguments)
 
 
-def run_program(
-    program: str, *arguments: str, **environment: str
-) -> subprocess.CompletedProcess[str]:
-    """Run a program of the package that registers no node, in a fork of one process.
+def program(name: str, *arguments: str) -> list[str]:
+    """The command line of a program of the package, without rosrun: that takes a second."""
+    return [sys.executable, str(NODES / name), *arguments]
+
+
+def run_program(name: str, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Run a program of the package until its end, in a fork of one process.
 
     That process has imported what most of them need: nearly all of their time.
     """
-    path = Path(rospkg.RosPack().get_path("drone_mesh")) / "nodes" / program
+    words = [str(NODES / name), *arguments]
     with tempfile.TemporaryDirectory() as folder:
         out, errors = Path(folder) / "out", Path(folder) / "errors"
-        words = [str(path), *arguments]
         process = FORKS.Process(target=_run_fork, args=(words, environment, out, errors))
         process.start()
         process.join(WALL_LIMIT_S)
-        assert process.exitcode is not None, f"{program} did not end"
+        assert process.exitcode is not None, f"{name} did not end"
         return subprocess.CompletedProcess(
             words, process.exitcode, out.read_text("utf-8"), errors.read_text("utf-8")
         )
@@ -72,7 +75,10 @@ def _run_fork(words: list[str], environment: dict[str, str], out: Path, errors: 
         os.dup2(os.open(path, os.O_WRONLY | os.O_CREAT), number)
     os.environ.update(environment)
     sys.argv = words
-    runpy.run_path(words[0], run_name="__main__")
+    try:
+        runpy.run_path(words[0], run_name="__main__")
+    finally:
+        rospy.signal_shutdown("the program has ended")  # as at the end of a process of its own
 
 
 def free_port() -> int:

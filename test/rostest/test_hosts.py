@@ -10,7 +10,7 @@ import unittest
 
 import rospy
 import rostest
-from rostest_support import WALL_LIMIT_S, LogWatch, MeshWatch, call, pid_of, wait_for
+from rostest_support import WALL_LIMIT_S, LogWatch, MeshWatch, call, pid_of, program, wait_for
 
 from drone_mesh.srv import AddDrone, RemoveDrone
 
@@ -27,7 +27,7 @@ class HostsTest(unittest.TestCase):
         mesh.wait("the new ones connected", 60, mesh.connected)
 
         refused = subprocess.run(
-            ["rosrun", "drone_mesh", "mesh_host", "__name:=second", "_first:=3", "_last:=4"],
+            program("mesh_host", "__name:=second", "_first:=3", "_last:=4"),
             stderr=subprocess.PIPE,
             timeout=WALL_LIMIT_S,
             check=False,

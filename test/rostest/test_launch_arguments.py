@@ -6,12 +6,16 @@ The effect of a parameter is tested where it is read.
 
 from __future__ import annotations
 
-import subprocess
+import contextlib
+import io
+import sys
 import unittest
 import xml.etree.ElementTree as ET
 from dataclasses import fields
 from pathlib import Path
+from unittest import mock
 
+import roslaunch
 import rostest
 import yaml
 
@@ -20,17 +24,21 @@ from drone_mesh.configuration import FactoryConfiguration
 LAUNCH = Path(__file__).resolve().parents[2] / "launch"
 
 
-def roslaunch(option: str, file: str, *arguments: str) -> str:
-    command = ["roslaunch", option, str(LAUNCH / file), *arguments]
-    return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+def printed(option: str, file: str, *arguments: str) -> str:
+    """What `roslaunch OPTION FILE ARGUMENT...` prints, without a process of its own."""
+    out, words = io.StringIO(), ["roslaunch", option, str(LAUNCH / file), *arguments]
+    given = mock.patch.object(sys, "argv", words)  # from where it takes the arguments
+    with given, contextlib.redirect_stdout(out), contextlib.suppress(SystemExit):
+        roslaunch.main(words)
+    return out.getvalue()
 
 
 def nodes(*arguments: str) -> set[str]:
-    return set(roslaunch("--nodes", "factory.launch", *arguments).split())
+    return set(printed("--nodes", "factory.launch", *arguments).split())
 
 
 def parameters(file: str, *arguments: str) -> dict[str, object]:
-    return dict(yaml.safe_load(roslaunch("--dump-params", file, *arguments)))
+    return dict(yaml.safe_load(printed("--dump-params", file, *arguments)))
 
 
 def names_in(file: str) -> set[str]:
@@ -100,7 +108,7 @@ class LaunchArgumentsTest(unittest.TestCase):
 
     def test_recorder_player_and_rviz_get_their_options(self) -> None:
         def line(file: str, node: str, *arguments: str) -> str:
-            return roslaunch(f"--args={node}", file, *arguments)
+            return printed(f"--args={node}", file, *arguments)
 
         record = ("record.launch", "/mesh_recorder", "bag:=/my/run")
         self.assertIn("--lz4 --buffsize", line(*record))
@@ -113,11 +121,11 @@ class LaunchArgumentsTest(unittest.TestCase):
         console = {"recording": "/my.bag", "port": 99, "origin": "1,2,3", "tiles": "/t"}
         for name, value in console.items():
             self.assertEqual(found[f"/mesh_console/{name}"], value)
-        shown = roslaunch("--nodes", *replay, "console:=false", "rviz:=true").split()
+        shown = printed("--nodes", *replay, "console:=false", "rviz:=true").split()
         self.assertEqual(set(shown), {"/mesh_replay", "/mesh_markers", "/mesh_rviz"})
         rviz = line("rviz.launch", "/mesh_rviz", "rviz_config:=/my.rviz")
         self.assertIn("-d /my.rviz", rviz)
-        hidden = roslaunch("--nodes", "rviz.launch", "window:=false").split()
+        hidden = printed("--nodes", "rviz.launch", "window:=false").split()
         self.assertEqual(hidden, ["/mesh_markers"])
 
 

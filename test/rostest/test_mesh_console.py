@@ -23,12 +23,13 @@ from rostest_support import (
     WALL_LIMIT_S,
     LogWatch,
     kill_and_wait_for_respawn,
+    program,
     wait_for,
 )
 
 HOST = "127.0.0.1:18181"
 TOKEN = "a-token-for-this-test"
-CONSOLE = ("rosrun", "drone_mesh", "console", "__name:=guarded_console", "_port:=0")
+CONSOLE = program("console", "__name:=guarded_console", "_port:=0")
 
 
 class Page:

@@ -18,7 +18,7 @@ import rostest
 import websockets.exceptions
 import websockets.sync.client
 from rosgraph_msgs.msg import Clock
-from rostest_support import WALL_LIMIT_S, wait_for
+from rostest_support import WALL_LIMIT_S, program, wait_for
 
 from drone_mesh.lab.command import main as lab_command
 from drone_mesh.msg import MeshState, NodeState, PacketSample
@@ -89,7 +89,7 @@ class ReplayTest(unittest.TestCase):
         run = ["run", str(folder / "trial.yaml"), "--workers", "0", "--out", out]
         self.assertEqual(lab_command(run), 0)
         row = (folder / "out" / "runs.csv").read_text().splitlines()[1]
-        show = ["rosrun", "drone_mesh", "lab_run", out, row[:8], "--bag", str(self.bag)]
+        show = program("lab_run", out, row[:8], "--bag", str(self.bag))
         shown = subprocess.run(show, capture_output=True, text=True, timeout=60, check=True)
         self.assertIn("reproduces the run", shown.stdout)
         states = list(read_states(self.bag))

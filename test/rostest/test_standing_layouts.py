@@ -17,7 +17,7 @@ import actionlib
 import rospy
 import rostest
 from actionlib_msgs.msg import GoalStatus
-from rostest_support import LogWatch, MeshWatch, call, pid_of, wait_for
+from rostest_support import LogWatch, MeshWatch, call, pid_of, program, run_program, wait_for
 
 from drone_mesh.formations.layouts import Layouts
 from drone_mesh.msg import LayoutAction, LayoutFeedback, LayoutGoal, LayoutProgress, MeshState
@@ -28,12 +28,6 @@ PLACES = (
     ("the old oak", [5.1213708, 52.0907270]),  # x -2, y 3
 )
 FLIGHTS_S = 120  # wall; the longest takes less than 30 simulated seconds
-
-
-def run(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        ["rosrun", "drone_mesh", *arguments], capture_output=True, text=True, timeout=300
-    )
 
 
 def waits_for_17(progress: LayoutProgress) -> bool:
@@ -110,20 +104,20 @@ class StandingLayoutsTest(unittest.TestCase):
 
     def test_5_the_commands_show_progress_and_withdraw_on_ctrl_c(self) -> None:
         self.mesh.wait("1 and 2 connected", 60, lambda: self.mesh.connected((1, 2)))
-        flight = run("fly", "1", "-1.5", "2", "0")
+        flight = run_program("fly", "1", "-1.5", "2", "0")
         self.assertEqual(flight.returncode, 0, flight.stdout + flight.stderr)
         self.assertRegex(flight.stdout, r"under way, \d+ m and \d+ s left\n(.*\n)*arrived\n")
-        done = run("layout", "1")
+        done = run_program("layout", "1")
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
         self.assertIn("1 of 1 at their place", done.stdout)
-        drawn = run("layout", "--file", self.drawing())
+        drawn = run_program("layout", "--file", self.drawing())
         self.assertEqual(drawn.returncode, 0, drawn.stdout + drawn.stderr)
         self.assertIn("2 of 2 at their places", drawn.stdout)
         self.mesh.wait_at(9, -2.0, 3.0, within_s=5.0)
         self.assertIn("drone 1 to x -3, y 3, z 0 m\ndrone 9 to x -2, y 3, z 0 m\n", drawn.stdout)
         self.missions_and_gateways_stay()
         layout = subprocess.Popen(  # 17 is off and elsewhere, since the test before
-            ["rosrun", "drone_mesh", "layout", "--at-once", "17"], stdout=subprocess.PIPE, text=True
+            program("layout", "--at-once", "17"), stdout=subprocess.PIPE, text=True
         )
         self.assertIn("ordered", layout.stdout.readline())
         wait_for("it waits for 17", FLIGHTS_S, lambda: any(map(waits_for_17, self.open())))
@@ -134,7 +128,7 @@ class StandingLayoutsTest(unittest.TestCase):
         self.assertEqual(layout.wait(60), 130)
         self.assertTrue(self.wait_until_over(number).over)
         for wrong in (["fly", "254", "0", "0"], ["fly", "1", "nan", "0"], ["layout", "0x1"]):
-            refused = run(*wrong)
+            refused = run_program(*wrong)
             self.assertEqual(refused.returncode, 2)
             self.assertIn("invalid value", refused.stderr)
 
@@ -142,14 +136,14 @@ class StandingLayoutsTest(unittest.TestCase):
         """Points "0 " and "1 " of a ground station's mission are no drones, and move nobody."""
         line = {"type": "LineString", "coordinates": [at for _name, at in PLACES]}
         mission = self.drawing([("0 ", PLACES[0][1]), ("1 ", PLACES[1][1])], line)
-        refused = run("layout", "--file", mission)
+        refused = run_program("layout", "--file", mission)
         self.assertEqual(refused.returncode, 2, refused.stdout)
         self.assertIn("a mission of one drone, as a line goes through its 2", refused.stderr)
         gateway = self.drawing([("gateway 0", [5.1213562, 52.0907])])  # x -3, y 0
-        refused = run("layout", "--file", gateway)
+        refused = run_program("layout", "--file", gateway)
         self.assertEqual(refused.returncode, 2, refused.stdout)
         self.assertRegex(refused.stderr, r"would move gateway 0: .*--gateway")
-        moved = run("layout", "--file", gateway, "--gateway", "0")
+        moved = run_program("layout", "--file", gateway, "--gateway", "0")
         self.assertIn("drone 0 to x -3", moved.stdout, moved.stderr)
         self.assertNotEqual(moved.returncode, 2)
 

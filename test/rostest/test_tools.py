@@ -7,7 +7,6 @@ import json
 import re
 import signal
 import subprocess
-import sys
 import tempfile
 import unittest
 from collections import Counter
@@ -16,7 +15,6 @@ from typing import Callable, Iterator
 
 import genpy.dynamic
 import rosbag
-import rospkg
 import rospy
 import rostest
 from rostest_support import (
@@ -34,7 +32,7 @@ from drone_mesh.ros.views.bag import playable, read_events, read_states, topics_
 from drone_mesh.srv import PowerSwitch, SetSpeed
 
 TOOLS = ("status", "snapshot", "report")
-NODES = {
+ROS_NODES = {
     "drone_factory": "world.drone_factory_node",
     "drone_manager": "services.drone_manager",
     "wireless_signal_simulator": "services.wireless_signal_simulator",
@@ -43,21 +41,8 @@ NODES = {
     "mesh_markers": "views.markers_node",
     "console": "views.console_node",
 }
-FORKS.set_forkserver_preload([*PRELOADED, *(f"drone_mesh.ros.{m}" for m in NODES.values())])
-TOOL_LIMIT_S = 60.0
+FORKS.set_forkserver_preload([*PRELOADED, *(f"drone_mesh.ros.{m}" for m in ROS_NODES.values())])
 OLD_DETAIL = "order 7 to x 1.00 m, y 2.00 m, z 3 m: battery at 9 %"
-
-
-def run_beside(tool: str, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """Run a tool that joins the graph, as rosrun does, without the time to find it."""
-    program = Path(rospkg.RosPack().get_path("drone_mesh")) / "nodes" / tool
-    return subprocess.run(
-        [sys.executable, str(program), *arguments],
-        capture_output=True,
-        text=True,
-        timeout=TOOL_LIMIT_S,
-        check=False,
-    )
 
 
 def gateway_record() -> Iterator[str]:
@@ -168,7 +153,7 @@ class ToolsTest(unittest.TestCase):
             self.assertIn("Exit code", finished.stdout)
 
     def test_1_each_node_explains_itself_and_leaves_the_one_that_runs_alone(self) -> None:
-        for node in NODES:
+        for node in ROS_NODES:
             finished = run_program(node, "--help")
             self.assertEqual(finished.returncode, 0, finished.stderr)
             self.assertIn(f"usage: rosrun drone_mesh {node}", finished.stdout)
@@ -177,7 +162,7 @@ class ToolsTest(unittest.TestCase):
             self.assertIn("unrecognized arguments: --nonsense", refused.stderr)
 
     def test_2_without_a_master_no_node_waits_for_one(self) -> None:
-        for node in NODES:
+        for node in ROS_NODES:
             finished = run_program(node, ROS_MASTER_URI="http://127.0.0.1:9")
             self.assertEqual(finished.returncode, 2)
             self.assertIn(f"{node}: no ROS master at http://127.0.0.1:9", finished.stderr)
@@ -250,19 +235,19 @@ class ToolsTest(unittest.TestCase):
             wait_for("a bag", WALL_LIMIT_S, lambda: list(self.folder.glob("*.bag.active")))
             wait_for("the recorder listens", WALL_LIMIT_S, recorder_listens)
             self.pause_when("all connected", connected(0, 1, 2, 3))
-            finished = run_beside("status")
+            finished = run_program("status")
             self.assertEqual(finished.returncode, 0, finished.stdout + finished.stderr)
             self.assertIn("3 of 3 routers connected", finished.stdout)
             self.assertNotIn("\x1b", finished.stdout)
-            self.assertEqual(run_beside("snapshot", f"{self.folder}/live.png").returncode, 0)
+            self.assertEqual(run_program("snapshot", f"{self.folder}/live.png").returncode, 0)
             call("/Nodes/2/powerSwitch", PowerSwitch, False)
             # At full speed the repair could mend it before the world is paused.
             self.go_on(1.0)
             self.pause_when("3 is lost", connected(0, 1), lost(3))
-            self.assertEqual(run_beside("status").returncode, 1)
+            self.assertEqual(run_program("status").returncode, 1)
             self.go_on(8.0)
             self.pause_when("the repair", connected(0, 1, 3))
-            self.assertEqual(run_beside("status").returncode, 0)
+            self.assertEqual(run_program("status").returncode, 0)
         finally:
             recorder.send_signal(signal.SIGINT)
             recorder.wait(timeout=WALL_LIMIT_S)

@@ -15,7 +15,7 @@ import rosgraph
 import rospy
 import rostest
 from rosgraph_msgs.msg import Clock
-from rostest_support import WALL_LIMIT_S, call, pid_of, receives, wait_for
+from rostest_support import WALL_LIMIT_S, call, pid_of, program, receives, wait_for
 
 from drone_mesh.msg import MeshState
 from drone_mesh.srv import Casus, RequestGPS, SetSpeed
@@ -65,14 +65,10 @@ def names_of(nodes: str) -> set[str]:
     return found - {"/rosout", "/rosout_agg"}
 
 
-def run(*words: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+def run(name: str, *words: str) -> subprocess.CompletedProcess[str]:
+    """In a process of its own: rospy takes the namespace of the process when it is imported."""
     return subprocess.run(
-        ["rosrun", "drone_mesh", *words],
-        capture_output=True,
-        timeout=WALL_LIMIT_S,
-        check=False,
-        cwd=cwd,
-        text=True,
+        program(name, *words), capture_output=True, timeout=WALL_LIMIT_S, check=False, text=True
     )
 
 
@@ -113,7 +109,7 @@ class TwoSimulationsTest(unittest.TestCase):
         stood_s, passed_s = self.b.now_s, self.a.now_s
         wait_for("time passes at site a", WALL_LIMIT_S, lambda: self.a.now_s > passed_s + 5.0)
         self.assertLess(self.b.now_s, stood_s + 1.0)
-        call("/site_b/DroneFactory/setSpeed", SetSpeed, False, 4.0)
+        call("/site_b/DroneFactory/setSpeed", SetSpeed, False, 2.0)
 
     def orders_are_apart(self) -> None:
         before = self.b.place(1)
@@ -159,8 +155,9 @@ class TwoSimulationsTest(unittest.TestCase):
         self.assertEqual(
             {t for t in topics if not t.startswith("/site_b/")} - {"/rosout_agg"}, set()
         )
-        for tool in (("status", "--bag", str(bag)), ("flight_trace", str(bag), "trace.csv")):
-            finished = run(*tool, cwd=self.folder)
+        trace = str(self.folder / "trace.csv")
+        for tool in (("status", "--bag", str(bag)), ("flight_trace", str(bag), trace)):
+            finished = run(*tool)
             self.assertEqual(finished.returncode, 0, finished.stderr)
         again = Site("/again", 3)
         player = self.launch(
@@ -184,12 +181,12 @@ class TwoSimulationsTest(unittest.TestCase):
 
     def a_second_start_is_refused(self) -> None:
         pid = pid_of("/site_a/DroneFactory")
-        for program, node in (("drone_factory", "DroneFactory"), ("drone_manager", "DroneManager")):
-            refused = run(program, "__ns:=site_a")
+        for name, node in (("drone_factory", "DroneFactory"), ("drone_manager", "DroneManager")):
+            refused = run(name, "__ns:=site_a")
             self.assertEqual(refused.returncode, FAILED)
             lines = [line for line in refused.stderr.splitlines() if "pybullet" not in line]
             self.assertEqual(len(lines), 1, refused.stderr)
-            self.assertIn(f"{program}: /site_a/{node} already runs on this master", lines[0])
+            self.assertIn(f"{name}: /site_a/{node} already runs on this master", lines[0])
         launched = subprocess.run(
             ["roslaunch", "drone_mesh", "factory.launch", "namespace:=site_a"],
             stdout=subprocess.DEVNULL,
