@@ -30,6 +30,7 @@ class PathWithSpaceTest(unittest.TestCase):
             "PATH": "/usr/bin:/bin",
             "ROS_HOSTNAME": "localhost",
             "ROS_MASTER_URI": f"http://localhost:{free_port()}",
+            "ROS_LANG_DISABLE": "gencpp:geneus:genlisp:gennodejs",  # Python is all that runs
         }
 
         def status() -> str:

@@ -24,6 +24,7 @@ from drone_mesh.inprocess import Network
 # Tolerance where an attack must have no effect: the scenario alone has slightly different results
 # when packets travel at other moments.
 SLACK = 0.05
+MIDDLE = PLACES.index((0.5, 0.5))
 
 
 @functools.lru_cache(maxsize=None)  # several tests look at the same one
@@ -31,13 +32,19 @@ def outcome(name, threat):
     return trial(name, threat, seed=0)
 
 
+def quiet(name, attacked):
+    """The same scenario without an attack, made only where it can matter."""
+    if attacked.cut_off <= SLACK and attacked.later == 0.0:
+        return attacked  # no worse than whatever happens without one
+    return outcome(name, Threat.NONE)
+
+
 @pytest.mark.parametrize("name", ATTACKS)
 def test_no_stranger_harms_a_mesh_with_a_key(name):
-    quiet = outcome(name, Threat.NONE)
     attacked = outcome(name, Threat.WITH_KEY)
     assert attacked.lured == 0
-    assert attacked.cut_off <= quiet.cut_off + SLACK
-    assert attacked.later <= quiet.later
+    assert attacked.cut_off <= quiet(name, attacked).cut_off + SLACK
+    assert attacked.later <= quiet(name, attacked).later
 
 
 @pytest.mark.parametrize("name", ["forged order to the gateway", "forged orders to all"])
@@ -70,21 +77,22 @@ def test_without_a_key_a_stranger_sends_drones_kilometres_away(name):
     ],
 )
 def test_a_captured_node_neither_orders_nor_lures_nor_cuts_off(name):
-    quiet = outcome(name, Threat.NONE)
     attacked = outcome(name, Threat.CAPTURED)
     assert attacked.lured == 0
-    assert attacked.cut_off <= quiet.cut_off + SLACK
+    assert attacked.cut_off <= quiet(name, attacked).cut_off + SLACK
 
 
-@pytest.mark.parametrize("threat", [Threat.WITHOUT_KEY, Threat.CAPTURED])
-@pytest.mark.parametrize("place", range(len(PLACES)))
+@pytest.mark.parametrize(
+    ("threat", "place"),
+    [*((Threat.WITHOUT_KEY, n) for n in range(len(PLACES))), (Threat.CAPTURED, MIDDLE)],
+)
 def test_beacons_of_a_black_hole_draw_nobody_who_knows_places(threat, place):
     """In the middle of the mesh half of it was cut off, while hops were believed."""
     assert trial("beacons of a black hole", threat, seed=1, place=place).cut_off <= SLACK
 
 
 def test_a_node_that_promises_a_beacon_and_falls_silent_is_soon_forgotten():
-    attacked = trial("a beacon, then silence", Threat.WITHOUT_KEY, seed=1, place=3)
+    attacked = trial("a beacon, then silence", Threat.WITHOUT_KEY, seed=1, place=MIDDLE)
     assert attacked.cut_off <= SLACK
 
 
