@@ -12,7 +12,7 @@ Part = TypeVar("Part")
 
 
 def load_by_name(what: str, name: str) -> Any:
-    """What "package.module:Name" names. `what` is in messages. Raises ConfigurationError."""
+    """The object with this name; `what` is for messages. Raises ConfigurationError."""
     module_name, _, attribute = name.partition(":")
     with in_one_line(f"{what} {name!r} cannot be loaded"):
         return getattr(importlib.import_module(module_name), attribute)

@@ -61,7 +61,7 @@ class PacketInbox:
 
 
 class Driven(Protocol):
-    """What the executor drives: a mesh component."""
+    """A mesh component, as the executor drives it."""
 
     @property
     def next_tick_s(self) -> float:
@@ -106,7 +106,7 @@ class ExecutorSlot:
         self._executor.submit(function, self)
 
     def request(self, function: Work) -> None:
-        """As MeshExecutor.request."""
+        """Like MeshExecutor.request, for this slot."""
         self._executor.request(function, self)
 
     def drive(self, driven: Driven) -> None:

@@ -60,12 +60,12 @@ class Setting:
 
     @property
     def help(self) -> str:
-        """What it is, with the bounds."""
+        """The meaning of the setting, with its bounds."""
         return f"{self.text} ({self.bounds})" if self.bounds else self.text
 
     @property
     def expected(self) -> str:
-        """What is allowed, for errors."""
+        """The allowed values, for errors."""
         return " or ".join(self.words) or ", ".join(filter(None, (self.what, self.bounds)))
 
     def allows(self, value: object) -> bool:

@@ -36,7 +36,7 @@ class Box:
 
     @property
     def corners(self) -> tuple[Point, ...]:
-        """Its four corners, seen from above."""
+        """The four corners, seen from above."""
         x, y, _z = self.center
         long, wide = self.size[0] / 2, self.size[1] / 2
         cos, sin = math.cos(self.yaw_rad), math.sin(self.yaw_rad)

@@ -76,7 +76,7 @@ class PacketRadio(Protocol):
         """Send to every node in range, without acknowledgement; True: it was sent."""
 
     def receive(self, timeout_s: float) -> Sequence[Received]:
-        """What has arrived, oldest first; waits up to `timeout_s` for something."""
+        """The payloads that have arrived, oldest first; waits up to `timeout_s` for one."""
 
     def hears_power(self) -> bool | None:
         """Whether there is power in its channel now, of whatever sender; None: it cannot tell."""

@@ -14,7 +14,7 @@ _NO_SENDER = -1
 
 
 class InTrain(enum.Enum):
-    """What an overheard packet shows about its train."""
+    """The place of an overheard packet in its train."""
 
     NO = "no"  # it belongs to none
     PERHAPS = "perhaps"  # another packet may follow at once
@@ -56,7 +56,7 @@ class Yielding:
 
 
 def place_in_train(payload: bytes, receiver: int) -> InTrain:
-    """What a packet shows `receiver` about its train."""
+    """The place of a packet in its train, as `receiver` can tell."""
     _creator, _from, kind, _to, addressee = messages.header(payload)
     if not messages.is_data(payload) or addressee == BROADCAST:
         return InTrain.NO

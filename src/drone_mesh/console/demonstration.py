@@ -42,7 +42,7 @@ _SLOW_DOWN_S = 4.0  # before the wait ends, so that a slow page does not miss wh
 
 @dataclass(frozen=True)
 class Casting:
-    """Who takes part in a demonstration, and what the fleet was like before it."""
+    """The drones that take part in a demonstration, and the state of the fleet before it."""
 
     gateway: int
     cast: Sequence[int]  # five routers: the chain, and the group behind it
@@ -77,7 +77,7 @@ class Casting:
         )
 
     def in_words(self) -> str:
-        """What it will do, before the user agrees."""
+        """The plan of the demonstration in words, for the user to agree to."""
         rest = f", and switches {len(self.resting)} others off" if self.resting else ""
         return (
             f"This sends drones {and_(self.cast)} to places beside gateway {self.gateway}{rest}. "

@@ -115,7 +115,7 @@ class History:
         return unpacked(self._states[index])
 
     def spread(self, most: int) -> list[bytes]:
-        """At most so many states, evenly over the time, for `unpacked`; the last is one of them."""
+        """At most `most` states, evenly over the time, for `unpacked`; the last is included."""
         step = max(1, math.ceil(len(self._states) / most))
         return self._states[::-1][::step][::-1]
 

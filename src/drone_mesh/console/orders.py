@@ -69,7 +69,7 @@ def places_of(orders: Iterable[Order]) -> list[Place]:
 
 
 class FileContent(NamedTuple):
-    """What the page may fly: places of drones, or ways over x, y, z in metres."""
+    """The content of a file: places of drones, or ways over x, y, z in metres."""
 
     places: Sequence[AnyPlace]
     ways: Sequence[Sequence[Vector]]

@@ -27,7 +27,7 @@ class Stage:
         self._ending = False  # it puts everything back, or shall do so
 
     def plan(self) -> str:
-        """What a demonstration would do, as a question. Raises OrderRefused if it cannot begin."""
+        """The plan of a demonstration, as a question. Raises OrderRefused if it cannot begin."""
         if self._store.mesh is None:
             raise OrderRefused("no state of a mesh yet")
         return Casting.choose(self._store.mesh).in_words()

@@ -78,7 +78,7 @@ class FlightPath:
 
     @property
     def ground_m(self) -> float:
-        """Its horizontal length."""
+        """The horizontal length of the path."""
         return _length([corner[:2] for corner in self.across])
 
     def ground_flown_m(self, now_s: float) -> float:

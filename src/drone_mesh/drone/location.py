@@ -47,6 +47,6 @@ class Location(NamedTuple):
         return f"x {self.longitude:.2f} m, y {self.latitude:.2f} m, z {self.height:.0f} m"
 
     def as_ordered(self) -> Location:
-        """As an order carries it: float32, and whole metres of height. Compare orders by this."""
+        """The place as an order carries it: float32, whole metres of height. To compare orders."""
         latitude, longitude = _ON_THE_WIRE.unpack(_ON_THE_WIRE.pack(self.latitude, self.longitude))
         return Location(latitude, longitude, float(round(self.height)))

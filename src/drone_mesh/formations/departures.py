@@ -40,7 +40,7 @@ class FlightRules(NamedTuple):
 
 @dataclass
 class Choice:
-    """What the drones of a formation may do now."""
+    """The decision about the drones of a formation: what each may do now."""
 
     set_out: dict[int, Location] = field(default_factory=dict)  # and where to
     blocked: dict[int, str] = field(default_factory=dict)  # by a drone that will not leave: why

@@ -23,7 +23,7 @@ STEP_S = 2.0  # how often the plan looks who may set out; also its time for an o
 
 @dataclass
 class FormationPreview:
-    """What would happen to a fleet; ids ascending."""
+    """The outcome of a formation for a fleet; ids ascending."""
 
     duration_s: float = 0.0  # until the last drone of the formation has landed
     out_of_reach: list[int] = field(default_factory=list)  # without a path at the end

@@ -315,7 +315,7 @@ class StandingOrders:
     # For a restart ---------------------------------------------------------------------------
 
     def saved(self) -> list[dict[str, Any]]:
-        """What is left to do, in plain values."""
+        """The orders that are left, as plain values that `restore` reads."""
         return [
             {
                 "number": order.number,

@@ -58,7 +58,7 @@ class ChipAntenna(NRF24HighLevelInterface, IInProcessAntenna):
         self._air.run(functools.partial(super().switch_power, on))
 
     def move(self) -> None:
-        """Its drone is elsewhere."""
+        """Move the chip to where its drone is."""
         self.chip.position = self._drone.get_location().to_vector()
 
 
@@ -86,7 +86,7 @@ class ChipAir(IInProcessAir):
 
     @property
     def space(self) -> Space:
-        """What lies between the antennas, and what else sends there."""
+        """The obstacles, fading and noise between the antennas."""
         return self.air.space
 
     @property

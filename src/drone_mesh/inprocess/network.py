@@ -200,7 +200,7 @@ class Network:
         return Security(keys, self.now_s, rng)
 
     def _configuration_of(self, node_id: int) -> NodeConfiguration:
-        """That of all nodes, except for the bounds, which know the whole network."""
+        """The configuration of all nodes; only the bounds get one that knows the whole network."""
         configuration = self._configuration
         if self._routing == SHORTEST_PATH:
             path = functools.partial(ShortestPath, self._link_map, node_id)

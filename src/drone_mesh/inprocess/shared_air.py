@@ -251,7 +251,7 @@ class SharedAir(IInProcessAir):
         return strongest_dbm > RPD_DBM
 
     def _in_reach(self, node: int, faded: bool) -> list[SharedRadio]:
-        """Who may hear a node: on the mean, or at a moment when fading adds to the power."""
+        """The radios that may hear a node: on average, or when fading adds to the power."""
         faded = faded and self.space.fading is not None
         reached = self._reached.get((node, faded))
         if reached is None:

@@ -152,7 +152,7 @@ def _older(plan: Plan, store: Store) -> dict[str, str]:
 
 
 def _changed(old: str, new: str) -> Iterator[str]:
-    """What differs between two versions of the code: modules of the user, or this package."""
+    """Yield what differs between two versions of the code: modules of the user, or this package."""
     for word in set(new.split()) - set(old.split()):
         module, colon, _ = word.partition(":")
         yield f"{module}.py" if colon else "drone_mesh"

@@ -42,7 +42,7 @@ class Drawing(NamedTuple):
 
 
 def _panels(count: int, row_in: float) -> tuple[Figure, list[Axes]]:
-    """A figure with so many panels, in rows of this height."""
+    """A figure with this many panels, in rows of this height."""
     columns = min(PANELS_PER_ROW, count)
     rows = math.ceil(count / columns)
     figure = Figure(figsize=(WIDTH_IN, row_in * rows + 0.5), layout="constrained")

@@ -37,7 +37,7 @@ class ServiceGap:
     restored_s: float | None  # None: not until the end
 
     def seconds(self, end_s: float) -> float:
-        """Its duration; up to the end of the run if it has not ended."""
+        """The duration of the gap; up to the end of the run if it has not ended."""
         return (end_s if self.restored_s is None else self.restored_s) - self.lost_s
 
 

@@ -187,7 +187,7 @@ class Probes(Part):
 
 
 class Positions(Part):
-    """What the mesh software knows of positions, as in PositionErrors."""
+    """The positions that the mesh software is told, as in PositionErrors."""
 
     known: bool = True
     sigma_m: AtLeast0 = 0.0

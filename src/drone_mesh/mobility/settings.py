@@ -17,7 +17,7 @@ Knot = Tuple[float, float, float, float]  # t (s), x, y, z (m)
 
 @dataclass(frozen=True)
 class Mobility:
-    """What moves, how, and how fast. Which numbers a kind uses: docs/motion.md."""
+    """The motion of a fleet: its kind and numbers. Which numbers a kind uses: docs/motion.md."""
 
     kind: str = "none"
     speed_m_s: tuple[float, float] = (0.3, 0.3)  # least and greatest
@@ -99,7 +99,7 @@ def _is_in(low: float, value: object, high: float = MOST) -> bool:
 
 
 def _is_tuple(values: object, length: int) -> bool:
-    """Whether these are so many finite numbers."""
+    """Whether these are `length` finite numbers."""
     return (
         isinstance(values, Sequence)
         and len(values) == length

@@ -10,7 +10,7 @@ SILENT_AFTER_S = 5.0  # ten missed reports, since a host reports twice a second
 
 
 class Condition(enum.Enum):
-    """What to expect of a node now. The value is the word that views display."""
+    """The condition of a node. The value is the word that views display."""
 
     CONNECTED = "connected"
     CRASHED = "crashed"  # its drone never flies again, but its node may still work

@@ -21,7 +21,7 @@ Link = Tuple[int, int]  # the lower id first
 
 
 class LinkUse(enum.Enum):
-    """What a link is used for. The value is the text that views display."""
+    """The use of a link. The value is the text that views display."""
 
     ROUTE = "route to a gateway"
     KNOWN = "known link"  # the two are neighbours, but no route uses the link
@@ -82,7 +82,7 @@ class LinkForecast:
     def update(
         self, links: Iterable[Link], nodes: Sequence[NodeStatus], now_s: float, range_m: float
     ) -> list[Link]:
-        """Those of these links that end within SOON_S if nobody changes course."""
+        """The links among these that end within SOON_S if nobody changes course."""
         places: dict[int, Sequence[float]] = {
             node.id: tuple(node.position) for node in nodes if position_is_known(node)
         }

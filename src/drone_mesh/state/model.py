@@ -99,7 +99,7 @@ class EventRecord:
     place: Location | None = None
 
     def explanation(self) -> str:
-        """What views display behind the kind."""
+        """The words that views display after the kind."""
         return explanation(self.order, self.place, self.detail)
 
 
@@ -142,7 +142,7 @@ def data_in_words(node: NodeStatus) -> str:
 
 
 def another_radio(node: int) -> str:
-    """What is wrong if a node shares its id."""
+    """The trouble of a node whose id another radio uses, in words."""
     return f"another radio uses id {node}"
 
 

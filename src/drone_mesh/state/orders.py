@@ -105,7 +105,7 @@ class OrderProgress:
 
     @property
     def state(self) -> OrderState:
-        """Its state."""
+        """The state of the order, by the reports of all gateways."""
         return self._latest.state
 
     @property
@@ -119,7 +119,7 @@ class OrderProgress:
         return not self.state.is_open
 
     def in_words(self, node: NodeStatus | None = None) -> str:
-        """Its state, with the way that is left if `node` is its drone now."""
+        """The state in words, with the way that is left if `node` is its drone now."""
         return self._latest.in_words(node)
 
     def on_event(self, event: EventRecord) -> None:
@@ -184,7 +184,7 @@ class OrderWatch:
             self._latest[drone] = order
 
     def words(self, drone: int, node: NodeStatus | None) -> str:
-        """Its latest order and the progress, as text; empty if there was none."""
+        """The latest order of a node and its progress, as text; empty if there was none."""
         if drone in self._expected:
             return BEING_SENT
         latest = self._latest.get(drone)

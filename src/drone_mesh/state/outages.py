@@ -36,7 +36,7 @@ class Outage:
 
     @property
     def seconds(self) -> float | None:
-        """Its duration, or None if it has not ended."""
+        """The duration, or None if the outage has not ended."""
         return None if self.connected_s is None else self.connected_s - self.lost_s
 
 

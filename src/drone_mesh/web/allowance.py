@@ -11,7 +11,7 @@ MOST_CLIENTS = 1024
 
 
 class Allowance:
-    """So many times at once per client, then once per period. Any thread."""
+    """Lets each client do something `at_once` times, then once per period. Any thread."""
 
     def __init__(
         self, at_once: int, period_s: float, clock: Callable[[], float] = time.monotonic
@@ -36,7 +36,7 @@ class Allowance:
 
 
 def client_of(address: str) -> str:
-    """What counts as one client: an address, of IPv6 a whole /64."""
+    """The client of an address: the address itself, of IPv6 its whole /64."""
     parsed = numeric_address(address)
     return str(int(parsed) >> 64) if isinstance(parsed, ipaddress.IPv6Address) else address
 

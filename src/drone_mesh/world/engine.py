@@ -129,7 +129,7 @@ class DroneEngine(IDroneEngine):
 
     @property
     def pilot(self) -> TrackPilot | None:
-        """Who flies it while it is not on an ordered flight; None: nobody any more. Any thread."""
+        """The pilot that flies it between ordered flights; None: there is none now. Any thread."""
         pilot = self._pilot
         return None if pilot is None or pilot.has_arrived else pilot
 

@@ -230,7 +230,7 @@ class Authority:
     def _why_not_leave(
         self, now_s: float, autopilot: Autopilot, on_ground: bool, for_repair: bool
     ) -> str:
-        """What forbids a change of the mode for a flight; empty if nothing does."""
+        """The reason why the mode may not be changed for a flight; empty if it may."""
         mode, choice, may = self._telemetry.mode, self.choice, self._permissions
         if mode == autopilot.own_mode:
             return ""

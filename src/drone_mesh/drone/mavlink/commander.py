@@ -166,7 +166,7 @@ class Commander:
         self._current = None
 
     def words(self) -> str:
-        """What the autopilot said about the current command; empty: nothing."""
+        """The autopilot's text about the current command; empty: it sent none."""
         return "" if self._current is None else self._current.words
 
     def on_ack(self, message: Message, now_s: float) -> None:

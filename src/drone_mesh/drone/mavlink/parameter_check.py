@@ -18,7 +18,7 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Finding:
-    """What a parameter is, and whether that is safe."""
+    """A parameter that was read, and whether its value is safe."""
 
     requirement: Requirement
     name: str  # in this release of the autopilot, or the oldest name if it could not be read
@@ -31,7 +31,7 @@ class Finding:
 
     @property
     def complaint(self) -> str:
-        """What is wrong; empty if it is safe."""
+        """The parameter in words, if its value is not safe; otherwise empty."""
         if self.is_safe:
             return ""
         found = "could not be read" if self.value is None else f"is {self.value:g}"
@@ -56,7 +56,7 @@ class ParameterCheck:
 
     @property
     def complaints(self) -> tuple[str, ...]:
-        """What is wrong, of what was read or given up until now."""
+        """The parameters, read or given up until now, whose values are not safe."""
         return tuple(finding.complaint for finding in self.findings if not finding.is_safe)
 
     def tick(self, now_s: float) -> None:

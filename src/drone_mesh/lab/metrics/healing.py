@@ -63,7 +63,7 @@ def t_capped_s(run: RunRecord) -> float:
     t_reroute_s="of t_total_s: the rest",
 )
 def phases(run: RunRecord) -> tuple[float, float, float, float]:
-    """They add up to t_total_s."""
+    """The four phases, which add up to t_total_s."""
     start_s, end_s = run.fault_s, run.healed_at_s
     if start_s is None or end_s is None:
         return (NAN, NAN, NAN, NAN)

@@ -60,11 +60,11 @@ class Noise:
         self._drawn_to_ns: float = self._from_ns
 
     def stop(self, at_ns: int) -> None:
-        """It sends nothing more from now on."""
+        """End the noise at this time."""
         self._until_ns = min(self._until_ns, at_ns)
 
     def power_dbm(self, carrier_mhz: int, width_mhz: float) -> float:
-        """What it radiates within a receiver's channel; -inf outside its own band."""
+        """The power radiated within a receiver's channel, in dBm; -inf outside the noise's band."""
         low_mhz = max(self._low_mhz, carrier_mhz - width_mhz / 2)
         high_mhz = min(self._high_mhz, carrier_mhz + width_mhz / 2)
         if high_mhz <= low_mhz:
@@ -109,7 +109,7 @@ class Space:
         self.noises: list[Noise] = []
 
     def lost_db(self, here: Position, there: Position) -> float:
-        """What obstacles between two places cost; set them before the first frame."""
+        """The loss by obstacles between two places, in dB; set them before the first frame."""
         return 0.0 if self.obstacles is None else self.obstacles(here, there)
 
     def noise_dbm(

@@ -129,7 +129,7 @@ def start_node(about: str | None, name: str, *, disable_signals: bool = False) -
 
 
 def end_launch() -> None:
-    """End the roslaunch that started this node, so that it does not start it again in vain."""
+    """End the roslaunch that started this node: it would start the node again and again."""
     parent = os.getppid()
     command = Path(f"/proc/{parent}/cmdline").read_bytes()
     if LAUNCHING.encode() in command:

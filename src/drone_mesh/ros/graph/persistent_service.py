@@ -36,7 +36,7 @@ class ServiceGone(MeshError):
 
 
 class ServiceSilent(ServiceGone):
-    """Its process, or the master, is there and does not answer."""
+    """The process of the service, or the master, is there and does not answer."""
 
 
 class ServiceUnknown(ServiceGone):

@@ -51,7 +51,7 @@ class SilentEngines(Periodic):
             _log.error("%s does not answer: its drones have no position", gps.server)
 
     def drop(self, gps: Gps) -> None:
-        """Its drone has ended."""
+        """Ask this engine no more, because its drone has ended."""
         with self._lock:
             self._silent = {key: other for key, other in self._silent.items() if other is not gps}
 

@@ -12,7 +12,7 @@ from drone_mesh.ros.graph import names
 
 
 class Outcomes(NamedTuple):
-    """What the gateways did with the orders of a batch; lists of ids."""
+    """The outcome of a batch of orders at the gateways; lists of ids."""
 
     sent: list[int]
     no_route: list[int]

@@ -125,7 +125,7 @@ def _drawn(file: Path, origin: str) -> list[Order]:
 def _follow(
     heard: queue.Queue[LayoutProgress], number: int, stop: StopRequest
 ) -> LayoutProgress | None:
-    """Print each change until it is over; returns the last. None: the program shall stop."""
+    """Print each change until it is over; returns the last. None: the program was told to end."""
     shown = ""
     while not stop.is_made():
         try:

@@ -218,7 +218,7 @@ class MarkerMaker:
 
 
 def _is_in_flight(node: NodeStatus) -> bool:
-    """On a flight of its own, or flown by its pilot."""
+    """Whether a drone is on an ordered or decided flight, or flown by its pilot."""
     return len(node.path) > 0 or len(node.heading) > 0
 
 
