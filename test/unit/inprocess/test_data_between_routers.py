@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import random
 
 import pytest
@@ -75,11 +76,39 @@ def test_between_25_nodes_at_rest_each_message_arrives_within_a_second(technique
     assert_all_arrive(network, within_s=1.0, count=100)
 
 
+@pytest.mark.parametrize("technique", ["child_table_tree", "beacon"])
 @pytest.mark.parametrize("key", [None, KEY], ids=["plain", "key"])
-def test_on_a_shared_channel_within_five_seconds(key):
-    network = scenarios.fleet(15, 4, seed=1, radio="shared", key=key)
+def test_on_a_shared_channel_within_five_seconds(key, technique):
+    network = scenarios.fleet(15, 4, seed=1, radio="shared", key=key, routing=technique)
     network.run_for(60.0)
     assert_all_arrive(network, within_s=5.0, count=60, every_s=0.5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("nodes", "radio", "technique"),
+    [
+        (25, "shared", "child_table_tree"),
+        (25, "shared", "beacon"),
+        (100, "disc", "child_table_tree"),
+        (100, "disc", "beacon"),
+        (100, "shared", "child_table_tree"),
+    ],
+)
+def test_also_between_more_nodes(nodes, radio, technique):
+    network = scenarios.fleet(nodes - 1, math.isqrt(nodes), 2, radio=radio, routing=technique)
+    network.run_for(120.0)
+    assert_all_arrive(network, 1.0 if radio == "disc" else 5.0, count=300, every_s=0.5)
+
+
+@pytest.mark.slow
+def test_between_a_hundred_nodes_with_beacons_on_a_shared_channel_one_in_a_hundred_is_later():
+    """Who changes its parent is not known far away until the beacons of all between have told."""
+    network = scenarios.fleet(99, 10, 2, radio="shared", routing="beacon")
+    network.run_for(120.0)
+    pairs = random.Random(3).sample(list(itertools.permutations(sorted(network.nodes), 2)), 300)
+    delays = send_each(network, pairs, every_s=0.5)
+    assert sum(delays.get(pair, math.inf) <= 5.0 for pair in pairs) >= 297
 
 
 @pytest.mark.parametrize("technique", ROUTING_TECHNIQUES)

@@ -7,6 +7,7 @@ import math
 from drone_mesh.communication.beacon.packets import Beacon, Motion
 
 FRESH = 2.5  # intervals: a neighbour that was silent for longer is none
+MOST_VAIN = 3  # nodes with which it brought no contact, before it counts as one that swallows
 MOST_REFUSED = 3  # packets that it did not take, since it last proved that it hears
 REFUSED_S = 3.0  # within which; a burst of losses is shorter
 
@@ -17,7 +18,7 @@ class Neighbour:
     __slots__ = (
         "alive_s", "announced_s", "apart_m", "beacon", "deaf", "doubted_s", "failed_s", "heard_s",
         "listed_s", "loss", "motion", "near_s", "node", "proved_s", "refused", "refuses_s",
-        "reported_s", "until_s",
+        "reported_s", "until_s", "vain",
     )  # fmt: skip
 
     def __init__(self, node: int, beacon: Beacon) -> None:
@@ -35,12 +36,19 @@ class Neighbour:
         self.loss = 0.0  # of its link, in hops
         self.announced_s: dict[int, float] = {}  # the nodes below it, and since when
         self.listed_s: dict[int, float] = {}  # and when it listed them last
+        # Nodes that did not answer what this one took for them, since a packet of another came here
+        self.vain: set[int] = set()
         self.near_s: dict[int, float] = {}  # its own neighbours, and when it showed them
 
     @property
     def usable(self) -> bool:
         """Whether it was alive since it failed, and hears this node."""
         return self.alive_s > self.failed_s and not self.deaf
+
+    @property
+    def swallows(self) -> bool:
+        """Whether it seems to lead nowhere, whatever it lists."""
+        return len(self.vain) >= MOST_VAIN
 
     def heard(self, beacon: Beacon, own: Motion | None, now_s: float) -> None:
         """Its beacon arrived, while this node was where `own` says."""

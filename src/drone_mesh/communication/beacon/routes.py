@@ -226,6 +226,15 @@ class BeaconRoutes(IRoutes):
     def led_to(self, node: int, neighbour: int) -> None:
         """A packet of `node` came through this neighbour."""
         self._hints[node] = neighbour, self.now_s
+        known = self.neighbours.get(neighbour)
+        if known is not None and known.vain:
+            known.vain.clear()
+
+    def in_vain(self, node: int, neighbour: int) -> None:
+        """A neighbour took a question for `node`, which has not been heard since."""
+        known = self.neighbours.get(neighbour)
+        if known is not None and neighbour != node:
+            known.vain.add(node)
 
     def led_s(self, node: int) -> float:
         """When a packet of this node came last over a relay. Any thread."""
@@ -380,10 +389,15 @@ class BeaconRoutes(IRoutes):
                 yield Way(neighbour, -heard)
             return
         seen: set[int] = set()
+        doubtful: list[Way] = []
         for way in self._ways_down(node, came_from):
             if way.neighbour not in seen:
                 seen.add(way.neighbour)
-                yield way
+                if way.neighbour != node and self.neighbours[way.neighbour].swallows:
+                    doubtful.append(way)
+                else:
+                    yield way
+        yield from sorted(doubtful, key=lambda way: len(self.neighbours[way.neighbour].vain))
 
     def _ways_down(self, node: int, came_from: int) -> Iterator[Way]:
         """The same for a node that is no gateway, and some of them more than once."""

@@ -12,7 +12,12 @@ import math
 import struct
 from typing import NamedTuple
 
-from drone_mesh.communication.wire.messages import BODY_BYTES, ROUTE_RECORD, ROUTE_RECORD_AT
+from drone_mesh.communication.wire.messages import (
+    BODY_BYTES,
+    QUESTION,
+    ROUTE_RECORD,
+    ROUTE_RECORD_AT,
+)
 from drone_mesh.errors import MessageRefused, PacketError
 
 MAX_MESSAGE_BYTES = 1024
@@ -20,7 +25,7 @@ MAX_DATA_PORT = 255  # one byte
 MESSAGE_TAG_BYTES = 6  # after the payload of a message in a mesh with a key
 FRAGMENTS = range(128, 192)  # type of the fragment with index 0, 1, ...
 ACK = 192  # the fragments of a message that its creator has
-POLL = 193  # asks for an ACK, and ends a train
+POLL = QUESTION  # asks for an ACK, and ends a train
 NO_ANSWER = 0  # nonce of a POLL that only ends a train
 ECHO = ROUTE_RECORD  # asks for an ECHO_ANSWER; each node that forwards it adds its id
 ECHO_ANSWER = 195

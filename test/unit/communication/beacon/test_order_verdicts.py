@@ -1,4 +1,4 @@
-"""Verdicts: which neighbour takes an order."""
+"""Verdicts: which neighbour takes an order, or a question of users' data."""
 
 from __future__ import annotations
 
@@ -15,6 +15,8 @@ from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.packet_types import MessageType
 
 GATEWAY, LIAR, RELAY, DRONE = 0, 1, 2, 9
+DRONES = (DRONE, 10, 11, 12)
+POLL, LAST_OF_TRAIN = b"\1\0\5\0\0\0", b"\1\0\0\0\0\0"  # session, nonce, message, checksum
 
 
 class Sender:
@@ -30,13 +32,15 @@ class Sender:
     def claim(self):
         for node, ago_s in ((RELAY, 0.1), (LIAR, 0.0)):
             self.routes.now_s = self.deadlines.now_s - ago_s
-            near = Beacon(GATEWAY, 1, 1, GATEWAY, NO_ANCESTORS, 2.0, near=(DRONE,))
+            near = Beacon(GATEWAY, 1, 1, GATEWAY, NO_ANCESTORS, 2.0, near=DRONES)
             self.routes.heard(node, near)
 
-    def next_hop(self, after_s=0.0, kind=MessageType.MOVE_TO_LOCATION, came_from=NO_ROUTE):
+    def next_hop(
+        self, after_s=0.0, kind=MessageType.MOVE_TO_LOCATION, came_from=NO_ROUTE, to=DRONE, body=b""
+    ):
         self.deadlines.now_s += after_s
         self.claim()
-        packet = messages.packet(kind, GATEWAY, GATEWAY, NO_ROUTE, DRONE)
+        packet = messages.packet(kind, GATEWAY, GATEWAY, NO_ROUTE, to, body)
         return self.verdicts.verdict_on(Transit(packet, came_from, self.deadlines.now_s))
 
 
@@ -64,3 +68,41 @@ def test_nobody_is_suspected_for_longer_than_the_order_is_repeated():
 def test_packets_that_are_no_orders_go_the_best_way():
     sender = Sender()
     assert [sender.next_hop(2.0, MessageType.REQUESTLOCATION) for _ in range(2)] == [LIAR, LIAR]
+
+
+def test_a_poll_without_an_answer_goes_another_way_too_but_not_one_that_wants_none():
+    sender = Sender()
+    assert [sender.next_hop(2.0, 193, body=POLL) for _ in range(2)] == [LIAR, RELAY]
+    sender = Sender()
+    assert [sender.next_hop(2.0, 193, body=LAST_OF_TRAIN) for _ in range(2)] == [LIAR, LIAR]
+
+
+def unanswered(sender, drones):
+    for drone in drones:
+        assert sender.next_hop(to=drone) == LIAR
+        assert sender.next_hop(after_s=2.0, to=drone) == RELAY
+
+
+def test_a_neighbour_through_which_three_nodes_gave_no_answer_takes_no_packet_of_any_kind():
+    sender = Sender()
+    unanswered(sender, DRONES[:2])
+    assert sender.next_hop(kind=MessageType.REQUESTLOCATION, to=12) == LIAR
+    unanswered(sender, DRONES[2:3])
+    assert sender.next_hop(kind=MessageType.REQUESTLOCATION, to=12) == RELAY
+    assert sender.next_hop(kind=MessageType.REQUESTLOCATION, to=LIAR) == LIAR
+
+
+def test_until_a_packet_of_another_node_comes_through_it():
+    sender = Sender()
+    unanswered(sender, DRONES[:3])
+    sender.routes.led_to(12, LIAR)
+    sender.deadlines.now_s += 5.0  # that it came from there is no hint any more
+    assert sender.next_hop(kind=MessageType.REQUESTLOCATION, to=12) == LIAR
+
+
+def test_it_is_used_where_there_is_no_other_way():
+    sender = Sender()
+    unanswered(sender, DRONES[:3])
+    del sender.routes.neighbours[RELAY]
+    ways = list(sender.routes.next_hops(12, NO_ROUTE))
+    assert [way.neighbour for way in ways] == [LIAR]
