@@ -15,13 +15,14 @@ LAUNCH = (
     "-m",
     "drone_mesh.ros.graph.launching",
 )  # as scripts/run; roslaunch exits with 0
+ALONE = ("simulator:=false", "manager:=false")  # what ends a launch does so with and without these
 
 
 class BadArgumentsTest(unittest.TestCase):
-    def launch_and_expect(self, argument: str, line: str) -> None:
+    def launch_and_expect(self, line: str, *arguments: str) -> None:
         port = free_port()
         launch = subprocess.run(
-            [*LAUNCH, "-p", str(port), "drone_mesh", "factory.launch", argument],
+            [*LAUNCH, "-p", str(port), "drone_mesh", "factory.launch", *arguments],
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             env={**os.environ, "ROS_MASTER_URI": f"http://127.0.0.1:{port}"},
@@ -83,31 +84,29 @@ class BadArgumentsTest(unittest.TestCase):
         )
 
     def test_a_number_that_is_out_of_bounds(self) -> None:
-        self.launch_and_expect(
-            "max_distance:=-1", "argument: invalid max_distance '-1': expected metres"
-        )
+        line = "argument: invalid max_distance '-1': expected metres"
+        self.launch_and_expect(line, "max_distance:=-1")
 
     def test_a_number_that_is_none(self) -> None:
-        self.launch_and_expect(
-            "hosts:=many", "argument: invalid hosts 'many': expected a whole number"
-        )
+        line = "argument: invalid hosts 'many': expected a whole number"
+        self.launch_and_expect(line, "hosts:=many", *ALONE)
 
     def test_a_file_of_layouts_that_is_not_there(self) -> None:
-        self.launch_and_expect(
-            "casus:=/no/such.yaml", "casus:=/no/such.yaml: No such file or directory"
-        )
+        given = "casus:=/no/such.yaml"
+        self.launch_and_expect(f"{given}: No such file or directory", given)
 
     def test_a_file_of_obstacles_that_is_not_there(self) -> None:
-        self.launch_and_expect("obstacles:=/no/such.yaml", "obstacles: /no/such.yaml: No such")
+        line = "obstacles: /no/such.yaml: No such"
+        self.launch_and_expect(line, "obstacles:=/no/such.yaml", *ALONE)
 
     def test_a_directory_in_place_of_a_configuration(self) -> None:
-        self.launch_and_expect("config:=/tmp", "config:=/tmp: Is a directory")
+        self.launch_and_expect("config:=/tmp: Is a directory", "config:=/tmp", *ALONE)
 
     def test_a_configuration_in_another_folder(self) -> None:
-        self.launch_and_expect("config:=mine.yaml", "config:=mine.yaml: no such file in ")
+        self.launch_and_expect("config:=mine.yaml: no such file in ", "config:=mine.yaml", *ALONE)
 
     def test_a_key_file_that_is_not_there(self) -> None:
-        self.launch_and_expect("key:=/no/such", "key: /no/such: No such file or directory")
+        self.launch_and_expect("key: /no/such: No such file or directory", "key:=/no/such", *ALONE)
 
 
 if __name__ == "__main__":

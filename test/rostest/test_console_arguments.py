@@ -12,13 +12,14 @@ import rostest
 from rostest_support import WALL_LIMIT_S, free_port
 
 LAUNCH = ("python3", "-m", "drone_mesh.ros.graph.launching")  # as scripts/run
+WITH_CONSOLE = ("console:=true", "simulator:=false", "manager:=false")
 
 
 class ConsoleArgumentsTest(unittest.TestCase):
     def refuses(self, launch: tuple[str, ...], line: str, *arguments: str) -> int:
         port = free_port()
         ended = subprocess.run(
-            [*launch, "-p", str(port), "drone_mesh", "factory.launch", "console:=true", *arguments],
+            [*launch, "-p", str(port), "drone_mesh", "factory.launch", *WITH_CONSOLE, *arguments],
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             env={**os.environ, "ROS_MASTER_URI": f"http://127.0.0.1:{port}"},
