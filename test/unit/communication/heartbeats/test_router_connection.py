@@ -25,6 +25,17 @@ def connected_rig():
     return rig
 
 
+SHORTCUT = "03 03 03 01 fe 02 01"  # 3 introduces itself: two hops from its gateway
+
+
+def distant_rig(*heard):
+    """Connected through 2, five hops from gateway 0; it hears these packets."""
+    rig = Rig()
+    rig.connect_through(2, hops=4)
+    rig.hear(*heard)
+    return rig
+
+
 # Becoming connected --------------------------------------------------------------------------
 
 
@@ -359,9 +370,7 @@ def test_introductions_among_connected_and_among_unconnected_are_not_answered():
 
 
 def test_the_next_heartbeat_tries_a_neighbour_with_fewer_hops():
-    rig = Rig()
-    rig.connect_through(2, hops=4)
-    rig.hear("03 03 03 01 fe 02 01")
+    rig = distant_rig(SHORTCUT)
     rig.mesh.control.send_heartbeat(0)
     assert rig.sent(HEARTBEAT) == [packet("01 01 04 03 00 01 00 00")]
     rig.hear("00 03 04 01 01 01 00 02")
@@ -370,26 +379,20 @@ def test_the_next_heartbeat_tries_a_neighbour_with_fewer_hops():
 
 
 def test_the_neighbour_with_the_fewest_hops_is_tried():
-    rig = Rig()
-    rig.connect_through(2, hops=4)
-    rig.hear("03 03 03 01 fe 03 01", "04 04 03 01 fe 01 01", "05 05 03 01 fe 02 01")
+    rig = distant_rig("03 03 03 01 fe 03 01", "04 04 03 01 fe 01 01", "05 05 03 01 fe 02 01")
     rig.mesh.control.send_heartbeat(0)
     assert rig.sent(HEARTBEAT) == [packet("01 01 04 04 00 01 00 00")]
 
 
 @pytest.mark.parametrize("hops", ["04", "05", "fe", "ff"])
 def test_a_neighbour_that_would_not_shorten_the_route_is_not_tried(hops):
-    rig = Rig()
-    rig.connect_through(2, hops=4)
-    rig.hear(f"03 03 03 01 fe {hops} 01")
+    rig = distant_rig(f"03 03 03 01 fe {hops} 01")
     rig.mesh.control.send_heartbeat(0)
     assert rig.sent(HEARTBEAT) == [packet("01 01 04 02 00 01 00 00")]
 
 
 def test_an_introduction_counts_for_one_heartbeat():
-    rig = Rig()
-    rig.connect_through(2, hops=4)
-    rig.hear("03 03 03 01 fe 02 01")
+    rig = distant_rig(SHORTCUT)
     for next_hop in (3, 2):
         rig.forget()
         rig.mesh.control.send_heartbeat(0)
@@ -421,18 +424,14 @@ def test_a_shortcut_without_an_answer_is_avoided_for_a_minute():
 
 
 def test_a_shortcut_that_does_not_take_the_heartbeat_is_no_loss():
-    rig = Rig()
-    rig.connect_through(2, hops=4)
-    rig.hear("03 03 03 01 fe 02 01")
+    rig = distant_rig(SHORTCUT)
     rig.antenna.dead = {3}
     assert rig.mesh.control.send_heartbeat(0)
     assert rig.sent(HEARTBEAT) == [packet("01 01 04 02 00 01 00 00")]
 
 
 def test_a_neighbour_whose_route_has_become_longer_is_no_shortcut():
-    rig = Rig()
-    rig.connect_through(2, hops=4)
-    rig.hear("03 03 03 01 fe 02 01", "03 03 03 01 fe 06 01")
+    rig = distant_rig("03 03 03 01 fe 02 01", "03 03 03 01 fe 06 01")
     rig.mesh.control.send_heartbeat(0)
     assert rig.tried(HEARTBEAT) == [packet("01 01 04 02 00 01 00 00")]
 
@@ -449,9 +448,7 @@ def test_only_a_neighbour_can_be_a_shortcut():
 
 def test_a_neighbour_nearer_to_another_gateway_is_a_shortcut_to_that_one_only():
     """Its few hops do not lead to the own gateway, whose heartbeat takes the usual route."""
-    rig = Rig()
-    rig.connect_through(2, hops=4)
-    rig.hear("03 03 04 01 01 01 09 00", "03 03 03 01 fe 02 01")
+    rig = distant_rig("03 03 04 01 01 01 09 00", "03 03 03 01 fe 02 01")
     rig.mesh.control.send_heartbeat(0)
     assert rig.sent(HEARTBEAT) == [
         packet("01 01 04 03 09 01 00 00"),
@@ -465,8 +462,7 @@ def test_a_neighbour_nearer_to_another_gateway_is_a_shortcut_to_that_one_only():
 
 
 def test_a_shortcut_from_before_the_loss_does_not_count():
-    rig = Rig()
-    rig.connect_through(2, hops=4)
+    rig = distant_rig()
     rig.mesh.control.send_heartbeat(0)
     rig.hear("03 03 03 01 fe 02 01")
     rig.wait_until(5.0)

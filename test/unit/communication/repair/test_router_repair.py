@@ -54,8 +54,18 @@ def own_bid(to: int, score: float) -> bytes:
 UNDERGROUND = "02 02 01 01 01 00 00 00 41 00 00 00 00 f5 ff"  # node 2: height -11 m
 
 
-def lone_rig(options=None, timing=None, repair=None):
+def connected_rig(latitude=0.0):
+    """A router there, connected through 2."""
+    rig = Rig()
+    rig.engine.place = Location(latitude, 0.0, 0.0)
+    rig.connect_through(2)
+    return rig
+
+
+def lone_rig(options=None, timing=None, repair=None, heard=()):
     """Connected through 2 to gateway 0, whose place is (0, 4); 2 stands at (0, 8). Then 2 dies.
+
+    Before that it hears the packets `heard`.
 
     The check at 5 s notices, the one at 15 s starts the timer, that at EMERGENCY_S acts.
     """
@@ -64,6 +74,7 @@ def lone_rig(options=None, timing=None, repair=None):
     rig.connect_through(2)
     rig.hear("00 02 01 01 01 00 00 80 40", NEIGHBOUR_2_AT_0_8)
     assert rig.mesh.get_last_good_known_location_id() == 2
+    rig.hear(*heard)
     rig.antenna.dead = {2}
     return rig
 
@@ -73,6 +84,19 @@ def group_rig(*neighbours, timing=None):
     rig = lone_rig(timing=timing)
     rig.know_neighbour(*neighbours)
     return rig
+
+
+def bidding_rig(*neighbours):
+    """As above, when the bids have been sent."""
+    rig = group_rig(*neighbours)
+    rig.wait_until(BIDS_S)
+    return rig
+
+
+def decide(rig, *bids):
+    """These bids are the last ones that are waited for."""
+    rig.hear(*bids)
+    rig.wait(TO_DECISION_S)
 
 
 def fly(rig, place):
@@ -85,23 +109,20 @@ def fly(rig, place):
 
 
 def test_the_place_of_the_next_hop_is_the_one_to_step_back_to():
-    rig = Rig()
-    rig.connect_through(2)
+    rig = connected_rig()
     rig.hear(NEIGHBOUR_2_AT_0_8, "00 02 01 01 01 00 00 80 40")
     assert rig.mesh.get_last_good_known_location_id() == 2
 
 
 def test_where_the_next_hop_flies_to_is_no_place_to_step_back_to_and_kept_clear_of():
-    rig = Rig()
-    rig.connect_through(2)
+    rig = connected_rig()
     rig.hear(NEIGHBOUR_2_AT_0_8, "02 02 01 01 01 00 00 70 41 00 00 00 00 00 00 00 00 00 80")
     assert rig.mesh.places.good == Location(8.0, 0.0, 0.0)
     assert rig.mesh._neighbours.place_of(2).place == Location(15.0, 0.0, 0.0)
 
 
 def test_a_goal_farther_away_than_the_next_hop_can_stand_is_no_wrong_place():
-    rig = Rig()
-    rig.connect_through(2)
+    rig = connected_rig()
     rig.hear("02 02 01 01 01 00 00 c8 42 00 00 00 00 00 00 00 00 00 80")  # 100 m to the north
     assert rig.mesh._neighbours.place_of(2).place == Location(100.0, 0.0, 0.0)
     assert not rig.mesh.complaints.counts
@@ -145,8 +166,7 @@ def test_it_is_the_gateways_when_that_is_the_next_hop():
 
 
 def test_it_is_unknown_until_a_location_arrives():
-    rig = Rig()
-    rig.connect_through(2)
+    rig = connected_rig()
     assert rig.mesh.get_last_good_known_location_id() == 255
 
 
@@ -154,8 +174,7 @@ def test_it_is_unknown_until_a_location_arrives():
 
 
 def test_an_order_is_flown_and_ends_the_connection():
-    rig = Rig()
-    rig.connect_through(2)
+    rig = connected_rig()
     rig.hear(GATEWAY_AT_0_4, NEIGHBOUR_2_AT_0_8, "00 02 06 01 01 00 00 80 3f 00 00 00 c0 07 00")
     assert rig.engine.goals == [Location(1.0, -2.0, 7)]
     assert not rig.mesh.get_connected_to_gateway()
@@ -171,8 +190,7 @@ def test_a_drone_that_knows_no_gateway_location_has_no_place_to_step_back_to_aft
 
 
 def test_an_ordered_flight_keeps_the_routes_until_the_landing():
-    rig = Rig()
-    rig.connect_through(2)
+    rig = connected_rig()
     rig.hear("00 02 06 01 01 00 00 a0 41")
     for latitude in (1.0, 8.0, 15.0):
         fly(rig, Location(latitude, 0.0, 0.0))
@@ -183,8 +201,7 @@ def test_an_ordered_flight_keeps_the_routes_until_the_landing():
 
 
 def test_a_flight_of_a_quarter_of_the_range_keeps_the_connection_and_the_routes():
-    rig = Rig()
-    rig.connect_through(2)
+    rig = connected_rig()
     rig.hear(NEIGHBOUR_2_AT_0_8, "00 02 06 01 01 00 00 10 40")  # latitude 2.25
     assert rig.mesh.get_connected_to_gateway()
     fly(rig, Location(1.0, 0.0, 0.0))
@@ -209,8 +226,7 @@ def test_after_a_short_flight_it_looks_for_others_and_loses_those_left_behind():
 
 
 def test_several_orders_in_one_flight_count_from_where_it_began():
-    rig = Rig()
-    rig.connect_through(2)
+    rig = connected_rig()
     rig.hear("00 02 06 01 01 00 00 00 40")  # latitude 2
     fly(rig, Location(1.9, 0.0, 0.0))
     assert rig.mesh.get_connected_to_gateway()
@@ -227,8 +243,7 @@ def test_a_router_without_a_gateway_forgets_its_routes_after_a_short_flight_too(
 
 
 def test_it_has_landed_within_a_tenth_of_a_metre_of_the_goal_and_then_introduces_itself():
-    rig = Rig()
-    rig.connect_through(2)
+    rig = connected_rig()
     rig.hear("00 02 06 01 01 00 00 a0 41")
     rig.forget()
     for latitude in (2.0, 10.0, 19.89):
@@ -382,8 +397,7 @@ def test_another_order_during_the_flight_replaces_the_first():
     ],
 )
 def test_an_order_out_of_bounds_is_refused_and_counted(place):
-    rig = Rig()
-    rig.connect_through(2)
+    rig = connected_rig()
     rig.hear(f"00 02 06 01 01 {place}")
     assert rig.engine.goals == []
     assert rig.mesh.get_connected_to_gateway()
@@ -407,8 +421,7 @@ def test_a_drone_that_cannot_say_where_it_is_does_not_fly_for_ever():
 
 
 def test_a_heartbeat_answered_in_flight_no_longer_counts_after_the_landing():
-    rig = Rig()
-    rig.connect_through(2)
+    rig = connected_rig()
     rig.hear("00 02 06 01 01 00 00 a0 41", "00 02 04 01 01 01 00 01")
     assert rig.mesh.get_connected_to_gateway()
     fly(rig, Location(20.0, 0.0, 0.0))
@@ -420,8 +433,7 @@ def test_a_heartbeat_answered_in_flight_no_longer_counts_after_the_landing():
 
 
 def test_a_lost_gateway_is_dropped_and_the_neighbours_are_informed():
-    rig = Rig()
-    rig.connect_through(2)
+    rig = connected_rig()
     rig.routing.other_can_communicate_with_node(3, 0)
     rig.mesh.control.send_heartbeat(0)
     rig.wait_until(4.9)
@@ -489,10 +501,7 @@ def test_a_router_without_neighbours_flies_to_the_place_to_step_back_to():
 
 
 def test_a_router_whose_neighbour_was_seen_to_move_waits_three_times_as_long():
-    rig = lone_rig()
-    rig.antenna.dead = set()
-    rig.hear(place(2, 9.5), place(2, 7.0))
-    rig.antenna.dead = {2}
+    rig = lone_rig(heard=[place(2, 9.5), place(2, 7.0)])
     rig.wait_until(104.0)
     assert rig.engine.goals == []
     rig.wait_until(106.0)
@@ -500,9 +509,7 @@ def test_a_router_whose_neighbour_was_seen_to_move_waits_three_times_as_long():
 
 
 def test_a_router_that_knows_no_other_place_flies_to_the_gateway():
-    rig = Rig()
-    rig.engine.place = Location(12.0, 0.0, 0.0)
-    rig.connect_through(2)
+    rig = connected_rig(12.0)
     rig.hear("00 02 01 01 01 00 00 80 40")
     assert rig.mesh.get_last_good_known_location_id() == 255
     rig.antenna.dead = {2}
@@ -547,8 +554,7 @@ def test_a_router_that_knows_no_place_at_all_stays():
 )
 def test_a_place_where_no_drone_may_go_is_nowhere_to_fly(place):
     """Any node can claim any place."""
-    rig = Rig()
-    rig.connect_through(2)
+    rig = connected_rig()
     rig.hear(f"00 02 01 01 01 {place}", f"02 02 01 01 01 {place}")
     rig.antenna.dead = {2}
     rig.wait_until(100.0)
@@ -584,8 +590,7 @@ def lines_about_places(caplog):
     "place", [FAR_NEXT_HOP, FAR_GATEWAY, hearsay("00 00 20 42"), FAR_GATEWAY + " 00" * 9 + " 80"]
 )
 def test_a_place_that_cannot_be_may_be_a_goal_or_hearsay_and_is_no_line_in_the_log(caplog, place):
-    rig = Rig()
-    rig.connect_through(2)
+    rig = connected_rig()
     rig.hear(place)
     rig.wait(5.0)
     rig.hear(place)
@@ -595,8 +600,7 @@ def test_a_place_that_cannot_be_may_be_a_goal_or_hearsay_and_is_no_line_in_the_l
 
 @pytest.mark.parametrize(("place", "who"), [(FAR_NEXT_HOP, "next hop"), (FAR_GATEWAY, "gateway")])
 def test_a_node_that_reports_for_half_a_minute_where_it_cannot_be_has_its_line(caplog, place, who):
-    rig = Rig()
-    rig.connect_through(2)
+    rig = connected_rig()
     for _ in range(4):
         rig.hear(place)
         rig.wait(10.0)
@@ -605,8 +609,7 @@ def test_a_node_that_reports_for_half_a_minute_where_it_cannot_be_has_its_line(c
 
 
 def test_a_place_of_a_gateway_that_it_does_not_prefer_is_not_judged():
-    rig = Rig()
-    rig.connect_through(2)
+    rig = connected_rig()
     rig.hear("07 02 7d 01 01 01 00 08 00 00 20 42 00 00 80 40")  # gateway 8, 40 m away
     assert not rig.mesh.complaints.counts
 
@@ -624,9 +627,7 @@ def test_what_others_say_of_the_gateway_does_not_replace_its_own_word_but_makes_
 
 
 def test_a_cut_off_node_without_the_gateways_own_word_believes_the_newest_possible_news():
-    rig = Rig()
-    rig.engine.place = Location(12.0, 0.0, 0.0)
-    rig.connect_through(2)
+    rig = connected_rig(12.0)
     rig.mesh.places.forget_gateway()
     rig.antenna.dead = {2}
     rig.wait_until(12.0)
@@ -637,9 +638,7 @@ def test_a_cut_off_node_without_the_gateways_own_word_believes_the_newest_possib
 
 
 def test_a_drone_that_knows_no_place_flies_to_where_it_was_connected_last():
-    rig = Rig()
-    rig.engine.place = Location(12.0, 0.0, 0.0)
-    rig.connect_through(2)
+    rig = connected_rig(12.0)
     rig.antenna.dead = {2}
     rig.engine.place = Location(30.0, 0.0, 0.0)
     rig.wait_until(60.0)
@@ -669,9 +668,7 @@ def test_alone_after_every_step_it_looks_where_it_was_connected_last_and_then_st
 
 
 def test_a_drone_that_knows_no_place_and_is_where_it_was_connected_last_stays_and_says_so():
-    rig = Rig()
-    rig.engine.place = Location(12.0, 0.0, 0.0)
-    rig.connect_through(2)
+    rig = connected_rig(12.0)
     rig.antenna.dead = {2}
     rig.wait_until(60.0)
     assert rig.engine.goals == []
@@ -684,10 +681,7 @@ TWO_AT_8 = "02 02 01 01 01 00 00 00 41 00 00 00 00"  # node 2: latitude 8; a hei
 @pytest.mark.parametrize("height", ["fd ff", "ff ff", "00 00"])  # -3, -1 and 0 m
 def test_the_place_of_a_next_hop_a_few_metres_below_the_origin_is_flown_to_and_not_below_it(height):
     """A field slopes, and altitudes err by metres."""
-    rig = lone_rig()
-    rig.antenna.dead = set()
-    rig.hear(f"{TWO_AT_8} {height}")
-    rig.antenna.dead = {2}
+    rig = lone_rig(heard=[f"{TWO_AT_8} {height}"])
     rig.wait_until(46.0)
     assert rig.engine.goals == [BESIDE_NEIGHBOUR]
 
@@ -696,10 +690,9 @@ def test_the_place_of_a_next_hop_a_few_metres_below_the_origin_is_flown_to_and_n
 @pytest.mark.parametrize("height", ["fd ff", "00 00"])
 def test_two_silent_drones_on_a_slope_both_keep_their_places(height, other):
     """5 was last heard where this drone would land otherwise."""
-    rig = lone_rig()
-    rig.antenna.dead = set()
-    rig.hear(f"{TWO_AT_8} {height}", f"05 02 01 01 01 00 00 00 41 cd cc 8c bf {other}")
-    rig.antenna.dead = {2}
+    rig = lone_rig(
+        heard=[f"{TWO_AT_8} {height}", f"05 02 01 01 01 00 00 00 41 cd cc 8c bf {other}"]
+    )
     rig.wait_until(46.0)
     (goal,) = rig.engine.goals
     assert goal.distance_m(Location(8.0, -1.1, 0.0)) >= 1.0
@@ -707,10 +700,7 @@ def test_two_silent_drones_on_a_slope_both_keep_their_places(height, other):
 
 
 def test_above_a_silent_drone_below_the_origin_is_a_metre_above_the_origin():
-    rig = lone_rig(RepairOptions(lost_place=LostPlace.ABOVE))
-    rig.antenna.dead = set()
-    rig.hear(f"{TWO_AT_8} fd ff")
-    rig.antenna.dead = {2}
+    rig = lone_rig(RepairOptions(lost_place=LostPlace.ABOVE), heard=[f"{TWO_AT_8} fd ff"])
     rig.wait_until(46.0)
     assert rig.engine.goals == [NEIGHBOUR_PLACE._replace(height=1)]
 
@@ -760,8 +750,7 @@ def test_the_highest_score_flies(bids, flies):
     rig.wait_until(BIDS_S)  # its own score is 8
     for neighbour, score in bids:
         assert rig.engine.goals == []
-        rig.hear(bid(neighbour, score))
-    rig.wait(TO_DECISION_S)
+        decide(rig, bid(neighbour, score))
     assert rig.engine.goals == ([BESIDE_NEIGHBOUR] if flies else [])
     assert rig.kinds().count("NEGOTIATION_ENDED") == 1
 
@@ -784,8 +773,7 @@ def test_scores_are_compared_as_they_are_on_the_air():
     rig = group_rig(3)
     rig.engine.place = Location(4.0, 10.1, 0.0)  # 10.1 is 10.10000038 as a float32
     rig.wait_until(BIDS_S)
-    rig.hear(bid(3, 10.1))
-    rig.wait(TO_DECISION_S)
+    decide(rig, bid(3, 10.1))
     assert len(rig.engine.goals) == 1
 
 
@@ -794,8 +782,7 @@ def test_no_router_flies_without_a_bid():
     rig.know_neighbour(3)
     rig.wait_until(36.1)
     assert rig.sent(BID) == [own_bid(3, -1.0)]
-    rig.hear(bid(3, -1.0))
-    rig.wait(TO_DECISION_S)
+    decide(rig, bid(3, -1.0))
     assert rig.engine.goals == []
     assert rig.events[-1].peer == NO_ROUTE
 
@@ -818,32 +805,26 @@ def test_a_router_that_knows_no_gateway_location_does_not_bid():
 
 def test_a_router_that_knows_where_its_relay_stood_and_not_where_the_gateway_is_bids_its_way():
     """As after its mesh has passed to another gateway, whose place nobody has told yet."""
-    rig = Rig()
-    rig.engine.place = Location(12.0, 0.0, 0.0)
-    rig.connect_through(2)
+    rig = connected_rig(12.0)
     rig.hear(NEIGHBOUR_2_AT_0_8)
     rig.antenna.dead = {2}
     rig.know_neighbour(3)
     rig.wait_until(BIDS_S)
     assert rig.sent(BID) == [own_bid(3, 4.0)]
-    rig.hear(bid(3, 1.0))
-    rig.wait(TO_DECISION_S)
+    decide(rig, bid(3, 1.0))
     (goal,) = rig.engine.goals
     assert goal.distance_m(NEIGHBOUR_PLACE) < 1.2
 
 
 def test_a_router_that_knows_only_the_place_of_the_gateway_bids_for_flying_there():
     """Otherwise a group of such drones would stay for ever."""
-    rig = Rig()
-    rig.engine.place = Location(12.0, 0.0, 0.0)
-    rig.connect_through(2)
+    rig = connected_rig(12.0)
     rig.hear("00 02 01 01 01 00 00 80 40")
     rig.antenna.dead = {2}
     rig.know_neighbour(3)
     rig.wait_until(BIDS_S)
     assert rig.sent(BID) == [own_bid(3, 8.0)]
-    rig.hear(bid(3, 1.0))
-    rig.wait(TO_DECISION_S)
+    decide(rig, bid(3, 1.0))
     assert rig.engine.goals == [A_LEG_FROM_12]
 
 
@@ -862,8 +843,7 @@ def test_a_gateway_with_an_impossible_place_does_not_break_the_bids():
 
 
 def test_a_neighbour_that_does_not_bid_is_waited_for_no_longer_than_a_period():
-    rig = group_rig(3, 4)
-    rig.wait_until(BIDS_S)
+    rig = bidding_rig(3, 4)
     rig.hear(bid(3, 1.0))
     rig.wait_until(BIDS_S + 9.8)
     assert rig.engine.goals == []
@@ -873,8 +853,7 @@ def test_a_neighbour_that_does_not_bid_is_waited_for_no_longer_than_a_period():
 
 
 def test_a_neighbour_that_dies_in_the_middle_is_not_waited_for():
-    rig = group_rig(3, 4)
-    rig.wait_until(BIDS_S)
+    rig = bidding_rig(3, 4)
     rig.hear(bid(3, 1.0))
     rig.antenna.dead = {2, 4}
     rig.mesh.control.send_heartbeat(4)
@@ -922,8 +901,7 @@ def test_a_bid_before_the_timer_runs_is_kept_and_not_answered():
 
 
 def test_a_connected_node_does_not_negotiate():
-    rig = Rig()
-    rig.connect_through(2)
+    rig = connected_rig()
     rig.hear(NEIGHBOUR_2_AT_0_8, bid(3, 9.0))
     rig.wait(1.0)
     assert rig.sent(BID) == []
@@ -931,8 +909,7 @@ def test_a_connected_node_does_not_negotiate():
 
 
 def test_switching_the_antenna_off_ends_a_negotiation():
-    rig = group_rig(3, 4)
-    rig.wait_until(BIDS_S)
+    rig = bidding_rig(3, 4)
     rig.antenna.powered = False
     rig.mesh.on_antenna_power(False, rig.now_s)
     rig.wait(12.0)
@@ -941,8 +918,7 @@ def test_switching_the_antenna_off_ends_a_negotiation():
 
 
 def test_becoming_connected_ends_a_negotiation():
-    rig = group_rig(3, 4)
-    rig.wait_until(BIDS_S)
+    rig = bidding_rig(3, 4)
     rig.hear("00 03 04 01 01 01 00 03", bid(3, 1.0), bid(4, 1.0))
     rig.wait(12.0)
     assert rig.engine.goals == []
@@ -955,16 +931,13 @@ def test_old_bids_do_not_count():
     rig.mesh.on_msg(packet(bid(4, 99.0)), rig.now_s)
     rig.antenna.dead = {2, 4}
     rig.wait_until(BIDS_S)
-    rig.hear(bid(3, 1.0))
-    rig.wait(TO_DECISION_S)
+    decide(rig, bid(3, 1.0))
     assert rig.engine.goals == [BESIDE_NEIGHBOUR]
 
 
 def test_the_list_is_cleared_after_a_negotiation():
-    rig = group_rig(3, 4)
-    rig.wait_until(BIDS_S)
-    rig.hear(bid(3, 99.0), bid(4, 1.0))
-    rig.wait(TO_DECISION_S)
+    rig = bidding_rig(3, 4)
+    decide(rig, bid(3, 99.0), bid(4, 1.0))
     assert rig.kinds().count("NEGOTIATION_ENDED") == 1
     rig.hear(bid(3, TOOK_OFF))
     rig.wait_until(EMERGENCY_S + 10.5)  # the timer runs again
@@ -976,8 +949,7 @@ def test_the_list_is_cleared_after_a_negotiation():
 
 def test_after_the_first_flight_of_the_group_later_rounds_come_three_times_as_soon():
     """The check 10 s after the emergency starts the timer, the next one acts."""
-    rig = group_rig(3, 4)
-    rig.wait_until(BIDS_S)
+    rig = bidding_rig(3, 4)
     rig.hear(bid(3, TOOK_OFF))
     rig.wait_until(EMERGENCY_S + 20.9)
     assert rig.kinds().count("NEGOTIATION_STARTED") == 1
@@ -1000,10 +972,8 @@ def test_after_three_rounds_without_a_flight_rounds_are_as_rare_as_before_the_fi
 
 
 def test_a_late_bid_does_not_start_the_same_negotiation_again():
-    rig = group_rig(3, 4)
-    rig.wait_until(BIDS_S)
-    rig.hear(bid(3, 99.0), bid(4, 1.0))
-    rig.wait(TO_DECISION_S)
+    rig = bidding_rig(3, 4)
+    decide(rig, bid(3, 99.0), bid(4, 1.0))
     rig.hear(bid(3, TOOK_OFF))
     rig.forget()
     rig.hear(bid(4, 2.0))
@@ -1012,8 +982,7 @@ def test_a_late_bid_does_not_start_the_same_negotiation_again():
 
 
 def test_a_bid_that_one_neighbour_brings_and_another_distorts_is_passed_on_once():
-    rig = group_rig(3, 4, 5)
-    rig.wait_until(BIDS_S)
+    rig = bidding_rig(3, 4, 5)
     rig.forget()
     for _ in range(3):
         for through, score in ((4, 99.0), (3, 1e6)):  # no node of the group is that far away
@@ -1022,10 +991,8 @@ def test_a_bid_that_one_neighbour_brings_and_another_distorts_is_passed_on_once(
 
 
 def test_an_emergency_flight_forgets_the_routes_when_it_starts():
-    rig = group_rig(3)
-    rig.wait_until(BIDS_S)
-    rig.hear(bid(3, 1.0))
-    rig.wait(TO_DECISION_S)
+    rig = bidding_rig(3)
+    decide(rig, bid(3, 1.0))
     assert rig.routing.empty()
     assert rig.mesh.get_neighbours() == {}
     assert "FLIGHT_DECIDED" in rig.kinds()
@@ -1099,8 +1066,7 @@ def test_after_two_rounds_without_a_flier_the_place_of_the_gateway_counts():
         rig.wait(TO_DECISION_S)
     rig.wait_until(BIDS_S + 80.0)
     assert own_bid(3, 1 / 9) in rig.sent(BID)  # the nearest flies: 1 / (1 + 8 m)
-    rig.hear(bid(2, -1.0), bid(3, -1.0))
-    rig.wait(TO_DECISION_S)
+    decide(rig, bid(2, -1.0), bid(3, -1.0))
     assert rig.engine.goals == [A_LEG_FROM_12]
 
 
@@ -1124,8 +1090,7 @@ def test_a_lone_drone_that_cannot_fly_stays():
 
 
 def test_an_order_to_a_drone_that_cannot_fly_is_refused_and_counted():
-    rig = Rig()
-    rig.connect_through(2)
+    rig = connected_rig()
     rig.engine.grounded = "the battery is empty"
     rig.hear("00 02 06 01 01 00 00 80 3f")
     assert rig.engine.goals == []
@@ -1134,8 +1099,7 @@ def test_an_order_to_a_drone_that_cannot_fly_is_refused_and_counted():
 
 
 def test_a_better_bid_is_passed_on_to_the_other_neighbours_and_a_worse_one_is_not():
-    rig = group_rig(3, 4, 5)
-    rig.wait_until(BIDS_S)
+    rig = bidding_rig(3, 4, 5)
     rig.forget()
     rig.hear("09 03 07 01 01 00 00 10 41")  # 9 bids 9, and 3 passes it on
     assert rig.sent(BID) == [
@@ -1148,21 +1112,17 @@ def test_a_better_bid_is_passed_on_to_the_other_neighbours_and_a_worse_one_is_no
 
 def test_the_winner_announces_its_flight_with_its_goal_and_asks_at_once_who_is_there():
     """It may be dead a second later, and then hang there."""
-    rig = group_rig(3)
-    rig.wait_until(BIDS_S)
+    rig = bidding_rig(3)
     rig.forget()
-    rig.hear(bid(3, 1.0))
-    rig.wait(TO_DECISION_S)
+    decide(rig, bid(3, 1.0))
     goal = "00 00 00 41 cd cc 8c bf"  # BESIDE_NEIGHBOUR
     assert rig.sent(BID) == [packet(f"01 01 07 03 03 28 6b ee 4e 01 00 00 {goal}")]
     assert rig.broadcasts() == [packet(f"01 01 02 fe fe {goal} 01 80")]
 
 
 def test_a_drone_keeps_clear_of_the_goal_of_one_that_took_off_and_was_not_heard_again():
-    rig = group_rig(3)
-    rig.wait_until(BIDS_S)
-    rig.hear(bid(3, 99.0))
-    rig.wait(TO_DECISION_S)
+    rig = bidding_rig(3)
+    decide(rig, bid(3, 99.0))
     rig.hear(bid(3, TOOK_OFF) + "01 00 00 00 00 00 41 cd cc 8c bf 00 00")  # BESIDE_NEIGHBOUR
     rig.antenna.dead = {2, 3}
     while not rig.engine.goals:
@@ -1173,10 +1133,8 @@ def test_a_drone_keeps_clear_of_the_goal_of_one_that_took_off_and_was_not_heard_
 
 
 def test_a_winner_that_takes_off_is_waited_for():
-    rig = group_rig(3, 4)
-    rig.wait_until(BIDS_S)
-    rig.hear(bid(3, 99.0), bid(4, 1.0))
-    rig.wait(TO_DECISION_S)
+    rig = bidding_rig(3, 4)
+    decide(rig, bid(3, 99.0), bid(4, 1.0))
     rig.hear(bid(3, TOOK_OFF))
     rig.wait(20.0)
     assert rig.engine.goals == []
@@ -1184,15 +1142,13 @@ def test_a_winner_that_takes_off_is_waited_for():
 
 def test_a_winner_that_does_not_take_off_within_5_s_is_passed_over():
     """It died after its bid."""
-    rig = group_rig(3, 4)
-    rig.wait_until(BIDS_S)
+    rig = bidding_rig(3, 4)
     rig.hear(bid(3, 99.0), bid(4, 1.0))
     rig.wait(TO_DECISION_S + 4.8)
     rig.forget()
     rig.wait(0.2)
     assert rig.sent(BID) == [own_bid(3, 8.0), own_bid(4, 8.0)]
-    rig.hear(bid(4, 1.0))
-    rig.wait(TO_DECISION_S)
+    decide(rig, bid(4, 1.0))
     assert rig.engine.goals == [BESIDE_NEIGHBOUR]
 
 
@@ -1500,10 +1456,10 @@ def test_the_goal_keeps_clear_of_the_silent_drone_as_the_option_says(option, goa
 
 
 def test_below_a_silent_drone_that_hovers_high_enough_there_is_room():
-    rig = lone_rig(RepairOptions(lost_place=LostPlace.BELOW))
-    rig.antenna.dead = set()
-    rig.hear("02 02 01 01 01 00 00 00 41 00 00 00 00 04 00")
-    rig.antenna.dead = {2}
+    rig = lone_rig(
+        RepairOptions(lost_place=LostPlace.BELOW),
+        heard=["02 02 01 01 01 00 00 00 41 00 00 00 00 04 00"],
+    )
     rig.wait_until(46.0)
     assert rig.engine.goals == [NEIGHBOUR_PLACE._replace(height=3)]
 
@@ -1633,9 +1589,7 @@ def test_in_flight_it_asks_all_nodes_in_range_once_a_second_where_they_are():
 
 def test_to_the_gateway_it_flies_in_legs_and_presents_itself():
     """So low that it hears nodes on the ground: it lands where it is connected."""
-    rig = Rig()
-    rig.engine.place = Location(12.0, 0.0, 0.0)
-    rig.connect_through(2)
+    rig = connected_rig(12.0)
     rig.hear("00 02 01 01 01 00 00 80 40")
     rig.antenna.dead = {2}
     rig.wait_until(EMERGENCY_S + 0.1)
@@ -1728,10 +1682,8 @@ def test_if_it_hears_that_its_goal_is_taken_it_stops_where_it_is_connected():
 
 
 def test_it_stops_where_it_is_connected_if_a_gateway_reached_its_group():
-    rig = group_rig(3)
-    rig.wait_until(BIDS_S)
-    rig.hear(bid(3, 1.0))
-    rig.wait(TO_DECISION_S)
+    rig = bidding_rig(3)
+    decide(rig, bid(3, 1.0))
     fly(rig, Location(10.0, 0.0, 2.0))
     rig.hear("00 03 04 01 01 01 00 05")
     assert rig.mesh.get_connected_to_gateway()
@@ -1814,8 +1766,7 @@ def test_the_flight_ends_although_a_gateway_answers_on_the_ground():
 
 
 def test_a_next_hop_passes_on_where_the_gateway_is():
-    rig = Rig()
-    rig.connect_through(2)
+    rig = connected_rig()
     rig.hear("02 02 01 01 01 00 00 00 41 00 00 00 00 00 00 00 00 00 00 0b 00 00 00 00 80 40")
     assert rig.mesh.places.gateway == Location(4.0, 0.0, 0.0)
     assert rig.mesh.places.gateway_seen_s == -10.0  # ten seconds ago
@@ -1825,8 +1776,7 @@ def test_a_next_hop_passes_on_where_the_gateway_is():
 
 
 def test_a_router_learns_where_the_gateway_is_from_an_answer_that_it_forwards():
-    rig = Rig()
-    rig.connect_through(2)
+    rig = connected_rig()
     rig.know_neighbour(5)
     rig.hear("00 02 01 01 05 00 00 80 40", "07 02 01 01 05 00 00 00 41")
     assert rig.mesh.places.gateway == Location(4.0, 0.0, 0.0)
@@ -1834,16 +1784,14 @@ def test_a_router_learns_where_the_gateway_is_from_an_answer_that_it_forwards():
 
 
 def test_older_news_of_the_gateway_changes_nothing():
-    rig = Rig()
-    rig.connect_through(2)
+    rig = connected_rig()
     rig.hear("00 02 01 01 01 00 00 80 3f")
     rig.hear("02 02 01 01 01 00 00 00 41 00 00 00 00 00 00 00 00 00 00 0b 00 00 00 00 80 40")
     assert rig.mesh.places.gateway == Location(1.0, 0.0, 0.0)
 
 
 def test_the_gateway_itself_is_asked_before_its_place_is_three_periods_old():
-    rig = Rig()
-    rig.connect_through(2)
+    rig = connected_rig()
     rig.hear("00 02 01 01 01 00 00 80 3f")
     asked_s = []
     for check_s in (5.0, 15.0, 25.0):
