@@ -40,6 +40,7 @@ from drone_mesh.inprocess.positions import PositionErrors, PositionReceiver
 from drone_mesh.inprocess.radio import HOP_DELAY_S
 from drone_mesh.inprocess.status import event_records, mesh_status
 from drone_mesh.mobility import Track
+from drone_mesh.nrf24.emulator.fading import RICIAN_K_DB
 from drone_mesh.nrf24.emulator.links import LinkModel
 from drone_mesh.nrf24.settings import DEFAULT_RATE
 from drone_mesh.state.model import EventRecord, MeshStatus
@@ -70,7 +71,7 @@ class Network:
         rate: str = DEFAULT_RATE,
         links: LinkModel | None = None,
         fading: str = "none",
-        rician_k_db: float = 10.0,
+        rician_k_db: float = RICIAN_K_DB,
         repair: str | Callable[[], IRepairStrategy] = DEFAULT_REPAIR,
         repair_options: RepairOptions | None = None,
         key: Keys | Callable[[int], Keys | None] | None = None,

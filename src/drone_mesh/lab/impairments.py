@@ -17,9 +17,9 @@ from drone_mesh.inprocess.shared_air import SharedAir
 from drone_mesh.lab.faults import Jam
 from drone_mesh.lab.scenario import Scenario
 from drone_mesh.lab.streams import Streams
-from drone_mesh.nrf24.emulator.links import Hop
+from drone_mesh.nrf24.emulator.links import OUTDOORS, Hop
 
-_FREE_SPACE, _OUTDOORS = 2.0, 2.7  # exponents of the path loss, as in IdealDisc and LogDistance
+_FREE_SPACE = 2.0  # exponent of the path loss, as in IdealDisc
 
 
 class OneWay:
@@ -32,7 +32,7 @@ class OneWay:
         self._reach_m: dict[int, float] = {}
         most_db, rng = scenario.radio.asymmetry_db, streams.generator("asymmetry")
         faded = scenario.obstacles.fading != "none"
-        exponent = _OUTDOORS if scenario.radio.links == "distance" or faded else _FREE_SPACE
+        exponent = OUTDOORS if scenario.radio.links == "distance" or faded else _FREE_SPACE
         for node in range(MAX_DRONES if most_db else 0):
             less_db = rng.uniform(0.0, most_db)
             self._reach_m[node] = scenario.range_m * 10 ** (-less_db / (10 * exponent))

@@ -6,11 +6,14 @@ from typing import ClassVar, Dict, FrozenSet, List, Optional, Tuple, Union
 from pydantic import Field, field_validator, model_validator
 from typing_extensions import Annotated, Literal
 
+from drone_mesh.air.box import CUT_DB
 from drone_mesh.air.obstacle_file import BoxRow
+from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.communication.node.named_techniques import DEFAULT_ROUTING
 from drone_mesh.communication.repair.options import DEFAULT_REPAIR, RANGE_M, RepairOptions
 from drone_mesh.communication.timing.mesh_timing import MeshTiming
 from drone_mesh.drone.fleet import MAX_DRONES
+from drone_mesh.drone.flight_path import SPEED_M_S
 from drone_mesh.drone.goal import MAX_HEIGHT_M
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.lab.experiment_parts import (
@@ -27,6 +30,7 @@ from drone_mesh.lab.faults import Fault
 from drone_mesh.mobility import Mobility
 from drone_mesh.mobility.settings import Knot
 from drone_mesh.mobility.settings import check as check_mobility
+from drone_mesh.nrf24.emulator.fading import RICIAN_K_DB
 from drone_mesh.yaml_file import is_number
 
 _MODEL = ("speed_m_s", "height_m", "share", "gateways")
@@ -209,11 +213,11 @@ class ObstacleSettings(Part):
     path: Optional[str] = None  # a file of boxes, beside the experiment
     boxes: List[BoxRow] = []
     radio: Literal["block", "wall"] = "block"
-    cut_db: AtLeast0 = 9.0  # wall: per wall crossed (Sommer et al., WONS 2011, as in Veins)
-    metre_db: AtLeast0 = 0.4  # wall: per metre inside, the same source
-    exponent: Annotated[float, Field(ge=1, le=6)] = 2.0  # of the path loss
+    cut_db: AtLeast0 = CUT_DB["brick"]  # wall: per wall crossed
+    metre_db: AtLeast0 = Obstacles.metre_db  # wall: per metre inside
+    exponent: Annotated[float, Field(ge=1, le=6)] = Obstacles.exponent  # of the path loss
     fading: Literal["none", "rayleigh", "rician"] = "none"
-    rician_k_db: Annotated[float, Field(ge=-20, le=40)] = 10.0
+    rician_k_db: Annotated[float, Field(ge=-20, le=40)] = RICIAN_K_DB
     ceiling_m: Annotated[float, Field(gt=0, le=MAX_HEIGHT_M)] = MAX_HEIGHT_M  # of flights
 
 
@@ -266,7 +270,7 @@ class Scenario(Part):
     grounded_share: Share = 0.0  # of the routers: their drones cannot fly
     duration_s: Annotated[float, Field(gt=0, le=1e6)] = 120.0
     sample_s: Annotated[float, Field(ge=0.05, le=60)] = 1.0  # sampling period of the network
-    speed_m_s: Annotated[float, Field(gt=0, le=100)] = 2.0  # of flights
+    speed_m_s: Annotated[float, Field(gt=0, le=100)] = SPEED_M_S  # of flights
 
     @model_validator(mode="after")
     def _suits_its_radio(self) -> "Scenario":

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from drone_mesh.drone.flight_path import SPEED_M_S
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError, GoalRefused
@@ -18,7 +19,7 @@ class FlightLimits:
 
     max_height_m: float = 50.0  # above home
     max_distance_m: float = 500.0  # from home, horizontally
-    speed_m_s: float = 2.0  # docs/ros.md, "World and flights"
+    speed_m_s: float = SPEED_M_S
     min_battery_percent: float = 30.0
     cruise_height_m: float = 10.0  # of the lowest layer
     layer_m: float = 2.0  # between layers; 0: all drones cross at the same height

@@ -16,6 +16,7 @@ from drone_mesh.errors import ConfigurationError
 from drone_mesh.nrf24.airtime import NS_PER_S
 
 KINDS = ("rayleigh", "rician")
+RICIAN_K_DB = 10.0
 SPEED_OF_LIGHT_M_S = 299_792_458.0
 COHERENCE = 0.423
 STIRRING_M_S = 0.5  # leaves, people and propellers move where drones stand

@@ -15,6 +15,7 @@ from drone_mesh.nrf24.airtime import NS_PER_S
 
 SENSITIVITY_DBM = {250_000: -94.0, 1_000_000: -85.0, 2_000_000: -82.0}  # at 0.1 % BER [DS 5.7]
 _FSPL_CONSTANT_DB = -27.55  # free space, metres and MHz (ITU-R P.525)
+OUTDOORS = 2.7  # exponent of the path loss near the ground
 _NEAREST_M = 0.1  # antennas may share a point; log10(0) may not
 _ADDRESS_LOST_BER = 0.1  # with more wrong bits not even the address is recognised
 _SAME_POINT_DBM = 0.0  # the strongest specified input [DS 5.7]
@@ -84,7 +85,7 @@ class LogDistance(LinkModel):
         self,
         rng: random.Random,
         *,
-        exponent: float = 2.7,
+        exponent: float = OUTDOORS,
         gain_db: float = 0.0,
         metres_per_metre: float = 1.0,
     ) -> None:
@@ -100,7 +101,7 @@ class LogDistance(LinkModel):
         range_m: float,
         rng: random.Random,
         *,
-        exponent: float = 2.7,
+        exponent: float = OUTDOORS,
         bits_per_s: int = 250_000,
     ) -> LogDistance:
         """Scale distances so that at `range_m` the power equals the sensitivity at that rate.
