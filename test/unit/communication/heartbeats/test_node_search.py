@@ -76,9 +76,9 @@ def test_an_order_that_nobody_dropped_is_not_lost_because_its_drone_flies_and_is
     rig.wait(20.0)
     assert len(searches(rig)) == 3
     assert "NO_ROUTE" not in rig.kinds()
-    rig.wait(22.8)  # three searches of 1 s, four waits for a route, and as long as with one
+    rig.wait(20.9)  # three searches of 1 s, four waits for a route, and as long as with one
     assert "ORDER_LOST_CONTACT" not in rig.kinds()
-    rig.wait(0.3)
+    rig.wait(0.2)
     assert rig.kinds()[-1] == "ORDER_LOST_CONTACT"
 
 
