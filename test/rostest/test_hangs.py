@@ -1,9 +1,13 @@
 #!/usr/bin/env python3
-"""A program hangs: simulated time goes on without it, the log names it, and it comes back."""
+"""A program hangs: simulated time goes on without it, the log names it, and it comes back.
+
+A node outside this package flies the drones (drones:=external), and the world shows them.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import signal
 import time
@@ -15,6 +19,7 @@ import rospy
 import rostest
 from rostest_support import WALL_LIMIT_S, LogWatch, MeshWatch, call, pid_of, wait_for
 
+from drone_mesh.msg import MeshState
 from drone_mesh.srv import RequestDroneFlight
 
 GOES_ON_WITHIN_S = 15.0  # wall: 2 s for each thing that does not answer, on a busy machine
@@ -34,6 +39,8 @@ class HangsTest(unittest.TestCase):
         rospy.init_node("test_hangs")
         self.log = LogWatch()
         self.mesh = MeshWatch(4)
+        self.states: list[MeshState] = []
+        rospy.Subscriber("/mesh/state", MeshState, self.states.append)
         self.mesh.wait("all connected", 200, self.mesh.connected)
 
     def hang(self, pid: int | None, named: str = "") -> None:
@@ -60,7 +67,12 @@ class HangsTest(unittest.TestCase):
 
         self.mesh.wait("no order is taken any more", 100, ordered)
         self.mesh.wait_at(3, x, 0.0, within_s=100)
+        self.mesh.wait("the world shows it there", 30, lambda: self.shown_at(3, x, 0.0))
         self.assertEqual(self.log.failures(), [])
+
+    def shown_at(self, drone: int, x: float, y: float) -> bool:
+        nodes = {node.id: node for node in self.states[-1].nodes} if self.states else {}
+        return drone in nodes and math.dist(nodes[drone].position[:2], (x, y)) < 0.1
 
     def test_the_process_that_flies_the_drones(self) -> None:
         self.hang(pid_of("/drones_of_others"), "/drones_of_others does not answer")
