@@ -259,6 +259,8 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
     def _on_answer(self, answer: bytes, from_: int, now_s: float) -> None:
         has_restarted = self._seal.answered(answer, now_s)
         if has_restarted is None:
+            if self._seal.is_proven(answer):
+                self._unopened.pop(from_, None)  # to an earlier challenge: it is only slow
             return
         self._unopened.pop(from_, None)
         doubtful = self._doubtful.pop(from_, None)

@@ -383,6 +383,20 @@ def test_a_challenge_that_nobody_took_says_nothing_about_a_neighbours_key():
     assert "node 7, sends packets that this node's key" in next(iter(layer.complaints.counts))
 
 
+def test_a_late_answer_shows_that_the_neighbour_has_the_key():
+    """It answers a challenge that another one has replaced, so its epoch is not believed."""
+    layer, rig = layer_of_1()
+    neighbour = HopSeal(7, KEY, random.Random(7), 30.0)
+    heard = neighbour.seal(packet("07 07 03 01 fe 00 01"))
+    layer.on_msg(heard, 0.0)
+    (first,) = rig.antenna.taken
+    layer.on_msg(heard, 3.0)
+    layer.on_msg(neighbour.answer(first, 3.5), 3.5)
+    for _ in range(3):
+        layer.on_msg(heard, 21.0)
+    assert not layer.complaints.counts
+
+
 def test_another_radio_with_this_nodes_id_and_no_key_is_named_and_challenged_by_a_broadcast():
     layer, rig = layer_of_1()
     layer.on_msg(packet("01 01 03 01 fe 00 01"), 0.0)
