@@ -14,7 +14,8 @@ from typing import Sequence
 import rosbag
 import rospy
 import rostest
-from test_tools import gateway_record, run
+from rostest_support import run_program
+from test_tools import gateway_record
 
 from drone_mesh.drone.roles import Role
 from drone_mesh.ros.graph.conversions import ros_time, state_msg
@@ -73,7 +74,7 @@ class DamagedRecordingTest(unittest.TestCase):
     def _look_into_damaged(self, recording: Path, tools: Sequence[Sequence[str]]) -> None:
         for tool, *words in tools:
             named = [word.format(recording=recording, folder=self.folder) for word in words]
-            finished = run(tool, *named)
+            finished = run_program(tool, *named)
             said = finished.stderr.splitlines()[-1]
             self.assertRegex(said, rf"^{tool}: .*: damaged at \d+\.0 s( to \d+\.0 s)?: \d+ mess")
             self.assertNotIn("Traceback", finished.stderr)
@@ -83,18 +84,20 @@ class DamagedRecordingTest(unittest.TestCase):
     def test_2_of_several_runs_in_one_recording_one_is_taken_and_told(self) -> None:
         bag, trace = self.folder / "runs.bag", self.folder / "runs.csv"
         record_runs(bag, flights(100), flights(30))
-        last = run("status", "--bag", str(bag), "--at", "5")
+        last = run_program("status", "--bag", str(bag), "--at", "5")
         self.assertEqual(last.returncode, 0, last.stderr)
         self.assertIn("contains 2 runs", last.stderr)
-        first = run("status", "--bag", str(bag), "--at", "99", "--run", "1")
+        first = run_program("status", "--bag", str(bag), "--at", "99", "--run", "1")
         self.assertEqual((first.returncode, first.stderr), (0, ""))
         self.assertIn(" 99.0, 0.0, 5.0 ", first.stdout)
-        self.assertIn("ends at 30.0 s", run("status", "--bag", str(bag), "--at", "99").stderr)
-        self.assertIn("2 drones, 29.0 s", run("flight_trace", str(bag), str(trace)).stdout)
+        self.assertIn(
+            "ends at 30.0 s", run_program("status", "--bag", str(bag), "--at", "99").stderr
+        )
+        self.assertIn("2 drones, 29.0 s", run_program("flight_trace", str(bag), str(trace)).stdout)
         self.assertEqual(len(trace.read_text().splitlines()), 61)
-        written = run("flight_trace", str(bag), str(trace), "--run", "1")
+        written = run_program("flight_trace", str(bag), str(trace), "--run", "1")
         self.assertIn("2 drones, 99.0 s", written.stdout, written.stderr)
-        missing = run("flight_trace", str(bag), str(trace), "--run", "3")
+        missing = run_program("flight_trace", str(bag), str(trace), "--run", "3")
         self.assertEqual(missing.returncode, 2)
         self.assertIn("no run 3; it contains 2", missing.stderr)
 
