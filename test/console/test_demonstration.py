@@ -48,7 +48,7 @@ def test_the_button_shows_a_repair_from_the_loss_to_the_reconnection(start_conso
     wait_for_sentence(page, "3 is farthest .* flies to node 2's place")
     wait_for_sentence(page, "3, 4 and 5 are connected again, [0-9]+ s after node 2 fell silent")
     assert page.page.get_attribute("#map-note", "data-scale") == scale
-    wait_for_sentence(page, "All drones are where they were")
+    wait_for_sentence(page, "Everything is put back: power, places and speed")
     page.wait_for("the end", lambda: page.page.inner_text("#demonstrate") == "Show a repair")
     page.wait_for("all are on", lambda: "off" not in (page.row(17, 2), page.row(2, 2)))
     page.page.click("#story-close")
@@ -65,7 +65,7 @@ def test_a_demonstration_that_was_asked_for_at_the_start_begins_with_the_first_p
     assert found.violations_count == 0, found.generate_report()
     page.page.click("#demonstrate")
     wait_for_sentence(page, "Not finished: ended by the user")
-    wait_for_sentence(page, "All drones are where they were")
+    wait_for_sentence(page, "Everything is put back: power, places and speed")
     page.wait_for("the end", lambda: page.page.inner_text("#demonstrate") != "End")
 
 

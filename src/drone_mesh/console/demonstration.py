@@ -7,23 +7,33 @@ and puts it back as it was.
 
 from __future__ import annotations
 
-import contextlib
 import math
 from dataclasses import dataclass
-from typing import Callable, Dict, Generator, List, Sequence, Tuple
+from typing import Callable, Sequence
 
 from drone_mesh.communication.control.router_states import RepairState
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.console.controls import MeshControls, OrderRefused
+from drone_mesh.console.controls import OrderRefused
+from drone_mesh.console.put_back import (
+    FAST,
+    ORDER_AGAIN_S,
+    FleetBefore,
+    Order,
+    Place,
+    Places,
+    PutBack,
+    Returning,
+    Script,
+    attempt,
+    away,
+    fly,
+    power,
+    rounded,
+    speed,
+)
 from drone_mesh.drone.roles import Role
 from drone_mesh.state.model import REPAIR_STATES, MeshStatus, NodeStatus, position_is_known
 from drone_mesh.state.repair_story import RepairStory, and_
-
-Order = Callable[[MeshControls], object]
-Script = Generator[List[Order], MeshStatus, None]
-Returning = Generator[List[Order], MeshStatus, MeshStatus]
-Place = Tuple[float, float, float]  # x y z, m
-Places = Dict[int, Place]  # by node
 
 # x, y from the gateway, in ranges of the radio: first the chain, then the group that loses it.
 _PLACES = ((0.0, 4 / 9), (0.0, 12 / 9), (0.0, 18 / 9), (4 / 9, 15 / 9), (-3 / 9, 15 / 9))
@@ -31,12 +41,10 @@ _CHAIN = 2  # routers; the last of them is switched off
 _TURNS = ((1, 0), (-1, 0), (0, 1), (0, -1))  # cosine and sine: ways in which the chain may point
 _FREE_M = 1.5  # between its places and the drones that only watch
 _READY_WITHIN_S = 300.0  # simulated, as all that follows: a fleet may have to repair itself first
-_ORDER_AGAIN_S = 5.0  # a drone that had no route may have one then
 _SETTLE_S = 25.0  # two default check periods: each node has asked for its next hop's position
 _REPAIR_WITHIN_S = 240.0
-_AT_PLACE_M = 0.5
 # Simulated seconds per second: waiting is sped up, and brief events are slowed down.
-_FAST, _WAITING, _BIDDING, _FLYING = 5.0, 3.0, 0.2, 0.5
+_WAITING, _BIDDING, _FLYING = 3.0, 0.2, 0.5
 _SLOW_DOWN_S = 4.0  # before the wait ends, so that a slow page does not miss what follows
 
 
@@ -48,8 +56,7 @@ class Casting:
     cast: Sequence[int]  # five routers: the chain, and the group behind it
     places: Places  # of the cast
     resting: Sequence[int]  # the other nodes that are on: they are switched off meanwhile
-    homes: Places  # of all routers that can fly
-    was_off: Sequence[int]  # of the gateway and the cast
+    before: FleetBefore
 
     @classmethod
     def choose(cls, mesh: MeshStatus) -> Casting:
@@ -66,14 +73,12 @@ class Casting:
         cast = sorted(node.id for node in able[: len(_PLACES)])
         others = [node for node in known if node.id not in cast]
         resting = [n.id for n in mesh.nodes if n.on and n.id not in (gateways[0].id, *cast)]
-        goals = {n.id: n.path[-3:] if len(n.path) else n.position for n in able}
         return cls(
             gateways[0].id,
             cast,
             dict(zip(cast, _free_places(gateways[0], mesh.max_distance, others))),
             resting,
-            {node: _rounded(goal) for node, goal in goals.items()},
-            [node.id for node in known if node.id in (gateways[0].id, *cast) and not node.on],
+            FleetBefore.of(mesh, able),
         )
 
     def in_words(self) -> str:
@@ -97,7 +102,6 @@ class RepairDemonstration:
         self._script: Script = self._play()
         next(self._script)
         self._factor = 0.0  # ordered last; 0: none
-        self._factor_before = 0.0
         self._describes_repair = False  # flights before the repair also look like losses
 
     def advance(self, mesh: MeshStatus) -> list[Order]:
@@ -123,12 +127,11 @@ class RepairDemonstration:
         """The orders that at least leave no drone dark, if there is no time for flights."""
         if self.plan is None:
             return []
-        orders = [_power(node, True) for node in (*self.plan.resting, *self.plan.cast)]
-        return [*orders, *([_speed(self._factor_before)] if self._factor else [])]
+        orders = [power(node, True) for node in (*self.plan.resting, *self.plan.cast)]
+        return [*orders, *([speed(self.plan.before.real_time_factor)] if self._factor else [])]
 
     def _play(self) -> Script:
         mesh = yield []
-        self._factor_before = mesh.real_time_factor
         self.plan = plan = Casting.choose(mesh)
         chain, group = plan.cast[:_CHAIN], plan.cast[_CHAIN:]
         lost = chain[-1]
@@ -137,7 +140,8 @@ class RepairDemonstration:
             "group behind it. The others stay on until they are there, because orders need routes",
             mesh.stamp_s,
         )
-        mesh = yield [*(_power(node, True) for node in plan.was_off), *self._at_pace(_FAST)]
+        dark = [node for node in (plan.gateway, *plan.cast) if node in plan.before.off]
+        mesh = yield [*(power(node, True) for node in dark), *self._at_pace(FAST)]
         mesh = yield from self._bring(mesh, plan.places)
         if plan.resting:
             count = len(plan.resting)
@@ -146,11 +150,13 @@ class RepairDemonstration:
                 f"{'are' if count > 1 else 'is'} switched off during the demonstration",
                 mesh.stamp_s,
             )
-            mesh = yield [_power(node, False) for node in plan.resting]
+            mesh = yield [power(node, False) for node in plan.resting]
         mesh = yield from self._until(
             mesh,
             f"{and_(plan.cast)} are not all connected at their places",
-            lambda m: _are_connected(m, plan.cast) and not _away(m, plan.places),
+            lambda m: (
+                _are_connected(m, plan.cast) and not any(away(n, plan.places) for n in m.nodes)
+            ),
         )
         settled_s = mesh.stamp_s + _SETTLE_S
         self.story.add(
@@ -166,7 +172,7 @@ class RepairDemonstration:
         )
         begun_s, self._describes_repair = mesh.stamp_s, True
         self.story.update(mesh)
-        mesh = yield [_power(lost, False), *self._at_pace(_WAITING)]
+        mesh = yield [power(lost, False), *self._at_pace(_WAITING)]
         yield from self._follow(mesh, group, begun_s)
         yield from self._put_back()
 
@@ -186,38 +192,27 @@ class RepairDemonstration:
             mesh = yield self._at_pace(_pace(nodes))
 
     def _put_back(self) -> Script:
-        """Switch everything on, and send each drone to where it was."""
         self._describes_repair, self.is_leaving = False, True
-        mesh = yield []
-        plan = self.plan
-        if plan is None:
-            return
-        self.story.add("Everything is put back: power, places and speed", mesh.stamp_s)
-        powers = [_power(node, True) for node in (*plan.resting, *plan.cast)]
-        mesh = yield [*map(_attempt, powers), *self._at_pace(_FAST)]
-        try:
-            mesh = yield from self._bring(mesh, plan.homes)
-            self.story.add("All drones are where they were", mesh.stamp_s)
-        except OrderRefused as error:
-            self.story.add(f"Not all drones are where they were: {error}", mesh.stamp_s)
-        yield [_attempt(_power(node, False)) for node in plan.was_off]
-        yield [_attempt(_speed(self._factor_before))]
+        if self.plan is None:
+            yield []
+        else:
+            yield from PutBack(self.plan.before, self.plan.cast, self.story).play()
 
     def _bring(self, mesh: MeshStatus, places: Places) -> Returning:
         """Order these drones to their places, as often as it takes, and wait for them."""
         begun_s, due_s = mesh.stamp_s, dict.fromkeys(places, mesh.stamp_s)
-        while away := _away(mesh, places):
+        while gone := [node for node in mesh.nodes if away(node, places)]:
             if mesh.stamp_s > begun_s + _READY_WITHIN_S:
-                lost = [node.id for node in away if not node.connected]
+                lost = [node.id for node in gone if not node.connected]
                 why = f", {and_(lost)} without a gateway" if lost else ""
-                ids = and_(node.id for node in away)
+                ids = and_(node.id for node in gone)
                 raise OrderRefused(f"{ids} not there after {_READY_WITHIN_S:.0f} s{why}")
             orders = []
-            for node in reversed(away):  # those behind others first
+            for node in reversed(gone):  # those behind others first
                 may_hear = node.connected and not len(node.path)
                 if may_hear and mesh.stamp_s >= due_s[node.id]:
-                    due_s[node.id] = mesh.stamp_s + _ORDER_AGAIN_S
-                    orders.append(_attempt(_fly(node.id, *places[node.id])))
+                    due_s[node.id] = mesh.stamp_s + ORDER_AGAIN_S
+                    orders.append(attempt(fly(node.id, places[node.id])))
             mesh = yield orders
         return mesh
 
@@ -236,7 +231,7 @@ class RepairDemonstration:
         if factor == self._factor:
             return []
         self._factor = factor
-        return [_speed(factor)]
+        return [speed(factor)]
 
 
 def _free_places(gateway: NodeStatus, range_m: float, others: Sequence[NodeStatus]) -> list[Place]:
@@ -245,7 +240,7 @@ def _free_places(gateway: NodeStatus, range_m: float, others: Sequence[NodeStatu
 
     def pointing(cos: int, sin: int) -> list[Place]:
         return [
-            _rounded((x + (cos * dx - sin * dy) * range_m, y + (sin * dx + cos * dy) * range_m, z))
+            rounded((x + (cos * dx - sin * dy) * range_m, y + (sin * dx + cos * dy) * range_m, z))
             for dx, dy in _PLACES
         ]
 
@@ -254,21 +249,6 @@ def _free_places(gateway: NodeStatus, range_m: float, others: Sequence[NodeStatu
         return min(_FREE_M, min(free, default=_FREE_M))
 
     return max((pointing(*turn) for turn in _TURNS), key=room_m)
-
-
-def _rounded(place: Sequence[float]) -> Place:
-    """The place as an order transmits it, with the height in whole metres."""
-    x, y, z = place
-    return round(x, 2), round(y, 2), max(0.0, float(round(z)))
-
-
-def _away(mesh: MeshStatus, places: Places) -> list[NodeStatus]:
-    return [
-        node
-        for node in mesh.nodes
-        if node.id in places
-        and (len(node.path) or math.dist(node.position[:2], places[node.id][:2]) > _AT_PLACE_M)
-    ]
 
 
 def _are_connected(mesh: MeshStatus, ids: Sequence[int]) -> bool:
@@ -292,25 +272,3 @@ def _pace(group: Sequence[NodeStatus]) -> float:
 def _why_not(nodes: Sequence[NodeStatus]) -> str:
     places = {node.place_of for node in nodes} - {NO_ROUTE}
     return "have no gateway, although one flew" if places else "have no gateway, and none flew"
-
-
-def _power(node_id: int, on: bool) -> Order:
-    return lambda controls: controls.power(node_id, on)
-
-
-def _fly(node_id: int, x: float, y: float, z: float) -> Order:
-    return lambda controls: controls.fly(node_id, x, y, z, allow_shared_place=True)  # others leave
-
-
-def _speed(factor: float) -> Order:
-    return lambda controls: controls.speed(False, factor)
-
-
-def _attempt(order: Order) -> Order:
-    """Carry out an order and ignore its refusal: it is repeated later, or cannot be helped."""
-
-    def carry_out(controls: MeshControls) -> None:
-        with contextlib.suppress(OrderRefused):
-            order(controls)
-
-    return carry_out

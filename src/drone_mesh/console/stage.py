@@ -9,11 +9,13 @@ from concurrent.futures import Executor
 from typing import Any, Mapping, Sequence
 
 from drone_mesh.console.controls import MeshControls, OrderRefused
-from drone_mesh.console.demonstration import Casting, Order, RepairDemonstration
+from drone_mesh.console.demonstration import Casting, RepairDemonstration
 from drone_mesh.console.frame_store import FrameStore
+from drone_mesh.console.put_back import Order
 from drone_mesh.state.model import MeshStatus
 
 POLL_PERIOD_S = 0.1  # wall time
+ENDED_AT_ONCE = "Ended at once: all are switched on, and those that are away stay where they are"
 
 
 class Stage:
@@ -79,6 +81,8 @@ class Stage:
             for order in demonstration.power_back():
                 with contextlib.suppress(OrderRefused):  # undo as much as possible
                     await self._carry_out([order])
+            if shown is not None:
+                demonstration.story.add(ENDED_AT_ONCE, shown.stamp_s)
         if shown is not None:
             self._store.set_story(describe(demonstration, shown, running=False))
 
