@@ -85,6 +85,31 @@ def test_a_held_layout_says_who_would_be_out_of_reach(start_console, visit):
     page.wait_for("who", lambda: page.page.inner_text("#held-text").startswith(words))
 
 
+def test_a_flight_out_of_reach_waits_until_the_user_sends_it(page):
+    page.page.click("#nodes tr[data-id='17']")
+    page.page.fill("#fly-x", "40")
+    page.page.press("#fly-x", "Enter")
+    held = page.page.locator("#held-text")
+    words = ": drone 17 would have no route there. It waits for you"
+    page.wait_for("why it waits", lambda: held.inner_text().endswith(words))
+    page.page.wait_for_timeout(5500)  # longer than other orders are held
+    assert page.row(17, STATE) == "connected"
+    page.page.click("#held-now")
+    page.wait_for("17 flies", lambda: page.row(17, STATE) == "flying")
+
+
+def test_another_order_does_not_send_one_that_waits(page):
+    page.page.click("#nodes tr[data-id='17']")
+    page.page.fill("#fly-x", "40")
+    page.page.press("#fly-x", "Enter")
+    held = page.page.locator("#held-text")
+    page.wait_for("a warning", lambda: "no route there" in held.inner_text())
+    page.page.click("#nodes tr[data-id='16']")
+    page.page.press("#fly-x", "Enter")
+    dropped = "not sent: Drone 17 will leave to 40"
+    page.wait_for("the word", lambda: dropped in page.page.inner_text("#toasts"))
+
+
 def test_all_places_of_a_held_layout_come_into_view_although_the_user_has_moved_the_map(page):
     for _ in range(4):
         page.page.click("#zoom-in")

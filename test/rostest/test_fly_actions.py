@@ -12,10 +12,10 @@ import actionlib
 import rospy
 import rostest
 from actionlib_msgs.msg import GoalStatus
-from rostest_support import WALL_LIMIT_S, LogWatch, MeshWatch, call, wait_for
+from rostest_support import WALL_LIMIT_S, LogWatch, MeshWatch, call, run_program, wait_for
 
 from drone_mesh.msg import FlyAction, FlyFeedback, FlyGoal, FlyResult
-from drone_mesh.srv import AddDrone, RemoveDrone, RequestDroneFlight, SetSpeed
+from drone_mesh.srv import AddDrone, OrderFlight, RemoveDrone, RequestDroneFlight, SetSpeed
 
 SLOW, FAST = 0.2, 4.0  # simulated seconds per wall second
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "fly_by_action.py"
@@ -146,6 +146,28 @@ class FlyActionsTest(unittest.TestCase):
             return any(topic == "/Drones/7/fly/status" for topic, _ in rospy.get_published_topics())
 
         wait_for("the action withdrawn", WALL_LIMIT_S, lambda: not offered())
+
+    def test_6_command_action_and_service_say_who_would_have_no_route(self) -> None:
+        warning = "drone 2 would have no route there"
+        self.speed(SLOW)
+        command = run_program("fly", "2", "6", "-60")
+        self.assertEqual(command.returncode, 2, command.stdout)
+        why = f"not ordered: {warning}; --out-of-reach orders it all the same"
+        self.assertIn(why, command.stderr)
+        self.fly(2, -60.0, 6.0)
+        wait_for(
+            "the warning",
+            WALL_LIMIT_S,
+            lambda: self.feedback and self.feedback[-1].state.endswith(f" left; {warning}"),
+        )
+        far = call("/DroneManager/orderFlight", OrderFlight, 2, -61.0, 6.0, 0, False)
+        self.assertEqual((far.success, far.message), (True, warning))
+        near = call("/DroneManager/orderFlight", OrderFlight, 2, 4.0, 6.0, 0, False)
+        self.assertEqual((near.success, near.message), (True, ""))
+        line = f"drone 2 ordered to x 6.00 m, y -61.00 m, z 0 m: {warning}"
+        wait_for("the line in the log", WALL_LIMIT_S, lambda: self.log.lines(line))
+        self.speed(FAST)
+        self.mesh.wait_at(2, 6.0, 4.0, within_s=60)
 
 
 if __name__ == "__main__":

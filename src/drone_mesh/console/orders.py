@@ -20,6 +20,8 @@ from drone_mesh.earth_files import MAX_CHARACTERS, Placemarks, is_earth_file, re
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.formations.layouts import MAX_CASE, MAX_NAME, Order, read_layout
 from drone_mesh.formations.missions import MAX_SPEED_M_S, MOST_WAYPOINTS, Mission
+from drone_mesh.formations.preview import LostRoutes, lost_routes
+from drone_mesh.state.model import MeshStatus
 
 MAX_LAYOUT_CHARACTERS = 30_000  # three times what 254 drones need
 MAX_ORDER_NUMBER = 2**53  # JavaScript integers are exact up to here
@@ -66,6 +68,10 @@ class LayoutOffer(NamedTuple):
 def places_of(orders: Iterable[Order]) -> list[Place]:
     """The positions to which a layout sends its drones."""
     return [(drone, goal.longitude, goal.latitude, goal.height) for drone, goal in orders]
+
+
+def _orders_to(places: Iterable[Place]) -> list[Order]:
+    return [Order(drone, Location(y, x, z)) for drone, x, y, z in places]
 
 
 class FileContent(NamedTuple):
@@ -143,8 +149,7 @@ class _Formation(PageOrder):
     gateways: Gateways = []
 
     def carry_out(self, controls: MeshControls) -> str:
-        orders = [Order(drone, Location(y, x, z)) for drone, x, y, z in self.places]
-        return controls.formation(self.name, orders, self.gateways)
+        return controls.formation(self.name, _orders_to(self.places), self.gateways)
 
     def drones(self, layouts: Sequence[LayoutOffer]) -> Sequence[int]:
         return [place[0] for place in self.places]
@@ -237,6 +242,17 @@ class PreviewLayout(_Answered):
     case: int = Field(ge=0, le=MAX_CASE)
 
 
+class Foresee(_Answered):
+    """The page asks who would have no route if these drones were at these places."""
+
+    do: Literal["foresee"]
+    places: Places
+
+    def lost_routes(self, mesh: MeshStatus) -> LostRoutes:
+        """Who that is, and who would lose a route by it."""
+        return lost_routes(mesh, dict(_orders_to(self.places)))
+
+
 class NeighbourWatch(_Request):
     """The page requests details of one node's neighbours; None: stop."""
 
@@ -293,6 +309,7 @@ Request = Union[
     Demonstrate,
     ReadPlaces,
     PreviewLayout,
+    Foresee,
     TimeLine,
     Acknowledge,
     _Add,

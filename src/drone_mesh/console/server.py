@@ -40,6 +40,7 @@ from drone_mesh.console.orders import (
     LIMITS,
     Acknowledge,
     Demonstrate,
+    Foresee,
     LayoutOffer,
     NeighbourWatch,
     PacketWatch,
@@ -53,6 +54,7 @@ from drone_mesh.console.orders import (
 from drone_mesh.console.page import Page
 from drone_mesh.console.stage import Stage
 from drone_mesh.console.tiles import Tiles
+from drone_mesh.formations.preview import LostRoutes
 from drone_mesh.view.palette import DARK, LIGHT, css_variables
 from drone_mesh.web.access import Access, AccessDenied, TooManyGuesses
 
@@ -305,7 +307,7 @@ class ConsoleServer:
     async def _do(
         self,
         page: Page,
-        request: PageOrder | ReadPlaces | PreviewLayout | Acknowledge | Demonstrate,
+        request: PageOrder | ReadPlaces | PreviewLayout | Foresee | Acknowledge | Demonstrate,
     ) -> None:
         """Carry out a request and return its answer. Raises OrderRefused."""
         if isinstance(request, (PageOrder, Demonstrate)) and request.heard is not None:
@@ -320,7 +322,12 @@ class ConsoleServer:
             text, about = "a layout", content._asdict()
         elif isinstance(request, PreviewLayout):
             found = await self._in_worker(self._controls.preview, request.case)
-            text, about = found.in_words(), {"preview": dataclasses.asdict(found)}
+            text = found.in_words()
+            about = {"preview": dataclasses.asdict(found), "lost": found.out_of_reach}
+        elif isinstance(request, Foresee):
+            mesh = self._store.mesh
+            lost = await self._in_worker(request.lost_routes, mesh) if mesh else LostRoutes()
+            text, about = lost.in_words(), {"lost": [*lost.there, *lost.cut_off]}
         elif isinstance(request, Acknowledge):
             text = f"acknowledged {self._store.acknowledge(request.text)}"
         elif isinstance(request, Demonstrate):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Iterable, NamedTuple
+from typing import Collection, Iterable, NamedTuple
 
 from drone_mesh.drone.roles import Role
 from drone_mesh.errors import ConfigurationError
@@ -36,6 +36,11 @@ def ids_in_words(ids: Iterable[int], shortest_run: int = 2) -> str:
         f"{a}..{b}" if b - a + 1 >= shortest_run else ", ".join(map(str, range(a, b + 1)))
         for a, b in runs
     )
+
+
+def drones_in_words(ids: Collection[int]) -> str:
+    """For example: drone 3; drones 3, 5..9."""
+    return f"drone{'' if len(ids) == 1 else 's'} {ids_in_words(ids)}"
 
 
 def plan_fleet(

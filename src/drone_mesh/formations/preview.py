@@ -1,15 +1,15 @@
-"""A formation before it is flown: how long it takes, and who would lose the mesh.
+"""Flights before they are flown: how long a formation takes, and who would lose the mesh.
 
-The flights of the plan, on an ideal mesh: a drone is connected if places and range allow a path.
+On an ideal mesh: a drone is connected if places and range allow a path.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import AbstractSet, Mapping
+from typing import AbstractSet, Mapping, Sequence
 
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.drone.fleet import ids_in_words
+from drone_mesh.drone.fleet import drones_in_words, ids_in_words
 from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
@@ -61,6 +61,47 @@ def preview(
     """
     others = {} if at_once or standing is None else standing
     return _Rehearsal(mesh, {**others, **goals}, goals.keys(), rules).run(at_once)
+
+
+@dataclass(frozen=True)
+class LostRoutes:
+    """Who has no path to a gateway after some flights; ids ascending."""
+
+    there: Sequence[int] = ()  # of those that fly: at their goals
+    cut_off: Sequence[int] = ()  # of the others, which would have one without these flights
+
+    def __bool__(self) -> bool:
+        return bool(self.there or self.cut_off)
+
+    def in_words(self) -> str:
+        """For example: drone 3 would have no route there; drones 4..6 would lose their routes."""
+        words = []
+        if self.there:
+            words.append(f"{drones_in_words(self.there)} would have no route there")
+        if self.cut_off:
+            routes = "its route" if len(self.cut_off) == 1 else "their routes"
+            words.append(f"{drones_in_words(self.cut_off)} would lose {routes}")
+        return "; ".join(words)
+
+
+def lost_routes(mesh: MeshStatus, goals: Mapping[int, Location]) -> LostRoutes:
+    """Who has no path once these drones, and those in flight, are where they fly to.
+
+    Nobody, if the range of the radios is not known, as of a real mesh.
+    """
+    if mesh.max_distance <= 0.0:
+        return LostRoutes()
+    on = [node for node in mesh.nodes if node.on and position_is_known(node)]
+    gateways = [node.id for node in on if node.role == Role.GATEWAY]
+    before: dict[int, Sequence[float]] = {
+        node.id: node.path[-3:] if len(node.path) else node.position for node in on
+    }
+    after = {n: goals[n].to_vector() if n in goals else place for n, place in before.items()}
+    without = after.keys() - Reach(after, gateways, mesh.max_distance).hops(after).keys()
+    if not without:
+        return LostRoutes()
+    had = Reach(before, gateways, mesh.max_distance).hops(before).keys()
+    return LostRoutes(sorted(without & goals.keys()), sorted((without - goals.keys()) & had))
 
 
 class _Rehearsal:

@@ -15,6 +15,7 @@ from drone_mesh.console.frame_store import FrameStore
 from drone_mesh.console.orders import LayoutOffer
 from drone_mesh.console.server import MOST_PAGES, ConsoleServer
 from drone_mesh.drone.location import Location
+from drone_mesh.drone.roles import Role
 from drone_mesh.formations.preview import FormationPreview
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
 from drone_mesh.web import access
@@ -381,8 +382,25 @@ def test_a_preview_of_a_layout_names_who_would_be_out_of_reach_and_who_would_sta
         await until("the answer", lambda: page.of_type("answer"))
         (answer,) = page.of_type("answer")
         assert answer["text"].startswith("1 drone would be out of reach: 14; drone 3 would stay: ")
-        assert answer["preview"]["out_of_reach"] == [14]
+        assert answer["preview"]["out_of_reach"] == answer["lost"] == [14]
         assert answer["preview"]["stays"] == {"3": "drone 5 is in the way"}
+
+    run(scenario)
+
+
+def test_a_flight_out_of_reach_is_foreseen():
+    async def scenario(server: ConsoleServer, store: FrameStore) -> None:
+        gateway = NodeStatus(0, role=Role.GATEWAY, position=(0.0, 0.0, 0.0))
+        drones = [NodeStatus(n, position=(6.0 * n, 0.0, 0.0)) for n in (1, 2)]
+        store.update_mesh(MeshStatus(1.0, [gateway, *drones]), 1.0)
+        page = FakePage(server).open()
+        page.say(do="foresee", number=1, places=[[1, 77.0, 0.0, 0]])
+        page.say(do="foresee", number=2, places=[[2, 13.0, 0.0, 0]])
+        await until("the answers", lambda: len(page.of_type("answer")) == 2)
+        far, near = sorted(page.of_type("answer"), key=lambda answer: answer["number"])
+        assert far["text"] == "drone 1 would have no route there; drone 2 would lose its route"
+        assert far["lost"] == [1, 2]
+        assert (near["text"], near["lost"]) == ("", [])
 
     run(scenario)
 

@@ -15,7 +15,7 @@ from drone_mesh.drone.roles import Role
 from drone_mesh.formations.airspace import nearest_m, segments, ways_of
 from drone_mesh.formations.departures import Departures, FlightRules
 from drone_mesh.formations.layouts import Layouts
-from drone_mesh.formations.preview import preview
+from drone_mesh.formations.preview import lost_routes, preview
 from drone_mesh.state.model import MeshStatus, NodeStatus
 
 LAYOUTS = Layouts.shipped()
@@ -219,3 +219,26 @@ def test_dynamic_drones_keep_the_room_that_they_sway():
     assert len(choose(mesh(places), goals).set_out) == 1  # 20 % of two: one at a time
     wide = Departures(mesh(places), goals, {1: goals[1]}, FlightRules(sway_m=0.5))
     assert wide.choose([2]).set_out == {}
+
+
+def test_a_flight_out_of_reach_is_named_before_it_is_flown():
+    state = mesh({1: at(5, 0), 2: at(10, 0)})
+    assert not lost_routes(state, {2: at(13, 0)})
+    assert lost_routes(state, {2: at(77, 0)}).in_words() == "drone 2 would have no route there"
+
+
+def test_a_relay_that_leaves_is_held_against_its_flight_and_not_against_others():
+    state = mesh({1: at(5, 0), 2: at(10, 0), 3: at(15, 0), 4: at(0, 40)})
+    lost = lost_routes(state, {1: at(-5, 0)})
+    assert lost.in_words() == "drones 2..3 would lose their routes"
+    assert lost_routes(state, {3: at(15, 1)}).in_words() == ""
+
+
+def test_routes_are_those_of_when_present_flights_have_ended():
+    state = mesh({1: at(30, 0), 2: at(5, 1)})
+    state.nodes[1].path = (30.0, 0.0, 0.0, 5.0, 0.0, 0.0)
+    assert not lost_routes(state, {2: at(10, 0)})
+
+
+def test_nobody_is_said_to_lose_a_route_if_the_range_is_not_known():
+    assert not lost_routes(mesh({1: at(5, 0)}, max_distance=0.0), {1: at(77, 0)})

@@ -5,7 +5,7 @@ import { Charts } from "./charts.js";
 import { Connection } from "./connection.js";
 import { chartsCsv, chartsPicture, nodesCsv, nodesPicture, placesYaml, save } from "./files.js";
 import { Fleet } from "./fleet.js";
-import { assigned, Formations, outOfReach } from "./formations.js";
+import { assigned, Formations } from "./formations.js";
 import { Groups } from "./groups.js";
 import { Flights, names } from "./flights.js";
 import { EventLog } from "./log.js";
@@ -79,7 +79,7 @@ keepFocus(() => {
   return map.checkVisibility() ? map : document.querySelector("nav [aria-current]");
 });
 
-const flights = new Flights(mesh, (request) => connection.order(request), toast);
+const flights = new Flights(mesh, (request) => connection.request(request), toast);
 
 /** The height of a drone's goal, or of the drone itself if it does not fly, in whole metres. */
 function heightOf(id) {
@@ -238,15 +238,8 @@ byId("layout-form").addEventListener("submit", async (event) => {
   const moves = movesTo(places);
   const send = () => order({ do: "layout", case: number }, event.submitter);
   if (!moves.length) return send();
-  await flights.hold(moves, namesIn(`Layout ${number}`, moves, places), send);
-  const { held } = flights;
-  if (!held.length) return;
-  connection
-    .request({ do: "preview", case: number })
-    .then(
-      ({ text, preview }) => flights.held === held && flights.foresee(text, preview.out_of_reach),
-    )
-    .catch(() => {}); // the order itself is answered
+  const preview = { do: "preview", case: number };
+  await flights.hold(moves, namesIn(`Layout ${number}`, moves, places), send, preview);
 });
 
 byId("load-places").addEventListener("change", async (event) => {
@@ -276,8 +269,6 @@ async function flyTo(name, places) {
   moves.push(...assigned(drones, free).map((move) => ({ ...move, z: Math.round(move.z) })));
   if (!moves.length) return toast(`none of the drones in ${name} is in this fleet`, true);
   await flights.hold(moves, namesIn(name, moves, places));
-  const lost = outOfReach(mesh, moves);
-  if (lost.length) flights.foresee(`${lost.length} would have no route: ${lost.join(", ")}`, lost);
 }
 
 /** Offers the only one of these ways [[x, y, z]] as a mission. */

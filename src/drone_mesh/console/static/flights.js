@@ -1,4 +1,5 @@
-// Orders flights: asks for confirmation of a long one, and holds each order briefly so that it can be undone.
+// Orders flights: asks for confirmation of a long one, and holds each order briefly so that it can be undone. An order
+// that would cost a drone its route is held until the user sends it.
 // A drone in flight may be out of reach, so an order cannot be recalled once it is sent.
 
 import { agreed } from "./confirm.js";
@@ -14,11 +15,13 @@ export class Flights extends EventTarget {
   #send = null; // sends the held orders
   #from = null; // had the focus before
 
-  /** `order(request)` resolves with a short text, or throws; `toast(text, bad)` shows them. */
-  constructor(mesh, order, toast) {
+  /**
+   * `ask(request)` resolves with the answer, or throws; its text is short. `toast(text, bad)` shows it.
+   */
+  constructor(mesh, ask, toast) {
     super();
     this.mesh = mesh;
-    this.order = order;
+    this.ask = ask;
     this.toast = toast;
     this.held = []; // [{id, x, y, z}], ordered when HOLD_MS are over
     byId("held-undo").addEventListener("click", () => this.undo());
@@ -27,23 +30,42 @@ export class Flights extends EventTarget {
 
   /**
    * Orders these drones [{id, x, y, z}] to fly after HOLD_MS, unless the user undoes it.
-   * `what` describes them; `send` sends all the orders.
+   * `what` describes them; `send` sends all the orders; `preview` asks what would come of them.
    */
-  async hold(moves, what = names(moves), send = () => this.#order(moves, what)) {
-    this.#release();
+  async hold(
+    moves,
+    what = names(moves),
+    send = () => this.#order(moves, what),
+    preview = { do: "foresee", places: places(moves) },
+  ) {
+    if (this.#timer) this.#release();
+    else this.undo(); // nobody has confirmed it
     if (!(await this.#agreed(moves, what)) || !(await this.#gatewaysAgreed(moves))) return;
     this.#hold(moves, send);
     const goal = moves.length > 1 ? "" : ` to ${metres(moves[0].x)}, ${metres(moves[0].y)}`;
     byId("held-text").textContent = `${what} will leave${goal}`;
     this.#timer = setTimeout(() => this.#release(), HOLD_MS);
+    this.#foresee(preview);
   }
 
-  /** Says what will come of the held orders; `lost` are the drones that would be out of reach. */
-  foresee(text, lost) {
-    if (!this.held.length) return;
+  /** Says what will come of the held orders. If a drone would be out of reach, they wait for the user. */
+  async #foresee(preview) {
+    const { held } = this;
+    const answer = await this.ask(preview).catch(() => null); // the order itself is answered
+    if (!answer?.text || this.held !== held) return;
+    const { text, lost } = answer;
     byId("held-text").textContent += `: ${text}`;
-    this.held = this.held.map((move) => ({ ...move, lost: lost.includes(move.id) }));
+    if (lost.length) {
+      this.#stopTimer();
+      byId("held-text").textContent += ". It waits for you";
+    }
+    this.held = held.map((move) => ({ ...move, lost: lost.includes(move.id) }));
     this.dispatchEvent(new Event("change"));
+  }
+
+  #stopTimer() {
+    clearTimeout(this.#timer);
+    this.#timer = null;
   }
 
   /** Drops the held orders and says so; returns whether there were any. */
@@ -55,7 +77,7 @@ export class Flights extends EventTarget {
   }
 
   #hold(moves, send) {
-    clearTimeout(this.#timer);
+    this.#stopTimer();
     this.held = moves;
     this.#send = send;
     byId("held").hidden = !moves.length;
@@ -80,11 +102,11 @@ export class Flights extends EventTarget {
   async #order(moves, what) {
     if (moves.length === 1 || !this.mesh.actions.includes("formation"))
       return this.#orderEach(moves);
-    const places = moves.map(({ id, x, y, z }) => [id, metres(x), metres(y), z]);
     const gateways = this.#gateways(moves); // which the user agreed to
-    const request = { do: "formation", name: what.slice(0, MAX_NAME), places, gateways };
+    const name = what.slice(0, MAX_NAME);
+    const request = { do: "formation", name, places: places(moves), gateways };
     try {
-      this.toast(await this.order(request), false);
+      this.toast((await this.ask(request)).text, false);
     } catch (error) {
       this.toast(error.message, true);
     }
@@ -117,14 +139,14 @@ export class Flights extends EventTarget {
   /** Sends one order, and again if it leads to the place of a drone that leaves, or if the user agrees. */
   async #sendOne(request, leaving) {
     try {
-      return await this.order(request);
+      return (await this.ask(request)).text;
     } catch (error) {
       const taken = /^drone (\d+) .*allow_shared_place/.exec(error.message);
       if (!taken) throw error;
       const reason = error.message.split(";")[0];
       const question = `Drone ${request.node}: ${reason}. Send it all the same?`;
       if (!leaving.has(Number(taken[1])) && !(await agreed(question, "Send"))) throw error;
-      return this.order({ ...request, allow_shared_place: true });
+      return (await this.ask({ ...request, allow_shared_place: true })).text;
     }
   }
 
@@ -157,6 +179,11 @@ export class Flights extends EventTarget {
 
 function metres(value) {
   return Number(value.toFixed(2));
+}
+
+/** As requests name them: [[id, x, y, z]]. */
+function places(moves) {
+  return moves.map(({ id, x, y, z }) => [id, metres(x), metres(y), z]);
 }
 
 /** These drones [{id}] in words. */

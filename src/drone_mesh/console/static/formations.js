@@ -59,7 +59,7 @@ export function assigned(drones, places) {
 }
 
 /** The drones among these moves [{id, x, y, z}] that no chain of links would connect with a gateway. */
-export function outOfReach(mesh, moves) {
+function outOfReach(mesh, moves) {
   const places = new Map();
   for (const node of mesh.nodes.values())
     if (node.on && node.position) places.set(node.id, node.position);

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import logging
-from typing import Callable, Sequence
+from typing import Callable, NamedTuple, Sequence
 
 import actionlib
 import rospy
@@ -37,6 +37,13 @@ NO_GATEWAY = "no gateway is running to take the order"
 ORDERS_IN_QUEUE = 512  # two whole fleets
 
 _log = logging.getLogger(__name__)
+
+
+class _Ordered(NamedTuple):
+    """The outcome of one order, in words."""
+
+    why_not: str  # empty: a gateway has sent it
+    warning: str  # who will lose the mesh by it; empty: nobody
 
 
 class DroneManager:
@@ -84,18 +91,18 @@ class DroneManager:
         self, request: srv.RequestDroneFlightRequest
     ) -> srv.RequestDroneFlightResponse:
         """Status 1: a gateway has the order; 2: no gateway has a route; 0: there is no gateway."""
-        why_not = self._order_one(Order(request.ID, location_of(request)), False)
+        why_not, _warning = self._order_one(Order(request.ID, location_of(request)), False)
         if why_not == NO_GATEWAY:
             return srv.RequestDroneFlightResponse(status=0)
         return srv.RequestDroneFlightResponse(status=2 if why_not else 1)
 
     def _order_flight(self, request: srv.OrderFlightRequest) -> srv.OrderFlightResponse:
         order = Order(request.id, location_of(request))
-        why_not = self._order_one(order, request.allow_shared_place)
-        return srv.OrderFlightResponse(success=not why_not, message=why_not)
+        why_not, warning = self._order_one(order, request.allow_shared_place)
+        return srv.OrderFlightResponse(success=not why_not, message=why_not or warning)
 
-    def _order_one(self, order: Order, allow_shared_place: bool) -> str:
-        """Why the order was not sent; empty if it was. Raises ServiceException: it was refused."""
+    def _order_one(self, order: Order, allow_shared_place: bool) -> _Ordered:
+        """Raises ServiceException: the order was refused."""
         drone, _goal = order
         _check(order)
         fleet = drones_if_known()
@@ -105,15 +112,18 @@ class DroneManager:
             )
         if not self._gateway_is_there():
             _log.warning("drone %d: order dropped: no gateway is running", drone)
-            return NO_GATEWAY
+            return _Ordered(NO_GATEWAY, "")
+        warning = self._standing.lost_routes([order]).in_words()
         outcomes = self._order([order], fleet, allow_shared_place)
         for answer in outcomes.refused.values():
             raise rospy.ServiceException(answer.reason)
         if not outcomes.no_route:
             self._standing.ordered(order)
-            return ""
+            if warning:
+                _log.warning("drone %d ordered to %s: %s", drone, order.goal.in_words(), warning)
+            return _Ordered("", warning)
         _log.warning("drone %d: no gateway has a route to it", drone)
-        return f"no gateway has a route to drone {drone}"
+        return _Ordered(f"no gateway has a route to drone {drone}", "")
 
     def _set_to_casus(self, request: srv.CasusRequest) -> srv.CasusResponse:
         self._order_case(request.caseID, at_once=True)
@@ -172,13 +182,14 @@ class DroneManager:
         known, missing = _in_fleet(orders, fleet)
         if not self._gateway_is_there():
             raise rospy.ServiceException("no gateway is running")
+        lost = self._standing.lost_routes(known)
         start = self._standing.give(name, orders, at_once, handle)
         if start.is_followed:
             summary = self._order_first(start, fleet, missing)
         else:
             summary = self._order_all(known, fleet, missing)
-        words = summary.in_words()
-        level = logging.INFO if summary.is_complete else logging.WARNING
+        words = "; ".join(filter(None, (summary.in_words(), lost.in_words())))
+        level = logging.INFO if summary.is_complete and not lost else logging.WARNING
         _log.log(level, "%s: %s", name, words)
         return srv.OrderLayoutResponse(
             start.progress.number,

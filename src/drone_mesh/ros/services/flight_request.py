@@ -18,8 +18,11 @@ class FlightRefused(FlightNotOrdered):
     """The order is refused: it is invalid, or leads to the place of another drone."""
 
 
-def request_flight(drone: int, goal: Location, allow_shared_place: bool = False) -> None:
-    """Order a drone to a place, through the mesh. Raises FlightNotOrdered. Any thread."""
+def request_flight(drone: int, goal: Location, allow_shared_place: bool = False) -> str:
+    """Order a drone to a place, through the mesh; returns who loses the mesh by it, in words.
+
+    Raises FlightNotOrdered. Any thread.
+    """
     height = whole_metres(goal.height)
     request = OrderFlightRequest(drone, goal.latitude, goal.longitude, height, allow_shared_place)
     try:
@@ -30,3 +33,4 @@ def request_flight(drone: int, goal: Location, allow_shared_place: bool = False)
         raise FlightRefused(str(error)) from None
     if not answer.success:
         raise FlightNotOrdered(answer.message)
+    return str(answer.message)

@@ -63,6 +63,11 @@ class _Flight:
         self.goal = location_of(handle.get_goal())
         self.progress = OrderProgress(drone, self.goal, since_s)
         self.begun_s = time.monotonic()
+        self.warning = ""  # who will lose the mesh by it, in words
+
+    def state_in_words(self, node: NodeState) -> str:
+        """The state of the order, and the warning."""
+        return "; ".join(filter(None, (self.progress.in_words(node), self.warning)))
 
 
 class FlyActions:
@@ -153,13 +158,13 @@ class FlyActions:
     def _begin(self, drone: int, handle: actionlib.ServerGoalHandle) -> None:
         flight = _Flight(handle, drone, rospy.get_time() - CLOCKS_DIFFER_S)
         try:
-            request_flight(drone, flight.goal)
+            flight.warning = request_flight(drone, flight.goal)
         except FlightNotOrdered as error:
             refused = isinstance(error, FlightRefused)
             outcome = FlyResult.REFUSED if refused else FlyResult.NO_ROUTE
             handle.set_rejected(FlyResult(outcome, str(error)), str(error))
             return
-        handle.set_accepted()
+        handle.set_accepted(flight.warning)
         self._flights.append(flight)
         if self._states is None:
             self._states = rospy.Subscriber(
@@ -204,7 +209,7 @@ class FlyActions:
             if node is not None:
                 x, y, z = node.position
                 left_m = Location.from_vector(node.position).distance_m(flight.goal)
-                words = flight.progress.in_words(node)
+                words = flight.state_in_words(node)
                 flight.handle.publish_feedback(FlyFeedback(words, y, x, z, left_m))
 
     def _end(self, flight: _Flight, outcome: int, why: str) -> None:

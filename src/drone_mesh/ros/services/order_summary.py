@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Mapping, Sequence
 
-from drone_mesh.drone.fleet import ids_in_words
+from drone_mesh.drone.fleet import drones_in_words
 
 
 @dataclass(frozen=True)
@@ -32,25 +32,20 @@ class OrderSummary:
         parts = [f"ordered {len(self.sent)} of {_counted(total, 'drone')}"]
         if self.there:
             verb, noun = ("is", "its place") if len(self.there) == 1 else ("are", "their places")
-            parts.append(f"{_drones_in_words(self.there)} {verb} at {noun}")
+            parts.append(f"{drones_in_words(self.there)} {verb} at {noun}")
         if self.flying:
             verb = "flies" if len(self.flying) == 1 else "fly"
-            parts.append(f"{_drones_in_words(self.flying)} {verb} there already")
+            parts.append(f"{drones_in_words(self.flying)} {verb} there already")
         if self.later:
-            parts.append(f"{_drones_in_words(self.later)} will set out later")
+            parts.append(f"{drones_in_words(self.later)} will set out later")
         if self.no_route:
-            parts.append(f"no route yet to {_drones_in_words(self.no_route)}")
+            parts.append(f"no route yet to {drones_in_words(self.no_route)}")
         parts += [f"drone {drone} stays: {reason}" for drone, reason in self.refused.items()]
         if self.not_in_fleet:
             verb = "is" if len(self.not_in_fleet) == 1 else "are"
-            parts.append(f"{_drones_in_words(self.not_in_fleet)} {verb} not in this fleet")
+            parts.append(f"{drones_in_words(self.not_in_fleet)} {verb} not in this fleet")
         return "; ".join(parts)
 
 
 def _counted(number: int, noun: str) -> str:
     return f"{number} {noun}{'' if number == 1 else 's'}"
-
-
-def _drones_in_words(ids: Sequence[int]) -> str:
-    """For example: drone 3; drones 3, 5..9."""
-    return f"drone{'' if len(ids) == 1 else 's'} {ids_in_words(ids)}"

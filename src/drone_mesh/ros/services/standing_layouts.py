@@ -17,7 +17,7 @@ from drone_mesh.errors import ConfigurationError
 from drone_mesh.formations.airspace import SWAY_M
 from drone_mesh.formations.departures import FlightRules
 from drone_mesh.formations.layouts import Order
-from drone_mesh.formations.preview import FormationPreview, preview
+from drone_mesh.formations.preview import FormationPreview, LostRoutes, lost_routes, preview
 from drone_mesh.formations.standing_orders import PartState, StandingOrders, StandingProgress
 from drone_mesh.msg import (
     LayoutAction,
@@ -148,6 +148,11 @@ class StandingLayouts:
         with self._lock:
             standing = self._orders.goals(mesh)
         return preview(mesh, dict(orders), flight_rules(), at_once, standing)
+
+    def lost_routes(self, orders: Sequence[Order]) -> LostRoutes:
+        """Who would lose the mesh by these orders; nobody if its state is unknown."""
+        mesh = self._mesh
+        return LostRoutes() if mesh is None else lost_routes(mesh, dict(orders))
 
     def ordered(self, order: Order) -> None:
         """Somebody ordered one drone to a place."""

@@ -39,10 +39,12 @@ class RosControls(MeshControls):
 
     def fly(self, node: int, x: float, y: float, z: float, allow_shared_place: bool = False) -> str:
         try:
-            request_flight(node, Place(latitude=y, longitude=x, height=z), allow_shared_place)
+            goal = Place(latitude=y, longitude=x, height=z)
+            warning = request_flight(node, goal, allow_shared_place)
         except FlightNotOrdered as error:
             raise OrderRefused(str(error)) from error
-        return f"ordered drone {node} to x {x:g}, y {y:g}, z {round(z)} m"
+        done = f"ordered drone {node} to x {x:g}, y {y:g}, z {round(z)} m"
+        return f"{done}; {warning}" if warning else done
 
     def layout(self, case: int) -> str:
         request = srv.OrderLayoutRequest(caseID=case)

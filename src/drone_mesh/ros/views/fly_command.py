@@ -15,13 +15,15 @@ from drone_mesh.communication.order_record import OrderState
 from drone_mesh.drone.goal import MAX_COORDINATE_M, MAX_HEIGHT_M
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import MeshError
+from drone_mesh.formations.preview import lost_routes
 from drone_mesh.msg import MeshEvent, MeshState
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import join_graph, run_tool
-from drone_mesh.ros.graph.conversions import event_record
+from drone_mesh.ros.graph.conversions import event_record, mesh_status
 from drone_mesh.ros.services.flight_request import request_flight
 from drone_mesh.state.orders import CLOCKS_DIFFER_S, OrderProgress
 
+OUT_OF_REACH = "--out-of-reach"
 SHOW_EVERY_S = 2.0  # simulated
 
 
@@ -29,12 +31,15 @@ def main() -> None:
     """Entry point of nodes/fly."""
     options = _parser().parse_args(_with_negative_numbers(rospy.myargv()[1:]))
     goal = Location(latitude=options.y, longitude=options.x, height=float(options.height))
-    run_tool("fly", lambda: _run(options.drone, goal))
+    run_tool("fly", lambda: _run(options.drone, goal, options.out_of_reach))
 
 
 def _with_negative_numbers(words: list[str]) -> list[str]:
-    """The arguments after "--", as argparse would take a number such as -1e3 for an option."""
-    return words if {"-h", "--help"} & set(words) else ["--", *words]
+    """The numbers after "--", as argparse would take one such as -1e3 for an option."""
+    if {"-h", "--help"} & set(words):
+        return words
+    options = [word for word in words if word == OUT_OF_REACH]
+    return [*options, "--", *(word for word in words if word != OUT_OF_REACH)]
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -55,32 +60,42 @@ def _parser() -> argparse.ArgumentParser:
         type=whole(0, int(MAX_HEIGHT_M)),
         help="metres above the ground, a whole number (default: 0)",
     )
+    parser.add_argument(
+        OUT_OF_REACH,
+        action="store_true",
+        help="order it although it, or another drone, would have no route to a gateway then",
+    )
     return parser
 
 
-def _run(drone: int, goal: Location) -> int:
+def _run(drone: int, goal: Location, out_of_reach: bool) -> int:
     join_graph("order_flight")
     heard: queue.Queue[MeshEvent | MeshState] = queue.Queue()
     rospy.Subscriber(names.EVENTS_TOPIC, MeshEvent, heard.put)
     rospy.Subscriber(names.STATE_TOPIC, MeshState, heard.put, queue_size=1)
-    since_s = _first_state_s(heard) - CLOCKS_DIFFER_S
-    request_flight(drone, goal)
+    mesh = mesh_status(_first_state(heard))
+    lost = lost_routes(mesh, {drone: goal})
+    if lost and not out_of_reach:
+        raise MeshError(f"not ordered: {lost.in_words()}; {OUT_OF_REACH} orders it all the same")
+    warning = request_flight(drone, goal)
+    if warning:
+        print(warning, flush=True)
     try:
-        return _follow(heard, OrderProgress(drone, goal, since_s), drone)
+        return _follow(heard, OrderProgress(drone, goal, mesh.stamp_s - CLOCKS_DIFFER_S), drone)
     except KeyboardInterrupt:
         print(f"drone {drone} flies on", file=sys.stderr)
         raise
 
 
-def _first_state_s(heard: queue.Queue[MeshEvent | MeshState]) -> float:
-    """Simulated time, by the first state of the mesh. Raises MeshError if none comes."""
+def _first_state(heard: queue.Queue[MeshEvent | MeshState]) -> MeshState:
+    """The first state of the mesh. Raises MeshError if none comes."""
     while True:
         try:
             message = heard.get(timeout=10.0)
         except queue.Empty:
             raise MeshError("no state of a mesh: is the simulation running?") from None
         if isinstance(message, MeshState):
-            return message.header.stamp.to_sec()
+            return message
 
 
 def _follow(heard: queue.Queue[MeshEvent | MeshState], progress: OrderProgress, drone: int) -> int:
