@@ -119,7 +119,7 @@ def test_an_autopilot_that_refuses_to_arm_is_quoted(autopilot: Autopilot) -> Non
 
 
 @BOTH
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", [0, 2, 6, 7])  # find each defect that range(10) finds
 def test_on_a_line_that_loses_one_message_in_twenty_a_flight_goes_up_across_and_down(
     autopilot: Autopilot, seed: int
 ) -> None:
