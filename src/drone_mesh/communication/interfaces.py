@@ -209,6 +209,8 @@ class IWirelessCommunication(abc.ABC):
 class IMeshSeals:
     """What the key of a mesh adds to a node's packets. As it stands here: a mesh without a key."""
 
+    has_key = False
+
     def reserved_bytes(self, kind: int) -> int:
         """How many of the 27 bytes after the header of a packet the seal needs."""
         return 0

@@ -11,8 +11,16 @@ from drone_mesh.drone.location import Location
 class OrderState(enum.Enum):
     """The progress of an order; `in_words` is how logs, events, services and pages tell it."""
 
-    SENT = "sent"  # the next hop has it
-    ACCEPTED = "accepted"  # by the drone, which flies there
+    is_open: bool  # whether the gateway still follows the order
+
+    def __new__(cls, words: str, is_open: bool = False) -> OrderState:
+        member = object.__new__(cls)
+        member._value_ = words
+        member.is_open = is_open
+        return member
+
+    SENT = "sent", True  # the next hop has it
+    ACCEPTED = "accepted", True  # by the drone, which flies there
     ARRIVED = "arrived"
     REPLACED = "replaced"  # the drone has a later order
     REFUSED = "refused"  # by the drone
@@ -20,15 +28,10 @@ class OrderState(enum.Enum):
     LOST_CONTACT = "lost contact"  # the drone may still fly there; if it reports, the state changes
     GIVEN_UP = "given up"  # the flight ended elsewhere
 
-    @property
-    def is_open(self) -> bool:
-        """Whether the gateway still follows the order."""
-        return self in (OrderState.SENT, OrderState.ACCEPTED)
-
     def in_words(self, reason: str = "") -> str:
         """The state and its reason, such as: replaced by order 8; refused: battery at 9 %."""
         if not reason:
-            return self.value
+            return str(self.value)
         continues = self in (OrderState.REPLACED, OrderState.LOST_CONTACT)
         return f"{self.value}{'' if continues else ':'} {reason}"
 

@@ -33,9 +33,8 @@ class RecordingAntenna(IWirelessCommunication):
     `gets_lost(payload)` decides for single packets.
     """
 
-    medium = UNDISTURBED
-
-    def __init__(self):
+    def __init__(self, medium=UNDISTURBED):
+        self._medium = medium
         self.taken = []
         self.tried = []
         self.broadcasts = []
@@ -47,6 +46,10 @@ class RecordingAntenna(IWirelessCommunication):
         self.powered = True
         self.is_whole = True
         self.power = lambda: None  # whether it hears power; None: it cannot tell
+
+    @property
+    def medium(self):
+        return self._medium
 
     def start_antenna(self, mesh):
         self.calls.append(("start_antenna", mesh))
@@ -147,9 +150,10 @@ class Rig:
         routing=None,
         repair=None,
         options=None,
+        medium=UNDISTURBED,
     ):
         self.now_s = 0.0
-        self.antenna = RecordingAntenna()
+        self.antenna = RecordingAntenna(medium)
         self.engine = RigEngine()
         self.internet = RigInternet()
         self.routing = routing or ChildTableTree()

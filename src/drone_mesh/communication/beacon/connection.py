@@ -8,10 +8,10 @@ from drone_mesh.communication.beacon.own_motion import OwnMotion
 from drone_mesh.communication.beacon.packets import newer
 from drone_mesh.communication.beacon.routes import PROVEN_S, BeaconRoutes
 from drone_mesh.communication.control.control_plane import IControlHost
-from drone_mesh.communication.control.parts import NodeBasics
 from drone_mesh.communication.control.router_states import RepairState, RouterEvent, RouterStates
-from drone_mesh.communication.events.observer import MeshEventKind, in_hops
-from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.events.observer import MeshEventKind, Reporter, in_hops
+from drone_mesh.communication.interfaces import NO_ROUTE, IWirelessCommunication
+from drone_mesh.communication.neighbours.known_places import KnownPlaces
 
 CHECK_S = 1.0  # how often a router without a gateway considers its repair
 
@@ -21,13 +21,16 @@ class Connection:
 
     def __init__(
         self,
-        basics: NodeBasics,
         host: IControlHost,
         states: RouterStates,
         routes: BeaconRoutes,
         motion: OwnMotion,
+        places: KnownPlaces,
+        antenna: IWirelessCommunication,
+        report: Reporter,
     ) -> None:
-        self._basics, self._host, self._states = basics, host, states
+        self._host, self._states = host, states
+        self._places, self._antenna, self._report = places, antenna, report
         self._routes, self._motion = routes, motion
         self._check_s = -math.inf
         self._was_connected = False
@@ -62,7 +65,7 @@ class Connection:
         if self._unproven is not None and newer(self._routes.number, self._unproven) > 0:
             self._unproven = None
         flies = states.repair is RepairState.FLYING  # over links that it leaves behind
-        places, here = self._basics.places, self._routes.motion
+        places, here = self._places, self._routes.motion
         if parent != NO_ROUTE and self._routes.is_proved and not flies:
             places.connected_here(None if here is None else here.place, self._routes.hops)
         is_good = self._unproven is None and self._routes.is_proved
@@ -76,14 +79,12 @@ class Connection:
         self._was_connected = connected
         if connected:
             states.happened(RouterEvent.GATEWAY_ANSWERED)
-            self._basics.report(
-                MeshEventKind.CONNECTED, self._routes.gateway, in_hops(self._routes.hops)
-            )
+            self._report(MeshEventKind.CONNECTED, self._routes.gateway, in_hops(self._routes.hops))
             self._told = False
             self.tell_repair()
         else:
             states.happened(RouterEvent.ROUTE_LOST)
-            self._basics.report(MeshEventKind.DISCONNECTED, self._routes.gateway)
+            self._report(MeshEventKind.DISCONNECTED, self._routes.gateway)
             self._check_s = self._routes.now_s
         return connected
 
@@ -114,4 +115,4 @@ class Connection:
             return False
         if self._routes.offline:
             return False  # its gateway is in reach and has no internet: a flight repairs nothing
-        return self._basics.antenna.on() and self._host.may_connect(NO_ROUTE, False)
+        return self._antenna.on() and self._host.may_connect(NO_ROUTE, False)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from drone_mesh.communication.beacon.nodes_below import NodesBelow
 from drone_mesh.communication.beacon.packets import Beacon, Motion
 from drone_mesh.communication.beacon.routes import BeaconRoutes
-from drone_mesh.communication.control.parts import NodeBasics
-from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.interfaces import NO_ROUTE, IMeshSeals
+from drone_mesh.communication.neighbours.common_frame import CommonFrame
 from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.drone.location import Location
@@ -20,11 +20,16 @@ class OwnBeacons:
     """Composes the beacons of one node: what does not fit one takes turns."""
 
     def __init__(
-        self, basics: NodeBasics, routes: BeaconRoutes, below: NodesBelow, step_m: float
+        self,
+        seals: IMeshSeals,
+        frame: CommonFrame,
+        routes: BeaconRoutes,
+        below: NodesBelow,
+        step_m: float,
     ) -> None:
         """A node within `step_m` of where it is expected is there, and so is a gateway."""
-        self._frame, self._routes, self._below, self._step_m = basics.frame, routes, below, step_m
-        self.room = messages.BODY_BYTES - basics.seals.reserved_bytes(MessageType.BEACON)
+        self._frame, self._routes, self._below, self._step_m = frame, routes, below, step_m
+        self.room = messages.BODY_BYTES - seals.reserved_bytes(MessageType.BEACON)
         self.asks = True  # whether the next one asks for those of the neighbours
         self._told_place: Location | None = None  # what this node's beacons have said
         self._sent = 0

@@ -18,12 +18,13 @@ from drone_mesh.communication.beacon.search import Searches
 from drone_mesh.communication.beacon.trickle import Trickle
 from drone_mesh.communication.beacon.verdicts import Verdicts
 from drone_mesh.communication.control.control_plane import (
-    IControlHost,
+    ControlledNode,
     IControlPlane,
     IControlTechnique,
 )
-from drone_mesh.communication.control.parts import NodeBasics
-from drone_mesh.communication.control.router_states import RouterEvent, RouterStates
+from drone_mesh.communication.control.node_part import due, receives
+from drone_mesh.communication.control.place_requests import PlaceRequests
+from drone_mesh.communication.control.router_states import RouterEvent
 from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.communication.interfaces import BROADCAST, MAX_NODE_ID, NO_ROUTE
 from drone_mesh.communication.timing.deadlines import Due
@@ -43,44 +44,65 @@ DRIVER_TRIES = 4  # per hop: more delay the packet, which another neighbour may 
 class BeaconPlane(IControlPlane):
     """Neighbours, connection and routes of one node by beacons."""
 
-    def __init__(self, basics: NodeBasics, host: IControlHost, states: RouterStates | None) -> None:
-        self._basics, self._host = basics, host
-        self._me, self._antenna = basics.node_id, basics.antenna
-        self._deadlines = basics.deadlines
-        self.bids_within_s = self._antenna.medium.stretched(BIDS_WITHIN_S)
+    def __init__(self, node: ControlledNode) -> None:
+        self._host = node.host
+        self._me, self._antenna, self._deadlines = node.node_id, node.antenna, node.deadlines
+        self._report, self._complaints = node.report, node.complaints
+        self._neighbours, self._places = node.neighbours, node.places
+        self._frame, self._claims, self._range_m = node.frame, node.claims, node.range_m
+        medium, states, is_gateway = node.antenna.medium, node.states, node.states is None
+        self.bids_within_s = medium.stretched(BIDS_WITHIN_S)
         self._routes = self.routes = BeaconRoutes(
             self._me,
-            states is None,
-            basics.range_m,
-            basics.neighbours.place_of,
-            self._antenna.medium.shared,
-            basics.seals.may_be_gateway,
+            is_gateway,
+            node.range_m,
+            node.neighbours.place_of,
+            medium.shared,
+            node.seals.may_be_gateway,
         )
-        self._step_m = MOVED * basics.range_m
-        self._motion = OwnMotion(basics.pilot.place, self._step_m)
+        self._step_m = MOVED * node.range_m
+        self._motion = OwnMotion(node.pilot.place, self._step_m)
         self._below = NodesBelow(self._me, self._routes)
-        self._own = OwnBeacons(basics, self._routes, self._below, self._step_m)
+        self._own = OwnBeacons(node.seals, node.frame, self._routes, self._below, self._step_m)
         self._body = slice(messages.HEADER_BYTES, messages.HEADER_BYTES + self._own.room)
-        medium = self._antenna.medium
-        self._trickle = Trickle(medium, basics.rng)
+        self._trickle = Trickle(medium, node.rng)
         self._searches = Searches(self._me, self._routes, self._broadcast, medium.hop_s)
         self._verdicts = Verdicts(self._routes, self._searches, self._deadlines)
         self._courier = self.delivery = Courier(
             self._me,
             self._antenna,
             self._deadlines,
-            basics.timing.send_attempts,
+            node.timing.send_attempts,
             self._verdicts.verdict_on,
             self._took,
             self._failed,
-            lambda from_, node: self._routes.leads_not_to(node, from_),
-            basics.seals.without_proof,
+            lambda from_, other: self._routes.leads_not_to(other, from_),
+            node.seals.without_proof,
         )
-        self._proofs = Proofs(basics, self._routes, self._courier, states is None)
-        self._watch = ParentWatch(self._routes, medium.hop_s, basics.rng)
-        self._connection = (
-            None if states is None else Connection(basics, host, states, self._routes, self._motion)
+        self._proofs = Proofs(
+            self._me,
+            is_gateway,
+            self._routes,
+            self._courier,
+            PlaceRequests(self._me, node.pilot, node.antenna, self._courier, node.deadlines),
+            node.places,
+            node.seals,
+            node.complaints,
+            node.rng,
         )
+        self._watch = ParentWatch(self._routes, medium.hop_s, node.rng)
+        self._states = states
+        self._connection = None
+        if states is not None:
+            self._connection = Connection(
+                node.host,
+                states,
+                self._routes,
+                self._motion,
+                node.places,
+                node.antenna,
+                node.report,
+            )
         self._look_s = -math.inf  # when it looks at everything anew, whatever a beacon says
         self.learn = self._learn
         self.forward = self._courier.forward
@@ -94,11 +116,11 @@ class BeaconPlane(IControlPlane):
         self._trickle.start(self._routes.now_s)
         self._plan()
 
-    def on_time(self, now_s: float) -> None:
+    @due(Due.ROUTING)
+    def on_due(self) -> None:
         """Do what is due."""
-        if now_s < self._deadlines.get(Due.ROUTING):
-            return
         self._set_time()
+        now_s = self._routes.now_s
         self._look_round()
         if self._courier.holds and now_s >= self._verdicts.retry_s:
             self._verdicts.retries()
@@ -108,9 +130,6 @@ class BeaconPlane(IControlPlane):
         self._proofs.on_time()
         self._plan()
 
-    def check(self, due_s: float) -> None:
-        """Does nothing: `on_time` checks each thing when it is due."""
-
     def on_power(self, on: bool) -> None:
         """Ask for the beacons of the neighbours; forget them when the antenna is off."""
         self._set_time()
@@ -119,7 +138,7 @@ class BeaconPlane(IControlPlane):
             self._trickle.start(self._routes.now_s)
         else:
             self._routes.neighbours.clear()
-            self._basics.neighbours.forget_all()  # it is this node that has fallen silent
+            self._neighbours.forget_all()  # it is this node that has fallen silent
             self._look_round()
         self._plan()
 
@@ -143,19 +162,13 @@ class BeaconPlane(IControlPlane):
         self._trickle.hurry(self._routes.now_s)
         self._plan()
 
-    def neighbour_leaves(self, neighbour: int) -> None:
-        """Does nothing: the neighbour's place and velocity, or this node's own, show it in time."""
-
-    def gateway_sent_place(self) -> None:
-        """Does nothing: no decision here waits for the gateway's place."""
-
     def _look_round(self) -> None:
         """Forget who is silent, choose the parent, tell the node what has changed."""
         routes, now_s = self._routes, self._routes.now_s
         for node in routes.expired():
             self._trickle.reset(now_s)
             self._lost(node)
-        heard = self._basics.neighbours
+        heard = self._neighbours
         for node in heard.deaf() & routes.neighbours.keys():
             neighbour = routes.neighbours[node]
             if now_s - neighbour.doubted_s >= DEAF_AGAIN_S:
@@ -198,8 +211,8 @@ class BeaconPlane(IControlPlane):
         """Report another gateway than `before`, and forget the place of that one."""
         gateway = self._routes.gateway
         if before not in (gateway, NO_ROUTE):
-            self._basics.report(MeshEventKind.GATEWAY_CHANGED, gateway)
-            self._basics.places.forget_gateway()
+            self._report(MeshEventKind.GATEWAY_CHANGED, gateway)
+            self._places.forget_gateway()
             self._routes.gateway_place = None
             self._proofs.begin()
 
@@ -244,26 +257,27 @@ class BeaconPlane(IControlPlane):
             messages.packet(kind, creator, self._me, BROADCAST, BROADCAST, body)
         )
 
-    def receive_beacon(self, payload: bytes, creator: int, from_: int) -> None:
+    @receives(MessageType.BEACON)
+    def on_beacon(self, payload: bytes, creator: int, from_: int) -> None:
         """A neighbour's beacon."""
         if creator != from_:
             return
         self._set_time()
         routes, now_s = self._routes, self._routes.now_s
-        if self._basics.complaints.is_foreign(creator, now_s):  # readable, but it takes no packets
-            self._basics.complaints.dropped("a beacon of another mesh", payload, now_s)
+        if self._complaints.is_foreign(creator, now_s):  # readable, but it takes no packets
+            self._complaints.dropped("a beacon of another mesh", payload, now_s)
             return
         beacon = Beacon.from_body(payload[self._body], self._motion.region)
         if beacon is None:
-            self._basics.complaints.dropped("a damaged beacon", payload, now_s)
+            self._complaints.dropped("a damaged beacon", payload, now_s)
             return
         if beacon.digest:
-            self._basics.heard_origin(creator, beacon.digest)
-        if self._basics.frame.refuses(creator):
+            self._claims.heard_origin(creator, beacon.digest)
+        if self._frame.refuses(creator):
             beacon = beacon._replace(motion=None, gateway_place=None)
         elif beacon.motion is not None and not self._is_in_reach(beacon.motion.place):
             reason = "a neighbour's place that is out of reach"
-            self._basics.complaints.add(reason, beacon.motion.place.in_words(), now_s)
+            self._complaints.add(reason, beacon.motion.place.in_words(), now_s)
             beacon = beacon._replace(motion=None)
         longest_s = self._trickle.longest_s
         if beacon.interval_s > longest_s:  # who promises it could fall silent and stay the way
@@ -272,7 +286,7 @@ class BeaconPlane(IControlPlane):
         self._below.heard(creator, beacon)
         is_new = routes.heard(creator, beacon)
         if not routes.neighbours[creator].deaf:
-            self._basics.neighbours.hears(creator)
+            self._neighbours.hears(creator)
         self._take_place(creator, beacon)
         if self._courier.holds or not is_quiet:  # few beacons
             self._consider(creator, beacon, is_new)
@@ -280,13 +294,13 @@ class BeaconPlane(IControlPlane):
 
     def _is_in_reach(self, place: Location) -> bool:
         own = self._routes.motion
-        return own is None or own.place.distance_m(place) <= LUCKY * self._basics.range_m
+        return own is None or own.place.distance_m(place) <= LUCKY * self._range_m
 
     def _consider(self, creator: int, beacon: Beacon, is_new: bool) -> None:
         """Update what depends on a neighbour's new beacon."""
         routes, now_s = self._routes, self._routes.now_s
         self._look_s = now_s + LOOK_S
-        self._basics.neighbours.note_known_elsewhere(beacon.named_nodes(), now_s)
+        self._neighbours.note_known_elsewhere(beacon.named_nodes(), now_s)
         if is_new:
             self._trickle.reset(now_s)
         if self._below.has_news and not routes.is_root:
@@ -301,7 +315,7 @@ class BeaconPlane(IControlPlane):
         self._plan()
 
     def _take_place(self, node: int, beacon: Beacon) -> None:
-        neighbours = self._basics.neighbours
+        neighbours = self._neighbours
         neighbours.set_hops(node, beacon.hops)
         if beacon.gateway <= MAX_NODE_ID:
             neighbours.set_gateway(node, beacon.gateway)
@@ -310,13 +324,13 @@ class BeaconPlane(IControlPlane):
 
     def _take_gateway_place(self, node: int, beacon: Beacon) -> None:
         """Store the gateway's place from its own beacon or the parent's."""
-        places, now_s, place = self._basics.places, self._routes.now_s, beacon.gateway_place
+        places, now_s, place = self._places, self._routes.now_s, beacon.gateway_place
         is_gateway = node == self._routes.gateway
         if is_gateway:
             place = None if beacon.motion is None else beacon.motion.place
         elif node != self._routes.parent:
             return
-        if place is None or not self._basics.may_be_at(place, gateway=True, says_so=is_gateway):
+        if place is None or not self._claims.may_be_at(place, gateway=True, says_so=is_gateway):
             return
         self._routes.gateway_place = place
         if not self._proofs.has_key:
@@ -327,13 +341,15 @@ class BeaconPlane(IControlPlane):
         if places.gateway is not None and places.gateway.distance_m(place) > self._step_m:
             self._proofs.ask_soon()
 
-    def receive_probe(self, payload: bytes, creator: int, from_: int) -> None:
+    @receives(MessageType.PROBE)
+    def on_probe(self, payload: bytes, creator: int, from_: int) -> None:
         """Answer a probe by a beacon, so that the other children need not ask, too."""
         self._set_time()
         self._trickle.answer(self._routes.now_s, alone=True)
         self._plan()
 
-    def receive_heartbeat(self, payload: bytes, creator: int, from_: int) -> None:
+    @receives(MessageType.HEARTBEAT)
+    def on_heartbeat(self, payload: bytes, creator: int, from_: int) -> None:
         """A node tells this gateway the nonce of its seals, or the gateway answers."""
         self._set_time()
         self._proofs.heard(payload, creator)
@@ -372,7 +388,7 @@ class BeaconPlane(IControlPlane):
         """A neighbour did not take a packet: do without it until it is heard again."""
         self._routes.now_s = self._deadlines.now_s
         if self._routes.failed(node):
-            self._gone(node, self._basics.neighbours.is_deaf(node))
+            self._gone(node, self._neighbours.is_deaf(node))
         if node == self._routes.parent:
             self._choose()
             self._plan()
@@ -383,27 +399,24 @@ class BeaconPlane(IControlPlane):
         routes.now_s = self._deadlines.now_s
         was_proved = routes.is_proved
         routes.took(node)
-        self._basics.neighbours.hears(node)
+        self._neighbours.hears(node)
         if routes.is_proved and not was_proved:
             self._trickle.hurry(routes.now_s)  # it leads to the gateway
             self._show()
             self._plan()
 
     def _lost(self, node: int) -> None:
-        self._gone(node, self._basics.neighbours.lost(node, self._routes.now_s))
+        self._gone(node, self._neighbours.lost(node, self._routes.now_s))
 
     def _gone(self, node: int, was_neighbour: bool) -> None:
         if was_neighbour:
-            self._basics.report(MeshEventKind.NEIGHBOUR_LOST, node)
+            self._report(MeshEventKind.NEIGHBOUR_LOST, node)
         self._host.on_neighbour_lost(node)
 
     # Searches --------------------------------------------------------------------------------
 
-    def search(self, node: int) -> bool:
-        """Starts nothing: the courier holds a packet without a route and searches by itself."""
-        return False
-
-    def receive_search(self, payload: bytes, creator: int, from_: int) -> None:
+    @receives(MessageType.SEARCH)
+    def on_search(self, payload: bytes, creator: int, from_: int) -> None:
         """Answer or repeat another node's search."""
         self._set_time()
         if self._searches.heard(creator, from_, messages.body(payload)):
@@ -413,7 +426,8 @@ class BeaconPlane(IControlPlane):
                 messages.packet(MessageType.FOUND, me, me, creator, creator, body)
             )
 
-    def receive_found(self, payload: bytes, creator: int, from_: int) -> None:
+    @receives(MessageType.FOUND)
+    def on_found(self, payload: bytes, creator: int, from_: int) -> None:
         """Note that a node that was searched for is reached through `from_`."""
         self._set_time()
         node = Found.from_body(messages.body(payload)).node
@@ -435,6 +449,11 @@ class BeaconPlane(IControlPlane):
         _gateway, hops, offline = self._routes.shown
         return NO_ROUTE if offline else hops
 
+    @property
+    def connected(self) -> bool:
+        """Whether the gateway is reached in both directions."""
+        return self.hops != NO_ROUTE if self._states is None else self._states.connected
+
     def next_hop(self) -> int:
         """The parent."""
         return self._routes.parent
@@ -443,17 +462,10 @@ class BeaconPlane(IControlPlane):
         """When a relay last brought a packet of `node` or named it."""
         return max(self._routes.led_s(node), self._below.known_s(node))
 
-    def may_use(self, gateway: int) -> bool:
-        """Whether `gateway` is the preferred one."""
-        return gateway == self._routes.gateway
-
     def end(self, event: RouterEvent) -> None:
         """A flight or an election begins or ends: the connection is what the beacons say."""
         if self._connection is not None:
             self._connection.end(event)
-
-    def give_up_routes(self) -> None:
-        """Does nothing: beacons keep no routes that could be given up."""
 
 
 class BeaconTechnique(IControlTechnique):
@@ -461,8 +473,6 @@ class BeaconTechnique(IControlTechnique):
 
     connection_lost_after_s = 10.0  # it notices a loss within seconds
 
-    def control_plane(
-        self, basics: NodeBasics, host: IControlHost, states: RouterStates | None
-    ) -> BeaconPlane:
+    def control_plane(self, node: ControlledNode) -> BeaconPlane:
         """The control plane of one node."""
-        return BeaconPlane(basics, host, states)
+        return BeaconPlane(node)

@@ -1,29 +1,42 @@
 """The control plane of a node: who is a neighbour, whether a gateway is reached, which way to send.
 
-The component hands every packet, every outcome of a transmission and the time to its control plane
-and asks it for next hops. There are two: `heartbeats`, the document's way, with a routing technique
-to choose among routes; and `beacon`, in which one broadcast per node and period decides everything.
+The node hands every packet, every outcome of a transmission and the time to its control plane and
+asks it for next hops. There are two: `heartbeats`, the document's way, with a routing technique to
+choose among routes; and `beacon`, in which one broadcast per node and period decides everything.
 A node has no further idea of a neighbour, a connection or a route than its control plane.
 """
 
-# ruff: noqa: B027 - a host overrides only what concerns it
+# ruff: noqa: B027 - a host or a plane overrides what concerns it
 
 from __future__ import annotations
 
 import abc
 import math
-from typing import Callable
+import random
+from dataclasses import dataclass
+from typing import Callable, Sequence
 
+from drone_mesh.communication.control.claims import Claims
 from drone_mesh.communication.control.delivery import IDelivery, IRoutes, ITechnique
-from drone_mesh.communication.control.parts import NodeBasics
+from drone_mesh.communication.control.pilot import Pilot
 from drone_mesh.communication.control.router_states import RouterEvent, RouterStates
-from drone_mesh.communication.interfaces import IMeshDebugInfo
+from drone_mesh.communication.events.complaints import Complaints
+from drone_mesh.communication.events.observer import Reporter
+from drone_mesh.communication.interfaces import IMeshSeals, IWirelessCommunication
+from drone_mesh.communication.neighbours.common_frame import CommonFrame
+from drone_mesh.communication.neighbours.known_places import KnownPlaces
+from drone_mesh.communication.neighbours.neighbour_table import Neighbours
+from drone_mesh.communication.timing.deadlines import Deadlines
+from drone_mesh.communication.timing.mesh_timing import MeshTiming
 
 Learn = Callable[[int, int, int, bytes], bool]
 Forward = Callable[[bytes, int, int, int, int, float], None]
 
+SEARCH_AGAIN_S = 0.3  # between two searches of a node; each is one broadcast by every node
+NUMBERS_PER_S = 16  # of searches and orders: a restarted gateway starts at another number
 
-class IControlHost(IMeshDebugInfo):
+
+class IControlHost:
     """What a control plane tells its node. The defaults are those of a node that never flies."""
 
     def may_connect(self, node: int, know_gateway: bool) -> bool:
@@ -49,14 +62,45 @@ class IControlHost(IMeshDebugInfo):
         """
 
 
+@dataclass(frozen=True)
+class ControlledNode:
+    """What a control plane works with. It hands each of its own parts only what that one uses.
+
+    All belongs to the thread of the node's component.
+    """
+
+    node_id: int
+    host: IControlHost
+    states: RouterStates | None  # of a router; a gateway has none
+    timing: MeshTiming
+    deadlines: Deadlines  # the clock of the node, too
+    report: Reporter
+    complaints: Complaints
+    neighbours: Neighbours
+    places: KnownPlaces
+    frame: CommonFrame
+    claims: Claims
+    pilot: Pilot
+    antenna: IWirelessCommunication
+    seals: IMeshSeals
+    rng: random.Random  # spreads simultaneous actions of many nodes
+    range_m: float  # of the radio, as far as the node knows
+
+
 class IControlPlane(abc.ABC):
     """Decides neighbours, connection and routes of one node. Belongs to its component's thread.
 
-    A method `receive_NAME` handles the packets of that type (see packet_types) for this node.
+    See node_part for how it declares the packets and timers that it handles. Below, first what each
+    plane must do, then the events and questions that may concern it.
     """
 
     delivery: IDelivery
     routes: IRoutes
+
+    @property
+    def parts(self) -> Sequence[object]:
+        """What of it handles packets and timers."""
+        return (self,)
 
     bids_within_s: float
     """For so long a bid for a repair counts and is awaited: by then a group has noticed a loss."""
@@ -68,19 +112,13 @@ class IControlPlane(abc.ABC):
     forward: Forward
     """(payload, creator, from, type, addressee, now_s): pass on a packet for another node."""
 
-    # Time and surroundings -------------------------------------------------------------------
-
     @abc.abstractmethod
     def start(self) -> None:
         """The node starts."""
 
     @abc.abstractmethod
-    def on_time(self, now_s: float) -> None:
-        """Do what is due; called at every tick of the component."""
-
-    @abc.abstractmethod
-    def check(self, due_s: float) -> None:
-        """The periodic check, with the antenna on, was due at `due_s`."""
+    def introduce(self) -> None:
+        """Make this node known to all in range, now."""
 
     @abc.abstractmethod
     def on_power(self, on: bool) -> None:
@@ -89,23 +127,6 @@ class IControlPlane(abc.ABC):
     @abc.abstractmethod
     def on_registered(self) -> None:
         """The medium has registered the antenna again."""
-
-    def on_internet(self, works: bool) -> None:
-        """A gateway's connection to the outside world works again, or no longer."""
-
-    @abc.abstractmethod
-    def introduce(self) -> None:
-        """Make this node known to all in range, now."""
-
-    @abc.abstractmethod
-    def neighbour_leaves(self, neighbour: int) -> None:
-        """A neighbour or this node flies, and they will be out of reach of each other."""
-
-    @abc.abstractmethod
-    def gateway_sent_place(self) -> None:
-        """The preferred gateway itself reported its place."""
-
-    # Packets ---------------------------------------------------------------------------------
 
     @abc.abstractmethod
     def own_came_back(self, from_: int) -> None:
@@ -116,18 +137,8 @@ class IControlPlane(abc.ABC):
         """Whether it is the introduction of a node that a gateway answers."""
 
     @abc.abstractmethod
-    def on_delivered(self, neighbour: int, tries: int) -> None:
-        """A neighbour received a queued packet after `tries` transmissions."""
-
-    @abc.abstractmethod
     def on_undelivered(self, payload: bytes, tries: int) -> None:
         """The antenna gave up a queued packet: send it another way, or drop it."""
-
-    @abc.abstractmethod
-    def search(self, node: int) -> bool:
-        """Look for a node without a known route. False: not now."""
-
-    # The connection of a router --------------------------------------------------------------
 
     @property
     @abc.abstractmethod
@@ -143,32 +154,57 @@ class IControlPlane(abc.ABC):
     def hops(self) -> int:
         """Hops to it; NO_ROUTE: unknown."""
 
+    @property
+    @abc.abstractmethod
+    def connected(self) -> bool:
+        """Whether it answered the last heartbeat, or may still answer; of a gateway, `hops`."""
+
     @abc.abstractmethod
     def next_hop(self) -> int:
         """The next hop to the preferred gateway, or NO_ROUTE."""
-
-    def heard_s(self, node: int) -> float:
-        """When `node`, no neighbour, was last known to be there; -inf: not recorded. Any thread."""
-        return -math.inf
-
-    @abc.abstractmethod
-    def may_use(self, gateway: int) -> bool:
-        """Whether `gateway` is the preferred one. If there is none yet, it becomes that."""
 
     @abc.abstractmethod
     def end(self, event: RouterEvent) -> None:
         """The connection ends because of `event`."""
 
-    @abc.abstractmethod
+    # Events ----------------------------------------------------------------------------------
+
+    def check(self, due_s: float) -> None:
+        """The periodic check, with the antenna on, was due at `due_s`."""
+
+    def on_internet(self, works: bool) -> None:
+        """A gateway's connection to the outside world works again, or no longer."""
+
+    def on_delivered(self, neighbour: int, tries: int) -> None:
+        """A neighbour received a queued packet after `tries` transmissions."""
+
+    def neighbour_leaves(self, neighbour: int) -> None:
+        """A neighbour or this node flies, and they will be out of reach of each other."""
+
+    def gateway_sent_place(self) -> None:
+        """The preferred gateway itself reported its place."""
+
     def give_up_routes(self) -> None:
         """Forget every route to the preferred gateway."""
+
+    # Questions -------------------------------------------------------------------------------
+
+    def search(self, node: int) -> bool:
+        """Look for a node without a known route. False: not now; ask again after SEARCH_AGAIN_S."""
+        return False
+
+    def heard_s(self, node: int) -> float:
+        """When `node`, no neighbour, was last known to be there; -inf: not recorded. Any thread."""
+        return -math.inf
+
+    def told_of_gateway(self, gateway: int) -> bool:
+        """Another node tells of a gateway. Returns whether it is, or becomes, the preferred one."""
+        return gateway == self.gateway
 
 
 class IControlTechnique(ITechnique):
     """A way to decide neighbours, connection and routes that may be chosen by name."""
 
     @abc.abstractmethod
-    def control_plane(
-        self, basics: NodeBasics, host: IControlHost, states: RouterStates | None
-    ) -> IControlPlane:
-        """The control plane of one node. `states` are those of a router; a gateway has none."""
+    def control_plane(self, node: ControlledNode) -> IControlPlane:
+        """The control plane of one node."""

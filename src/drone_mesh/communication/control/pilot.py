@@ -86,14 +86,9 @@ class Pilot:
         self._deadlines = deadlines
         self._complaints = complaints
         self._flight: Flight | None = None
+        self.goal: Location | None = None  # of the current flight
         self._origin: Location | None = None  # start of the flight, or of the first of several
         self.flight_end = ""  # why the last flight ended short of its goal
-
-    @property
-    def goal(self) -> Location | None:
-        """The goal of the current flight; None without one."""
-        flight = self._flight
-        return flight.goal if flight is not None else None
 
     def location(self) -> Location | None:
         """The drone's position; None, with a log line, if it is unknown."""
@@ -138,6 +133,7 @@ class Pilot:
         if self._flight is None:
             self._origin = here
         self._flight = flight = Flight(goal, here, self.goal, self._deadlines.now_s)
+        self.goal = goal
         self._ask_position_later()
         return flight
 
@@ -155,7 +151,7 @@ class Pilot:
 
     def forget_flight(self) -> None:
         """No longer watch the flight."""
-        self._flight = None
+        self._flight = self.goal = None
         self._deadlines.set(Due.ASK_POSITION, math.inf)
 
     def _located(self) -> Location:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections import OrderedDict
+from dataclasses import dataclass
 from typing import NamedTuple
 
-from drone_mesh.communication.control.parts import NodeParts
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.ticket import TO_ALL
+from drone_mesh.communication.interfaces import IWirelessCommunication
+from drone_mesh.communication.timing.deadlines import Deadlines
 from drone_mesh.communication.wire import messages
 
 REMEMBERED_S = 5.0  # longer than a fragment takes through the mesh
@@ -23,32 +25,36 @@ class _Repeated(NamedTuple):
     indices: int = 0  # of further fragments of the latest one, as bits
 
 
+@dataclass(eq=False)
 class Flood:
     """Broadcasts the fragments of this node, and repeats those of other nodes."""
 
-    def __init__(self, parts: NodeParts) -> None:
-        self._parts = parts
+    _node_id: int
+    _antenna: IWirelessCommunication
+    _deadlines: Deadlines
+
+    def __post_init__(self) -> None:
         self._seen: OrderedDict[tuple[int, int], _Repeated] = OrderedDict()  # by sender and number
 
     def send(self, fragment: bytes) -> None:
         """Broadcast a fragment of this node."""
         self._is_new(fragment)
-        self._parts.antenna.broadcast_message(fragment)
+        self._antenna.broadcast_message(fragment)
 
     def repeat(self, fragment: bytes) -> bool:
         """Broadcast a fragment of another node, unless it has arrived before (False)."""
         if not self._is_new(fragment):
             return False
-        onward = messages.next_hop(fragment, self._parts.node_id, TO_ALL)
+        onward = messages.next_hop(fragment, self._node_id, TO_ALL)
         if onward is not None:
-            self._parts.antenna.broadcast_message(onward)
+            self._antenna.broadcast_message(onward)
         return True
 
     def _is_new(self, fragment: bytes) -> bool:
         """Whether this fragment is new; records it."""
         creator, _from, kind, _to, _forward = messages.header(fragment)
         number, index = messages.body(fragment)[0], kind - packets.FRAGMENTS.start
-        key, now_s = (creator, number), self._parts.now_s
+        key, now_s = (creator, number), self._deadlines.now_s
         seen = self._seen.get(key)
         if seen is None or now_s - seen.first_s >= REMEMBERED_S:
             seen = _Repeated(now_s)

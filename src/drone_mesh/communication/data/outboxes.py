@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import functools
 import math
+import random
 from collections import OrderedDict
 from typing import Callable
 
-from drone_mesh.communication.control.parts import NodeParts
+from drone_mesh.communication.control.control_plane import IControlPlane
 from drone_mesh.communication.data.echo import SendPacket
 from drone_mesh.communication.data.outbox import Outbox
 from drone_mesh.communication.data.outgoing import OutgoingMessage
@@ -23,7 +24,8 @@ from drone_mesh.communication.data.ticket import (
     TicketState,
     destination_in_words,
 )
-from drone_mesh.communication.interfaces import NO_ROUTE, IMeshDebugInfo
+from drone_mesh.communication.interfaces import NO_ROUTE, IMeshSeals, IWirelessCommunication
+from drone_mesh.communication.timing.deadlines import Deadlines
 
 BURST = 8  # packets sent before others get their turn
 FOUND_WITHIN_S = 0.5  # a gateway's search passes through 100 nodes
@@ -35,20 +37,29 @@ class Outboxes:
 
     def __init__(
         self,
-        parts: NodeParts,
-        node: IMeshDebugInfo,
+        node_id: int,
+        control: IControlPlane,
+        antenna: IWirelessCommunication,
+        seals: IMeshSeals,
+        deadlines: Deadlines,
+        rng: random.Random,
         room: int,
         send_packet: SendPacket,
         to_self: Callable[[OutgoingMessage], None],
         ended: Callable[[TicketState], None],
         hint: Callable[[], str],
     ) -> None:
-        """`room`, `ended` and `hint` as for Outbox; `node` knows its connection.
+        """`rng`, `room`, `ended` and `hint` as for Transport and Outbox.
 
         `to_self` delivers a message for the gateway of a node that is its own gateway.
         """
-        self._parts = parts
-        self._node = node
+        self._node_id = node_id
+        self._control = control
+        self._antenna = antenna
+        self._medium = antenna.medium
+        self._seals = seals
+        self._deadlines = deadlines
+        self._rng = rng
         self._was_lost = False
         self._room = room
         self._send_packet = send_packet
@@ -74,19 +85,19 @@ class Outboxes:
         """Process an ACK of a receiver."""
         outbox = self._outboxes.get(by)
         if outbox is not None:
-            outbox.answered(ack, self._parts.now_s)
+            outbox.answered(ack, self._deadlines.now_s)
 
     def on_node_missing(self, node: int) -> None:
         """Another node has no route to `node`: what goes there by default may end there."""
         outbox = self._outboxes.get(node)
-        if outbox is not None and self._parts.routing.get_direction_to_node(node) == NO_ROUTE:
-            search_s = self._parts.antenna.medium.stretched(FOUND_WITHIN_S)
-            outbox.missing(self.unreachable(node), search_s, self._parts.now_s)
+        if outbox is not None and self._control.routes.get_direction_to_node(node) == NO_ROUTE:
+            search_s = self._medium.stretched(FOUND_WITHIN_S)
+            outbox.missing(self.unreachable(node), search_s, self._deadlines.now_s)
 
     def send(self) -> float:
         """Send what may be sent now; returns when to call it again, or infinity."""
-        now_s, antenna = self._parts.now_s, self._parts.antenna
-        if not self._outboxes and not self._for_gateway:
+        now_s, antenna = self._deadlines.now_s, self._antenna
+        if not self._for_gateway and all(box.is_idle for box in self._outboxes.values()):
             return math.inf
         self._follow_gateway()
         self._yield_to_repair()
@@ -99,7 +110,7 @@ class Outboxes:
                 left, idle = left - 1, 0
             else:
                 idle += 1
-        soon_s = now_s + antenna.medium.data_pause_s
+        soon_s = now_s + self._medium.data_pause_s
         again_s = soon_s if left <= 0 else math.inf
         for to, outbox in self._outboxes.items():
             outbox.expire(now_s, self._direction(to) != NO_ROUTE)
@@ -121,7 +132,7 @@ class Outboxes:
             return False
         if outbox.to != TO_ALL and not self._may_reach(outbox, now_s):
             return False
-        if self._parts.antenna.medium.shared and outbox.to != TO_ALL:
+        if self._medium.shared and outbox.to != TO_ALL:
             outbox.set_relayed(self._direction(outbox.to) != outbox.to)
         packet = outbox.next_packet(now_s)
         if packet is None:
@@ -132,16 +143,16 @@ class Outboxes:
         if self._direction(outbox.to) == NO_ROUTE:
             self._may_reach(outbox, now_s)
         else:
-            outbox.not_before_s = now_s + self._parts.antenna.medium.data_pause_s
+            outbox.not_before_s = now_s + self._medium.data_pause_s
         return False
 
     def _may_reach(self, outbox: Outbox, now_s: float) -> bool:
         """Whether there is a route. If not, retry later and give up unreliable messages."""
-        parts, to = self._parts, outbox.to
-        by_default = parts.delivery.default_hop() != NO_ROUTE
-        if parts.antenna.on() and (by_default or parts.routing.may_reach(to)):
+        to, control = outbox.to, self._control
+        has_way = control.routes.may_reach(to) or control.delivery.default_hop() != NO_ROUTE
+        if has_way and self._antenna.on():
             return True
-        parts.delivery.seek(to)
+        control.delivery.seek(to)
         outbox.not_before_s = now_s + ROUTE_PERIOD_S
         outbox.blocked(self.unreachable(outbox.to))
         return False
@@ -151,23 +162,23 @@ class Outboxes:
 
         They would keep the channel busy for the packets that mend the mesh.
         """
-        node, now_s = self._node, self._parts.now_s
-        lost = not node.get_connected_to_gateway() and node.get_preferred_gateway() != NO_ROUTE
+        control, now_s = self._control, self._deadlines.now_s
+        lost = not control.connected and control.gateway != NO_ROUTE
         for outbox in self._outboxes.values():
             if not lost and self._was_lost:
                 outbox.ask_anew(now_s)
-            elif lost and self._parts.antenna.medium.shared and outbox.repeats:
+            elif lost and self._medium.shared and outbox.repeats:
                 outbox.not_before_s = max(outbox.not_before_s, now_s + ROUTE_PERIOD_S)
                 outbox.waits_because("this node looks for a gateway")
         self._was_lost = lost
 
     def _direction(self, to: int) -> int:
-        direction = to if to == TO_ALL else self._parts.routing.get_direction_to_node(to)
-        return self._parts.delivery.default_hop() if direction == NO_ROUTE else direction
+        direction = to if to == TO_ALL else self._control.routes.get_direction_to_node(to)
+        return self._control.delivery.default_hop() if direction == NO_ROUTE else direction
 
     def _follow_gateway(self) -> None:
         """Move messages for the gateway to the one that this node uses now."""
-        gateway = self._node.get_preferred_gateway()
+        gateway = self._control.gateway
         if gateway == NO_ROUTE:
             self._give_up_without_gateway()
             return
@@ -176,13 +187,13 @@ class Outboxes:
             if to not in (gateway, TO_ALL):
                 waiting += outbox.take(TO_GATEWAY)
         for message in sorted(waiting, key=lambda message: message.ticket.number):
-            if gateway == self._parts.node_id:
+            if gateway == self._node_id:
                 self._to_self(message)
             else:
                 self._outbox(gateway).add(message)
 
     def _give_up_without_gateway(self) -> None:
-        now_s = self._parts.now_s
+        now_s = self._deadlines.now_s
         reason = self.unreachable(TO_GATEWAY)
         for message in list(self._for_gateway):
             message.ticket.reason = reason
@@ -193,10 +204,10 @@ class Outboxes:
 
     def _outbox(self, to: int) -> Outbox:
         if self._session is None:
-            self._session = self._parts.rng.randrange(1 << 16)
+            self._session = self._rng.randrange(1 << 16)
         outbox = self._outboxes.get(to)
         if outbox is None:
-            seal = functools.partial(self._parts.seals.seal_message, self._parts.node_id, to)
+            seal = functools.partial(self._seals.seal_message, self._node_id, to)
             outbox = Outbox(to, self._session, self._room, self._ended, seal, self._hint)
             self._outboxes[to] = outbox
         return outbox

@@ -8,9 +8,11 @@ sender.
 from __future__ import annotations
 
 import hmac
+import random
 from typing import Callable, NamedTuple
 
-from drone_mesh.communication.control.parts import NodeParts
+from drone_mesh.communication.control.control_plane import IControlPlane
+from drone_mesh.communication.control.node_part import due, receives
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.echo import Echoes, OnEchoAnswer
 from drone_mesh.communication.data.flood import Flood
@@ -19,9 +21,11 @@ from drone_mesh.communication.data.outboxes import Outboxes
 from drone_mesh.communication.data.outgoing import OutgoingMessage
 from drone_mesh.communication.data.reassembly import Whole
 from drone_mesh.communication.data.ticket import TO_ALL, TO_GATEWAY, Ticket, TicketState
-from drone_mesh.communication.interfaces import MAX_NODE_ID, IMeshDebugInfo
-from drone_mesh.communication.timing.deadlines import Due
+from drone_mesh.communication.events.complaints import Complaints
+from drone_mesh.communication.interfaces import MAX_NODE_ID, IMeshSeals, IWirelessCommunication
+from drone_mesh.communication.timing.deadlines import Deadlines, Due
 from drone_mesh.communication.wire import messages
+from drone_mesh.communication.wire.packet_types import DATA_TYPES
 from drone_mesh.errors import MessageRefused, PacketError, QueueFull
 
 MOST_QUEUED = 64  # messages waiting or under way, in total
@@ -59,17 +63,41 @@ class DataFigures(NamedTuple):
 class Transport:
     """Sends and receives the messages of one node. Belongs to the component's thread."""
 
-    def __init__(self, parts: NodeParts, node: IMeshDebugInfo) -> None:
-        """`node` knows its connection."""
-        room = messages.BODY_BYTES - parts.seals.reserved_bytes(packets.FRAGMENTS.start)
+    def __init__(
+        self,
+        node_id: int,
+        control: IControlPlane,
+        antenna: IWirelessCommunication,
+        seals: IMeshSeals,
+        deadlines: Deadlines,
+        complaints: Complaints,
+        rng: random.Random,
+    ) -> None:
+        """`rng` draws the number of the session, with the first message."""
+        room = messages.BODY_BYTES - seals.reserved_bytes(packets.FRAGMENTS.start)
         assert room >= packets.LEAST_ROOM, "a seal leaves too little room for users' data"
-        self._parts = parts
-        self._my_gateway = node.get_preferred_gateway
+        self._node_id = node_id
+        self._control = control
+        self._seals = seals
+        self._deadlines = deadlines
+        self._complaints = complaints
         self._outboxes = Outboxes(
-            parts, node, room, self._send_packet, self._to_self, self._ended, self.hint
+            node_id,
+            control,
+            antenna,
+            seals,
+            deadlines,
+            rng,
+            room,
+            self._send_packet,
+            self._to_self,
+            self._ended,
+            self.hint,
         )
-        self._inboxes = Inboxes(parts, room, self._send_packet, self._arrived)
-        self._flood = Flood(parts)
+        self._inboxes = Inboxes(
+            node_id, antenna, seals, deadlines, room, self._send_packet, self._arrived
+        )
+        self._flood = Flood(node_id, antenna, deadlines)
         self._echoes = Echoes(self._send_packet, room)
         self._receivers: list[Receiver] = []
         self._numbered = 0
@@ -85,7 +113,7 @@ class Transport:
         Raises MessageRefused for a bad destination, port or size, and QueueFull if too many
         messages wait.
         """
-        self._parts.deadlines.now_s = now_s
+        self._deadlines.now_s = now_s
         self._check(to, payload, port)
         reliable = reliable and to != TO_ALL
         self._numbered += 1
@@ -95,8 +123,8 @@ class Transport:
             bytes_sent=self._figures.bytes_sent + len(payload),
             sent_s=now_s,
         )
-        me = self._parts.node_id
-        if to == me or (to == TO_GATEWAY and self._my_gateway() == me):
+        me = self._node_id
+        if to == me or (to == TO_GATEWAY and self._control.gateway == me):
             self._work()  # earlier ones may wait for a gateway, which this node is by now
             self._deliver(ReceivedMessage(me, port, payload, False, reliable, now_s))
             ticket.set_state(TicketState.DELIVERED)
@@ -111,8 +139,8 @@ class Transport:
 
     def echo(self, to: int, on_answer: OnEchoAnswer, now_s: float) -> int | None:
         """Send an echo to a node; returns its token, or None if there is no route."""
-        self._parts.deadlines.now_s = now_s
-        if not 0 <= to <= MAX_NODE_ID or to == self._parts.node_id:
+        self._deadlines.now_s = now_s
+        if not 0 <= to <= MAX_NODE_ID or to == self._node_id:
             raise MessageRefused(f"invalid node {to}: must be another node, 0..{MAX_NODE_ID}")
         return self._echoes.send(to, on_answer, now_s)
 
@@ -122,8 +150,8 @@ class Transport:
 
     def hint(self) -> str:
         """Text to append to an error: that a neighbour has another key or none. Otherwise empty."""
-        foreign = self._parts.seals.foreign_neighbour()
-        foreign = foreign or self._parts.complaints.foreign_neighbour(self._parts.now_s)
+        foreign = self._seals.foreign_neighbour()
+        foreign = foreign or self._complaints.foreign_neighbour(self._deadlines.now_s)
         return f"; {foreign}" if foreign else ""
 
     def figures(self) -> DataFigures:
@@ -132,12 +160,13 @@ class Transport:
 
     # For the component -------------------------------------------------------------------------
 
-    def receive_data(self, payload: bytes, creator: int, _from: int) -> None:
+    @receives(*DATA_TYPES)
+    def on_packet(self, payload: bytes, creator: int, _from: int) -> None:
         """Process a packet of a user's type, for this node or for all."""
         kind, body = messages.type_of(payload), messages.body(payload)
-        if creator == self._parts.node_id:
+        if creator == self._node_id:
             return  # it came back
-        now_s = self._parts.now_s
+        now_s = self._deadlines.now_s
         try:
             if kind in packets.FRAGMENTS:
                 to_all = messages.addressee(payload) == TO_ALL
@@ -147,9 +176,7 @@ class Transport:
                 if self._is_authentic(body, creator):
                     self._outboxes.answered(creator, packets.ack_of(body))
                 else:
-                    self._parts.complaints.dropped(
-                        "an acknowledgement without proof", payload, now_s
-                    )
+                    self._complaints.dropped("an acknowledgement without proof", payload, now_s)
             elif kind == packets.POLL:
                 self._inboxes.poll(creator, packets.poll_of(body))
             elif kind == packets.ECHO:
@@ -157,9 +184,9 @@ class Transport:
             elif kind == packets.ECHO_ANSWER:
                 self._echoes.answered(creator, body, now_s)
             else:
-                self._parts.complaints.dropped("data of an unknown type", payload, now_s)
+                self._complaints.dropped("data of an unknown type", payload, now_s)
         except PacketError as error:
-            self._parts.complaints.dropped(f"invalid data: {error}", payload, now_s)
+            self._complaints.dropped(f"invalid data: {error}", payload, now_s)
         self._work()
 
     def on_node_missing(self, node: int) -> None:
@@ -167,6 +194,7 @@ class Transport:
         self._outboxes.on_node_missing(node)
         self._work()
 
+    @due(Due.DATA)
     def on_due(self) -> None:
         """The time requested with Due.DATA has come."""
         self._inboxes.on_time()
@@ -176,19 +204,18 @@ class Transport:
 
     def _work(self) -> None:
         """Send what may be sent now, and schedule the next time."""
-        again_s = self._outboxes.send()
-        self._parts.deadlines.set(Due.DATA, min(again_s, self._inboxes.due_s))
-        queued = len(self._outboxes)
+        again_s, queued = self._outboxes.send(), len(self._outboxes)
+        self._deadlines.set(Due.DATA, min(again_s, self._inboxes.due_s))
         if queued != self._figures.messages_queued:
             self._figures = self._figures._replace(messages_queued=queued)
 
     def _send_packet(self, kind: int, to: int, body: bytes) -> bool:
-        me = self._parts.node_id
+        me = self._node_id
         packet = messages.packet(kind, me, me, to, to, body)
         if to == TO_ALL:
             self._flood.send(packet)
             return True
-        return self._parts.delivery.send_own(packet)
+        return self._control.delivery.send_own(packet)
 
     def _check(self, to: int, payload: bytes, port: int) -> None:
         if not 0 <= to <= MAX_NODE_ID and to not in (TO_ALL, TO_GATEWAY):
@@ -206,7 +233,7 @@ class Transport:
     def _is_authentic(self, ack: bytes, creator: int) -> bool:
         """Whether an ACK comes from its creator: a relay could forge one."""
         body = packets.untagged(ack)
-        tag = self._parts.seals.acknowledgement_tag(creator, self._parts.node_id, body)
+        tag = self._seals.acknowledgement_tag(creator, self._node_id, body)
         return hmac.compare_digest(tag, ack[len(body) : len(body) + len(tag)])
 
     def _ended(self, state: TicketState) -> None:
@@ -217,10 +244,10 @@ class Transport:
             self._figures = figures._replace(messages_given_up=figures.messages_given_up + 1)
 
     def _to_self(self, message: OutgoingMessage) -> None:
-        ticket, me = message.ticket, self._parts.node_id
+        ticket, me = message.ticket, self._node_id
         self._deliver(
             ReceivedMessage(
-                me, ticket.port, message.payload, False, ticket.reliable, self._parts.now_s
+                me, ticket.port, message.payload, False, ticket.reliable, self._deadlines.now_s
             )
         )
         ticket.set_state(TicketState.DELIVERED)
@@ -229,7 +256,7 @@ class Transport:
     def _arrived(self, sender: int, to_all: bool, whole: Whole) -> None:
         port, reliable = whole.head.port, whole.head.reliable
         self._deliver(
-            ReceivedMessage(sender, port, whole.payload, to_all, reliable, self._parts.now_s)
+            ReceivedMessage(sender, port, whole.payload, to_all, reliable, self._deadlines.now_s)
         )
 
     def _deliver(self, message: ReceivedMessage) -> None:

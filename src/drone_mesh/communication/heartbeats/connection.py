@@ -6,20 +6,27 @@ docs/protocol.md, "Connection"; docs/repair.md, "Places to step back to".
 from __future__ import annotations
 
 import math
-from typing import Callable, NamedTuple
+from dataclasses import dataclass
+from typing import NamedTuple
 
-from drone_mesh.communication.control.place_requests import ask_for_place, tell_all_place
+from drone_mesh.communication.control.place_requests import PlaceRequests
 from drone_mesh.communication.control.router_states import (
     ConnectionState,
     RouterEvent,
     RouterStates,
 )
-from drone_mesh.communication.events.observer import MeshEventKind, in_hops
+from drone_mesh.communication.events.observer import MeshEventKind, Reporter, in_hops
+from drone_mesh.communication.heartbeats.delivery import Delivery
 from drone_mesh.communication.heartbeats.detours import AVOIDED_S, Detours
-from drone_mesh.communication.heartbeats.parts import HeartbeatParts
+from drone_mesh.communication.heartbeats.introduction import Introduction
+from drone_mesh.communication.heartbeats.own_heartbeats import OwnHeartbeats
 from drone_mesh.communication.heartbeats.relay_check import RelayCheck
 from drone_mesh.communication.interfaces import MAX_NODE_ID, NO_ROUTE
-from drone_mesh.communication.timing.deadlines import Due
+from drone_mesh.communication.neighbours.known_places import KnownPlaces
+from drone_mesh.communication.neighbours.neighbour_table import Neighbours
+from drone_mesh.communication.routing.interfaces import IRoutingTechnique
+from drone_mesh.communication.timing.deadlines import Deadlines, Due
+from drone_mesh.communication.timing.medium import Medium
 
 _HOPS_UNTIL_KNOWN = 10  # the number of hops for which to wait for the first answer
 RESIGNED_PERIODS = 2.5  # a gateway without internet that is silent for longer is lost
@@ -34,31 +41,48 @@ class Shortcut(NamedTuple):
     hops: int
 
 
+@dataclass(eq=False)
 class GatewayConnection:
     """The preferred gateway of one router, the hops to it, and whether it answers.
 
     It drives the `ConnectionState` of the router's states.
     """
 
-    def __init__(
-        self, parts: HeartbeatParts, states: RouterStates, introduce: Callable[[], None]
-    ) -> None:
-        """`introduce` broadcasts a PRESENT."""
+    _node_id: int
+    _states: RouterStates
+    _technique: IRoutingTechnique
+    _delivery: Delivery
+    _heartbeats: OwnHeartbeats
+    _introduction: Introduction
+    _requests: PlaceRequests
+    _medium: Medium
+    _deadlines: Deadlines
+    _check_period_s: float
+    _neighbours: Neighbours
+    _places: KnownPlaces
+    _report: Reporter
+    _has_key: bool
+
+    def __post_init__(self) -> None:
         self.gateway = NO_ROUTE  # the preferred one
         self.hops = NO_ROUTE
-        self._parts = parts
-        self._states = states
-        self._introduce = introduce
         self._heartbeat_sent_s = -math.inf
         self._answered_s = -math.inf
         self._answered_itself_s = -math.inf  # this router, and not only one behind it
-        self._has_key = parts.has_key
         self.just_lost = False  # the last route failed since the last check
         self._shown_connected = False
         self._shortcut: Shortcut | None = None
         self._tried = NO_ROUTE  # the neighbour of the latest heartbeat's shortcut or detour
-        self._detours = Detours(parts.neighbours)
-        self._relay_check = RelayCheck(parts, self._detours)
+        self._detours = Detours(self._neighbours)
+        is_needed = self._has_key and self._technique.TAKES_SHORTCUTS
+        self._relay_check = RelayCheck(
+            self._node_id,
+            is_needed,
+            self._check_period_s,
+            self._deadlines,
+            self._requests,
+            self._detours,
+        )
         self._unanswered = 0  # heartbeats in a row
         self._asked_neighbour_s = -math.inf  # for its gateway
         self._moved = False  # since the gateway was last asked for its place
@@ -68,11 +92,11 @@ class GatewayConnection:
         """The next hop to the preferred gateway, or NO_ROUTE."""
         if self.gateway == NO_ROUTE:
             return NO_ROUTE
-        return self._parts.routing.get_direction_to_node(self.gateway)
+        return self._technique.get_direction_to_node(self.gateway)
 
-    def may_use(self, gateway: int) -> bool:
+    def told_of_gateway(self, gateway: int) -> bool:
         """Whether `gateway` is the preferred one. If there is none yet, it becomes that."""
-        if self.gateway == NO_ROUTE and gateway <= MAX_NODE_ID and gateway != self._parts.node_id:
+        if self.gateway == NO_ROUTE and gateway <= MAX_NODE_ID and gateway != self._node_id:
             self.gateway = gateway
         return gateway == self.gateway
 
@@ -80,18 +104,18 @@ class GatewayConnection:
 
     def send_heartbeat(self) -> bool:
         """Send a heartbeat to the preferred gateway, unless one is under way. False: not sent."""
-        now_s, gateway = self._parts.now_s, self.gateway
+        now_s, gateway = self._deadlines.now_s, self.gateway
         window_s = self._answer_window_s()
         if now_s - self._heartbeat_sent_s < window_s:
             return True
         was_connected = self._states.connected
         self._states.happened(RouterEvent.HEARTBEAT_SENT)
-        self._parts.deadlines.set(Due.ANSWER, now_s + window_s)
+        self._deadlines.set(Due.ANSWER, now_s + window_s)
         self._heartbeat_sent_s = now_s
         if self._sent_over_detour(was_connected) or self._sent_over_shortcut(was_connected):
             return True
-        heartbeat = self._parts.heartbeat(gateway, gateway, was_connected, gateway)
-        if self._parts.delivery.send_own(heartbeat):
+        heartbeat = self._heartbeats.packet(gateway, gateway, was_connected, gateway)
+        if self._delivery.send_own(heartbeat):
             return True
         if self._states.awaiting:  # otherwise the loss of the route has been noticed
             self._heartbeat_sent_s = -math.inf
@@ -109,13 +133,13 @@ class GatewayConnection:
         if shortcut is None or shortcut.hops + 1 >= self.hops:
             return False
         to = shortcut.neighbour
-        if self._parts.neighbours.hops_of(to) > shortcut.hops:
+        if self._neighbours.hops_of(to) > shortcut.hops:
             return False  # it has been rerouted since
-        its_gateway = self._parts.neighbours.gateway_of(to)
+        its_gateway = self._neighbours.gateway_of(to)
         if its_gateway == NO_ROUTE:
             its_gateway = self.gateway
-        heartbeat = self._parts.heartbeat(to, its_gateway, connected, self.gateway)
-        if not self._parts.delivery.send(heartbeat, to) or its_gateway != self.gateway:
+        heartbeat = self._heartbeats.packet(to, its_gateway, connected, self.gateway)
+        if not self._delivery.send(heartbeat, to) or its_gateway != self.gateway:
             return False
         self._tried = to
         return True
@@ -125,8 +149,8 @@ class GatewayConnection:
         to = self._relay_check.take_detour()
         if to == NO_ROUTE:
             return False
-        heartbeat = self._parts.heartbeat(to, self.gateway, connected, self.gateway)
-        if not self._parts.delivery.send(heartbeat, to):
+        heartbeat = self._heartbeats.packet(to, self.gateway, connected, self.gateway)
+        if not self._delivery.send(heartbeat, to):
             return False
         self._tried = to
         return True
@@ -142,8 +166,8 @@ class GatewayConnection:
         if tried == NO_ROUTE:
             self._unanswered += 1
         else:
-            self._detours.avoid(tried, self._parts.now_s + AVOIDED_S)
-        may_answer = tried != NO_ROUTE or self._unanswered < self._parts.antenna.medium.heartbeats
+            self._detours.avoid(tried, self._deadlines.now_s + AVOIDED_S)
+        may_answer = tried != NO_ROUTE or self._unanswered < self._medium.heartbeats
         if was_connected and may_answer:
             self._heartbeat_sent_s = -math.inf
             self.send_heartbeat()
@@ -152,7 +176,7 @@ class GatewayConnection:
         self._states.happened(RouterEvent.ANSWER_MISSED)
         self._show()
         if was_connected:
-            self._introduce()  # neighbours that know another route answer
+            self._introduction.broadcast()  # neighbours that know another route answer
 
     def on_route_lost(self) -> None:
         """A route failed. If it was the only one to the gateway, look for another one at once.
@@ -163,25 +187,25 @@ class GatewayConnection:
         connection = self._states.connection
         if self.next_hop() != NO_ROUTE:
             return
-        if not self._parts.antenna.medium.shared:
+        if not self._medium.shared:
             if connection is ConnectionState.CONNECTED:
                 self.end(RouterEvent.ROUTE_LOST)
                 self.just_lost = True
-                self._introduce()
+                self._introduction.broadcast()
             elif connection is ConnectionState.AWAITING_FIRST_ANSWER:
                 self.end(RouterEvent.ROUTE_LOST)
         elif self._states.connected:
             another = self.another_next_hop(NO_ROUTE)
             if another != NO_ROUTE:
-                self._parts.routing.other_can_communicate_with_node(another, self.gateway)
+                self._technique.other_can_communicate_with_node(another, self.gateway)
             self._heartbeat_sent_s = -math.inf
             self.send_heartbeat()
 
     def another_next_hop(self, but: int) -> int:
         """A neighbour that may lead to the gateway, not `but`; NO_ROUTE: none is known."""
-        if not self._parts.routing.TAKES_SHORTCUTS:
+        if not self._technique.TAKES_SHORTCUTS:
             return NO_ROUTE
-        return self._detours.nearest(but, self.hops, self._parts.now_s)
+        return self._detours.nearest(but, self.hops, self._deadlines.now_s)
 
     # Reports of neighbours and gateways ------------------------------------------------------
 
@@ -192,20 +216,20 @@ class GatewayConnection:
             return connected or not (self._states.awaiting or self._asks_a_neighbour())
         if (
             connected
-            and self._parts.routing.TAKES_SHORTCUTS
+            and self._technique.TAKES_SHORTCUTS
             and hops + 1 < self.hops
             and (self._shortcut is None or hops < self._shortcut.hops)
-            and not self._detours.avoids(neighbour, self._parts.now_s)
-            and self._parts.routing.get_direction_to_node(neighbour) == neighbour
+            and not self._detours.avoids(neighbour, self._deadlines.now_s)
+            and self._technique.get_direction_to_node(neighbour) == neighbour
         ):
             self._shortcut = Shortcut(neighbour, hops)
         return False
 
     def on_gateway_heartbeat(self, gateway: int, hops: int) -> bool:
         """A gateway is `hops` away. Returns whether that connected the router."""
-        now_s = self._parts.now_s
+        now_s = self._deadlines.now_s
         if gateway != self.gateway:
-            recent = now_s - self._answered_s <= self._parts.timing.check_period_s
+            recent = now_s - self._answered_s <= self._check_period_s
             if (self._states.connected or recent) and hops >= self.hops:
                 return False
             self._prefer(gateway)
@@ -219,30 +243,30 @@ class GatewayConnection:
         self._tried = NO_ROUTE
         self._show()
         if is_new:
-            self._introduce()
+            self._introduction.broadcast()
             self._ask_for_places()
-            tell_all_place(self._parts)
+            self._requests.tell_all()
         return is_new
 
     def take_gateway_of(self, neighbour: int, gateway: int) -> None:
         """Try the gateway of a neighbour; other routes to it have failed."""
-        if gateway > MAX_NODE_ID or gateway == self._parts.node_id:
+        if gateway > MAX_NODE_ID or gateway == self._node_id:
             return
         if gateway == self.gateway and self._has_resigned(periods=1.0):
             return  # the neighbour has not heard of it yet
-        if self._detours.passes_by(neighbour, self._parts.now_s):
+        if self._detours.passes_by(neighbour, self._deadlines.now_s):
             return
         self._prefer(gateway)
-        self._parts.delivery.gateway_taken(neighbour, gateway)
+        self._delivery.gateway_taken(neighbour, gateway)
         self.send_heartbeat()
 
     def gateway_resigned(self) -> None:
         """The preferred gateway says that it is none now: look for another one."""
-        self._resigned_s = self._parts.now_s
+        self._resigned_s = self._deadlines.now_s
         was_connected = self._states.connected
         self.end(RouterEvent.ROUTE_LOST)
         if was_connected:
-            self._introduce()
+            self._introduction.broadcast()
 
     def asks_gateway_that_resigned(self) -> bool:
         """Whether the gateway is in reach and only without internet; asks it again if so."""
@@ -253,21 +277,21 @@ class GatewayConnection:
 
     def _has_resigned(self, periods: float) -> bool:
         """Whether the preferred gateway said so within so many check periods."""
-        return self._parts.now_s - self._resigned_s <= periods * self._parts.timing.check_period_s
+        return self._deadlines.now_s - self._resigned_s <= periods * self._check_period_s
 
     def proven(self, patience: float) -> bool:
         """Whether the gateway answered within the last `patience` check periods.
 
         With a key, answers for others do not tell this router the gateway's nonce.
         """
-        now_s, period_s = self._parts.now_s, self._parts.timing.check_period_s
+        now_s, period_s = self._deadlines.now_s, self._check_period_s
         if self._has_key and now_s - self._answered_itself_s > NONCE_PERIODS * period_s:
             return False
         return self._answered_s > now_s - patience * period_s
 
     def answered_itself(self) -> None:
         """The gateway has answered a heartbeat of this router."""
-        self._answered_itself_s = self._parts.now_s
+        self._answered_itself_s = self._deadlines.now_s
 
     def check(self, patience: float) -> None:
         """The part of the periodic check for a connected router."""
@@ -277,8 +301,8 @@ class GatewayConnection:
         asked = self._relay_check.run(self.gateway, self.next_hop(), self.hops, self._answered_s)
         if shows_way_back or self.proven(patience):
             return
-        fresh_periods = self._parts.antenna.medium.place_periods
-        self._ask_for_places(fresh_periods * self._parts.timing.check_period_s, asked)
+        fresh_periods = self._medium.place_periods
+        self._ask_for_places(fresh_periods * self._check_period_s, asked)
         self.send_heartbeat()
 
     def gateway_sent_place(self) -> None:
@@ -291,19 +315,19 @@ class GatewayConnection:
         `fresh_s`: a place that was reported within that time is known well enough;
         `gateway_asked`: the gateway was asked a moment ago.
         """
-        next_hop, places, now_s = self.next_hop(), self._parts.places, self._parts.now_s
+        next_hop, places, now_s = self.next_hop(), self._places, self._deadlines.now_s
         enough_s = fresh_s
         if next_hop != self.gateway:  # relays report its place, too
-            period_s = self._parts.timing.check_period_s
+            period_s = self._check_period_s
             enough_s = max((MAX_AGE_PERIODS - 1) * period_s, 2.0 * fresh_s)
         unsure = places.gateway is None or now_s - places.gateway_seen_s >= enough_s
         unsure = unsure or places.gateway_disputed
         if (unsure and not gateway_asked) or self._moved:  # the request tells where this node is
             self._moved = False
-            ask_for_place(self._parts, self.gateway)
+            self._requests.ask(self.gateway)
         is_old = next_hop != places.good_id or now_s - places.good_seen_s >= fresh_s
         if is_old and next_hop not in (self.gateway, NO_ROUTE):
-            ask_for_place(self._parts, next_hop)
+            self._requests.ask(next_hop)
 
     # The end of a connection -----------------------------------------------------------------
 
@@ -317,13 +341,13 @@ class GatewayConnection:
         self._show()
 
     def _answer_window_s(self) -> float:
-        medium = self._parts.antenna.medium
+        medium = self._medium
         hops = self.hops if self.hops != NO_ROUTE else _HOPS_UNTIL_KNOWN
         return medium.answer_s + medium.answer_per_hop_s * hops
 
     def _asks_a_neighbour(self) -> bool:
         """Whether a neighbour was recently asked for its gateway. If not, one is asked now."""
-        medium, now_s = self._parts.antenna.medium, self._parts.now_s
+        medium, now_s = self._medium, self._deadlines.now_s
         if medium.shared and now_s - self._asked_neighbour_s < medium.answer_s:
             return True
         self._asked_neighbour_s = now_s
@@ -332,18 +356,18 @@ class GatewayConnection:
     def _prefer(self, gateway: int) -> None:
         if gateway != self.gateway:
             if self.gateway != NO_ROUTE:
-                self._parts.report(MeshEventKind.GATEWAY_CHANGED, gateway)
+                self._report(MeshEventKind.GATEWAY_CHANGED, gateway)
             self.gateway = gateway
             self._resigned_s = -math.inf
-            self._parts.places.forget_gateway()
+            self._places.forget_gateway()
             self._relay_check.swallowing.give_up()  # this one may not know its own place
 
     def _show(self) -> None:
         """Report a change of the connection, and stop waiting for an answer that will not come."""
         if self._states.connection in (ConnectionState.SEARCHING, ConnectionState.CONNECTED):
-            self._parts.deadlines.set(Due.ANSWER, math.inf)
+            self._deadlines.set(Due.ANSWER, math.inf)
         connected = self._states.connected
         if connected != self._shown_connected:
             self._shown_connected = connected
             kind = MeshEventKind.CONNECTED if connected else MeshEventKind.DISCONNECTED
-            self._parts.report(kind, self.gateway, in_hops(self.hops) if connected else "")
+            self._report(kind, self.gateway, in_hops(self.hops) if connected else "")

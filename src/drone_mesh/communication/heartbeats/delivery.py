@@ -7,20 +7,42 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from typing import Callable, Sequence
+from typing import Protocol, Sequence
 
 from drone_mesh.communication.control.delivery import IDelivery
-from drone_mesh.communication.control.parts import NodeBasics
-from drone_mesh.communication.events.observer import MeshEventKind
+from drone_mesh.communication.events.observer import MeshEventKind, Reporter
 from drone_mesh.communication.heartbeats.circulation import CirculationGuard, Passage
-from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE
+from drone_mesh.communication.interfaces import (
+    BROADCAST,
+    NO_ROUTE,
+    IMeshSeals,
+    IWirelessCommunication,
+)
+from drone_mesh.communication.neighbours.neighbour_table import Neighbours
 from drone_mesh.communication.routing.interfaces import IRoutingTechnique
+from drone_mesh.communication.timing.deadlines import Deadlines
 from drone_mesh.communication.timing.limits import REPEATS, RateLimit, Strangers
 from drone_mesh.communication.wire import messages
-from drone_mesh.communication.wire.messages import CREATOR_AT, FORWARD_AT
+from drone_mesh.communication.wire.messages import CREATOR_AT, FORWARD_AT, TO_AT
 
 DATA_PERSISTENCE = 3  # users' packets are many, so a chain of losses is more likely
 SENT_KEPT_S = 30.0  # on a busy channel a packet is under way for seconds
+
+
+class IWayFinder(Protocol):
+    """What the delivery tells and asks its control plane."""
+
+    def on_neighbour_lost(self, node: int) -> None:
+        """A neighbour did not take a packet; the routes are already updated."""
+
+    def another_next_hop(self, node: int, but: int) -> int:
+        """A neighbour to try for `node`, not `but`, beside those that the routes know."""
+
+    def way_up(self, but: int) -> int:
+        """A next hop to the preferred gateway, not `but`; NO_ROUTE also if that is this node."""
+
+    def seek(self, node: int) -> bool:
+        """Users' data for `node` has no way from here: search for it. False: this is no gateway."""
 
 
 class Delivery(IDelivery):
@@ -31,30 +53,26 @@ class Delivery(IDelivery):
 
     def __init__(
         self,
-        basics: NodeBasics,
+        node_id: int,
         routing: IRoutingTechnique,
-        on_neighbour_lost: Callable[[int], None],
-        another_next_hop: Callable[[int, int], int],
-        way_up: Callable[[int], int],
-        seek: Callable[[int], bool],
+        ways: IWayFinder,
+        antenna: IWirelessCommunication,
+        neighbours: Neighbours,
+        deadlines: Deadlines,
+        attempts: int,
+        report: Reporter,
+        seals: IMeshSeals,
     ) -> None:
-        """`another_next_hop`: a neighbour to try for a node, not the one given, or NO_ROUTE.
-
-        `way_up`: a next hop to the preferred gateway, not the one given, or NO_ROUTE; `seek`: see
-        IDelivery.
-        """
-        self._node_id = basics.node_id
-        self._antenna = antenna = basics.antenna
-        self._shared = antenna.medium.shared
+        """`attempts` that fail: then the receiver counts as lost."""
+        self._node_id = node_id
         self._routing = routing
-        self._neighbours = basics.neighbours
-        self._deadlines = basics.deadlines
-        self._attempts = basics.timing.send_attempts  # that fail: then the receiver counts as lost
-        self._report = basics.report
-        self._on_neighbour_lost = on_neighbour_lost
-        self._another_next_hop = another_next_hop
-        self._way_up = way_up
-        self._seek = seek
+        self._ways = ways
+        self._antenna = antenna
+        self._shared = antenna.medium.shared
+        self._neighbours = neighbours
+        self._deadlines = deadlines
+        self._attempts = attempts
+        self._report = report
         self._reported_s: dict[int, float] = {}  # shared medium: when each was announced
         self._gave_up: set[int] = set()  # neighbours that were heard but took no packets
         self._strangers = Strangers()
@@ -62,7 +80,7 @@ class Delivery(IDelivery):
         self._announced = RateLimit(REPEATS)
         self._missing_to_report: deque[tuple[int, int, int]] = deque()
         self._reporting = False
-        self._without_proof = basics.seals.without_proof  # which is put on later than it is sent
+        self._without_proof = seals.without_proof  # which is put on later than it is sent
         self._kept_s = antenna.medium.stretched(SENT_KEPT_S)
         self._relayed = CirculationGuard(self._kept_s)  # own packets
         self._begun_s = -math.inf  # what this node sent before its start comes back, too
@@ -152,7 +170,7 @@ class Delivery(IDelivery):
         detour = self._routing.get_direction_to_node(other)
         if detour in (NO_ROUTE, to) and other != to:
             by_default = messages.is_data(payload) and not is_known
-            detour = self._way_up(to) if by_default else self._another_next_hop(other, to)
+            detour = self._ways.way_up(to) if by_default else self._ways.another_next_hop(other, to)
         if detour in (NO_ROUTE, to):
             return False
         return self.send(messages.readdressed(payload, detour), detour)
@@ -164,7 +182,7 @@ class Delivery(IDelivery):
         while True:
             directions = self._routing.directions(other, NO_ROUTE, self._node_id)
             if not directions and messages.is_data(payload):
-                directions = [self._way_up(NO_ROUTE)]
+                directions = [self._ways.way_up(NO_ROUTE)]
             untried = [to for to in directions if to != NO_ROUTE and to not in tried]
             if not untried:
                 return False
@@ -174,17 +192,18 @@ class Delivery(IDelivery):
 
     def default_hop(self) -> int:
         """The next hop to the preferred gateway, which knows more nodes than a router."""
-        return self._way_up(NO_ROUTE)
+        return self._ways.way_up(NO_ROUTE)
 
     def seek(self, node: int) -> bool:
         """Search for `node` at a gateway with no next hop to another one; returns whether."""
-        return self._seek(node)
+        return self._ways.seek(node)
 
     def send_to_each(self, payload: bytes, next_hops: Sequence[int]) -> bool:
         """Send the same packet to each of these neighbours. True: at least one received it."""
         taken = False
         for to in next_hops:
-            taken |= self.send(messages.readdressed(payload, to), to)
+            packet = payload if payload[TO_AT] == to else messages.readdressed(payload, to)
+            taken |= self.send(packet, to)
         return taken
 
     def send_own_to_each(self, payload: bytes, others: Sequence[int]) -> None:
@@ -291,4 +310,4 @@ class Delivery(IDelivery):
         if self._routing.cant_communicate_with_node(node):
             self._report(MeshEventKind.NODE_MISSING, node)
             self.report_missing(node, first=came_from)
-        self._on_neighbour_lost(node)
+        self._ways.on_neighbour_lost(node)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import Hashable, Sequence
 
-from drone_mesh.communication.control.parts import NodeBasics
-from drone_mesh.communication.events.observer import MeshEventKind
+from drone_mesh.communication.events.complaints import Complaints
+from drone_mesh.communication.events.observer import MeshEventKind, Reporter
 from drone_mesh.communication.heartbeats.circulation import CirculationGuard, came_round
 from drone_mesh.communication.heartbeats.delivery import Delivery
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.routing.interfaces import IRoutingTechnique
 from drone_mesh.communication.timing.limits import RateLimit
+from drone_mesh.communication.timing.medium import Medium
 from drone_mesh.communication.timing.mesh_timing import CIRCULATION_S
 from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.packet_types import MessageType
@@ -22,16 +23,24 @@ CREATORS_TOLD = 8  # MISSING to one creator of users' data, per limits.LIMIT_PER
 class Forwarding:
     """Sends packets of other nodes to their next hop. Called only by the node's component."""
 
-    def __init__(self, basics: NodeBasics, routing: IRoutingTechnique, delivery: Delivery) -> None:
-        self._node_id = basics.node_id
+    def __init__(
+        self,
+        node_id: int,
+        routing: IRoutingTechnique,
+        delivery: Delivery,
+        medium: Medium,
+        complaints: Complaints,
+        report: Reporter,
+    ) -> None:
+        self._node_id = node_id
         self._routing = routing
         self._floods = routing.FLOODS
         self._delivery = delivery
-        self._searches = basics.antenna.medium.shared
-        self._complaints = basics.complaints
-        self._report = basics.report
+        self._searches = medium.shared
+        self._complaints = complaints
+        self._report = report
         self._told = RateLimit(CREATORS_TOLD)
-        self._circulates_s = basics.antenna.medium.stretched(CIRCULATION_S)
+        self._circulates_s = medium.stretched(CIRCULATION_S)
         self._circulation = CirculationGuard(self._circulates_s)
 
     def forward(

@@ -4,29 +4,28 @@ from __future__ import annotations
 
 from typing import Sequence
 
-from drone_mesh.communication.control.control_plane import IControlHost
-from drone_mesh.communication.control.parts import NodeBasics
+from drone_mesh.communication.control.control_plane import ControlledNode
+from drone_mesh.communication.control.node_part import receives
 from drone_mesh.communication.control.router_states import RouterEvent, RouterStates
 from drone_mesh.communication.heartbeats.plane import HeartbeatPlane
 from drone_mesh.communication.heartbeats.router_plane import RouterHeartbeats
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.routing.interfaces import IRoutingTechnique
 from drone_mesh.communication.wire import messages
+from drone_mesh.communication.wire.packet_types import MessageType
 
 
 class GatewayHeartbeats(RouterHeartbeats):
     """Answers heartbeats. While its internet does not work, it is a router instead."""
 
-    def __init__(
-        self, basics: NodeBasics, technique: IRoutingTechnique, host: IControlHost
-    ) -> None:
-        super().__init__(basics, technique, host, RouterStates())
+    def __init__(self, node: ControlledNode, technique: IRoutingTechnique) -> None:
+        super().__init__(node, technique, RouterStates())
         self._has_internet = True
 
     @property
     def gateway(self) -> int:
         """This gateway's own id; without internet, the other gateway that it uses."""
-        return self._parts.node_id if self._has_internet else super().gateway
+        return self._node_id if self._has_internet else super().gateway
 
     @property
     def hops(self) -> int:
@@ -34,6 +33,11 @@ class GatewayHeartbeats(RouterHeartbeats):
         if self._has_internet:
             return 0
         return super().hops if self._states.connected else NO_ROUTE
+
+    @property
+    def connected(self) -> bool:
+        """Whether it has internet, or reaches another gateway."""
+        return self.hops != NO_ROUTE
 
     def on_internet(self, works: bool) -> None:
         """Be a gateway, or a router that says so to all who take it for one."""
@@ -65,26 +69,28 @@ class GatewayHeartbeats(RouterHeartbeats):
         """Itself, or the next hop to another gateway."""
         return self.gateway if self._has_internet else super().next_hop()
 
-    def may_use(self, gateway: int) -> bool:
+    def told_of_gateway(self, gateway: int) -> bool:
         """Whether that is the preferred one."""
-        return gateway == self.gateway if self._has_internet else super().may_use(gateway)
+        return gateway == self.gateway if self._has_internet else super().told_of_gateway(gateway)
 
-    def receive_present(self, payload: bytes, creator: int, _from: int) -> None:
+    @receives(MessageType.PRESENT)
+    def on_present(self, payload: bytes, creator: int, _from: int) -> None:
         """A neighbour introduces itself."""
         if not self._has_internet:
-            super().receive_present(payload, creator, _from)
+            super().on_present(payload, creator, _from)
             return
         _hops, know_gateway = messages.present_body(payload)
         if not know_gateway:
             self._introduction.answer_search(creator)
 
-    def receive_heartbeat(self, payload: bytes, creator: int, from_: int) -> None:
+    @receives(MessageType.HEARTBEAT)
+    def on_heartbeat(self, payload: bytes, creator: int, from_: int) -> None:
         """A heartbeat for this node."""
         _know_gateway, preferred_gateway, hops = messages.heartbeat_body(payload)
         self._host.on_node_heard(creator, hops + 1)
         self._search.found(creator)
-        if not self._has_internet and preferred_gateway != self._parts.node_id:
-            super().receive_heartbeat(payload, creator, from_)
+        if not self._has_internet and preferred_gateway != self._node_id:
+            super().on_heartbeat(payload, creator, from_)
         elif creator != preferred_gateway:  # gateways do not answer each other
             self.send_heartbeat(creator)
 
@@ -99,8 +105,8 @@ class GatewayHeartbeats(RouterHeartbeats):
 
     # Users' data for nodes that this gateway does not know --------------------------------------
 
-    def _seek(self, node: int) -> bool:
-        if self._way_up(NO_ROUTE) != NO_ROUTE:
+    def seek(self, node: int) -> bool:
+        if self.way_up(NO_ROUTE) != NO_ROUTE:
             return False
         self._search.seek(node)
         return True

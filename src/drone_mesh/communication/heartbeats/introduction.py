@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import Callable
+import random
+from typing import Protocol
 
-from drone_mesh.communication.control.control_plane import IControlHost
-from drone_mesh.communication.heartbeats.parts import HeartbeatParts
-from drone_mesh.communication.timing.deadlines import Due
+from drone_mesh.communication.control.node_part import due
+from drone_mesh.communication.interfaces import IMeshSeals, IWirelessCommunication
+from drone_mesh.communication.neighbours.common_frame import CommonFrame
+from drone_mesh.communication.routing.interfaces import IRoutingTechnique
+from drone_mesh.communication.timing.deadlines import Deadlines, Due
 from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.packet_types import MessageType
 
@@ -15,6 +18,18 @@ AFTER_POWER_S = 0.2  # the medium must register the antenna first
 SPREAD_S = 1.0  # spreads the nodes' packets after an outage
 
 _PRESENT = int(MessageType.PRESENT)
+
+
+class IIntroduced(Protocol):
+    """The control plane, as far as an introduction needs it."""
+
+    @property
+    def hops(self) -> int: ...
+
+    @property
+    def connected(self) -> bool: ...
+
+    def send_heartbeat(self, other: int) -> bool: ...
 
 
 class Introduction:
@@ -25,17 +40,26 @@ class Introduction:
 
     def __init__(
         self,
-        parts: HeartbeatParts,
-        node: IControlHost,
-        send_heartbeat: Callable[[int], bool],
+        node_id: int,
+        plane: IIntroduced,
+        technique: IRoutingTechnique,
+        antenna: IWirelessCommunication,
+        seals: IMeshSeals,
+        deadlines: Deadlines,
+        check_period_s: float,
+        frame: CommonFrame,
+        rng: random.Random,
     ) -> None:
-        """`node` provides its connection and hops."""
-        self._parts = parts
-        self._node = node
-        self._frame = parts.frame
-        self._rng = parts.rng
-        self._send_heartbeat = send_heartbeat
-        self._medium = parts.antenna.medium
+        self._node_id = node_id
+        self._plane = plane
+        self._technique = technique
+        self._room = messages.EXTENSION_ROOM[_PRESENT] - seals.reserved_bytes(_PRESENT)
+        self._antenna = antenna
+        self._deadlines = deadlines
+        self._check_period_s = check_period_s
+        self._frame = frame
+        self._rng = rng
+        self._medium = antenna.medium
         self._search_again_s = self._medium.search_s if self._medium.shared else math.inf
         self._is_answer = False  # the planned one answers a node that needs a gateway
 
@@ -45,23 +69,22 @@ class Introduction:
         A node without a gateway repeats it, less and less often; off a shared channel only if it
         had one.
         """
-        parts, node = self._parts, self._node
-        hops, connected = node.get_hops_from_gateway_away(), node.get_connected_to_gateway()
-        payload = messages.present(parts.node_id, hops, connected)
-        room = messages.EXTENSION_ROOM[_PRESENT] - parts.seals.reserved_bytes(_PRESENT)
-        extension = parts.routing.extension(_PRESENT, room)
+        hops, connected = self._plane.hops, self._plane.connected
+        payload = messages.present(self._node_id, hops, connected)
+        extension = self._technique.extension(_PRESENT, self._room)
         if extension:
             payload = messages.extended(payload, extension)
         if self._frame.digest:
             payload = messages.with_frame_digest(payload, self._frame.digest)
-        parts.antenna.broadcast_message(payload)
+        self._antenna.broadcast_message(payload)
         if connected:
             self._search_again_s = self._medium.search_s
         elif self._search_again_s < math.inf:
             wait_s = self._search_again_s * (0.5 + self._rng.random())
-            self._search_again_s = min(2.0 * self._search_again_s, parts.timing.check_period_s)
+            self._search_again_s = min(2.0 * self._search_again_s, self._check_period_s)
             self._plan(wait_s)
 
+    @due(Due.INTRODUCE)
     def on_due(self) -> None:
         """The planned time has come."""
         self._cancel()
@@ -83,8 +106,8 @@ class Introduction:
         """Answer a neighbour that needs a gateway: on a shared channel one PRESENT for all."""
         spread_s = self._medium.answer_spread_s
         if not spread_s:
-            self._send_heartbeat(neighbour)
-        elif self._parts.deadlines.get(Due.INTRODUCE) == math.inf:
+            self._plane.send_heartbeat(neighbour)
+        elif self._deadlines.get(Due.INTRODUCE) == math.inf:
             self._is_answer = True
             self._plan(self._rng.random() * spread_s)
 
@@ -95,7 +118,7 @@ class Introduction:
             self._cancel()
 
     def _plan(self, wait_s: float) -> None:
-        self._parts.deadlines.set(Due.INTRODUCE, self._parts.now_s + wait_s)
+        self._deadlines.set(Due.INTRODUCE, self._deadlines.now_s + wait_s)
 
     def _cancel(self) -> None:
-        self._parts.deadlines.set(Due.INTRODUCE, math.inf)
+        self._deadlines.set(Due.INTRODUCE, math.inf)

@@ -12,25 +12,37 @@ from __future__ import annotations
 import math
 from typing import Callable
 
-from drone_mesh.communication.control.parts import NodeParts
-from drone_mesh.communication.interfaces import BROADCAST
+from drone_mesh.communication.control.control_plane import NUMBERS_PER_S, SEARCH_AGAIN_S
+from drone_mesh.communication.control.node_part import receives
+from drone_mesh.communication.events.complaints import Complaints
+from drone_mesh.communication.interfaces import BROADCAST, IWirelessCommunication
+from drone_mesh.communication.timing.deadlines import Deadlines
 from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.packet_types import MessageType
 
 BODY = MessageType.NODE_SEARCH.about.layout
-SEARCH_EVERY_S = 0.3  # each search is one broadcast by every node
 SAME_SEARCH_S = 10.0  # far longer than a search takes to pass through a mesh
 FIRST_PAUSE_S = 1.0  # a search passes through 100 nodes within half a second
 LONGEST_PAUSE_S = 60.0  # a search in vain doubles the pause, up to this
-NUMBERS_PER_S = 16  # for orders too: a restarted gateway starts at another number
 
 
 class NodeSearch:
     """Searches of one node, and its part in others' searches. Called only by its component."""
 
-    def __init__(self, parts: NodeParts, answer: Callable[[int], bool]) -> None:
+    def __init__(
+        self,
+        node_id: int,
+        antenna: IWirelessCommunication,
+        deadlines: Deadlines,
+        complaints: Complaints,
+        answer: Callable[[int], bool],
+    ) -> None:
         """`answer` sends a heartbeat to the gateway that searches for this node."""
-        self._parts = parts
+        self._node_id = node_id
+        self._antenna = antenna
+        self._medium = antenna.medium
+        self._deadlines = deadlines
+        self._complaints = complaints
         self._answer = answer
         self._searched_s = -math.inf
         self._pauses_s: dict[int, tuple[float, float]] = {}  # by node: until when, and the next one
@@ -38,46 +50,47 @@ class NodeSearch:
 
     def search(self, node: int) -> bool:
         """Broadcast a search for `node`. False: too soon after another search."""
-        now_s = self._parts.now_s
-        medium = self._parts.antenna.medium
-        if medium.shared and now_s - self._searched_s < medium.stretched(SEARCH_EVERY_S):
+        now_s = self._deadlines.now_s
+        medium = self._medium
+        if medium.shared and now_s - self._searched_s < medium.stretched(SEARCH_AGAIN_S):
             return False
         self._searched_s = now_s
         number = int(now_s * NUMBERS_PER_S) % 2**16
-        self._broadcast(self._parts.node_id, node, number)
+        self._broadcast(self._node_id, node, number)
         return True
 
     def seek(self, node: int) -> None:
         """Search for `node`, unless that was in vain a moment ago."""
-        now_s = self._parts.now_s
+        now_s = self._deadlines.now_s
         until_s, pause_s = self._pauses_s.get(node, (-math.inf, FIRST_PAUSE_S))
         if pause_s > 2.0 * FIRST_PAUSE_S:
-            self._parts.complaints.add(f"no route to node {node}", "users' data ends here", now_s)
+            self._complaints.add(f"no route to node {node}", "users' data ends here", now_s)
         if now_s >= until_s and self.search(node):
-            until_s = now_s + self._parts.antenna.medium.stretched(pause_s)
+            until_s = now_s + self._medium.stretched(pause_s)
             self._pauses_s[node] = until_s, min(2.0 * pause_s, LONGEST_PAUSE_S)
 
     def found(self, node: int) -> None:
         """End the search for a node that was heard again."""
         self._pauses_s.pop(node, None)
 
-    def on_packet(self, creator: int, payload: bytes) -> None:
+    @receives(MessageType.NODE_SEARCH)
+    def on_packet(self, payload: bytes, creator: int, _from: int) -> None:
         """Answer a search for this node; forward any other search, once."""
         node, number = BODY.unpack_from(payload, messages.HEADER_BYTES)
-        now_s, search = self._parts.now_s, (creator, node, number)
+        now_s, search = self._deadlines.now_s, (creator, node, number)
         old = [seen for seen, at_s in self._seen_s.items() if now_s - at_s >= SAME_SEARCH_S]
         for seen in old:
             del self._seen_s[seen]
-        if creator == self._parts.node_id or search in self._seen_s:
+        if creator == self._node_id or search in self._seen_s:
             return
         self._seen_s[search] = now_s
-        if node == self._parts.node_id:
+        if node == self._node_id:
             self._answer(creator)
         else:
             self._broadcast(creator, node, number)
 
     def _broadcast(self, creator: int, node: int, number: int) -> None:
-        me, kind = self._parts.node_id, MessageType.NODE_SEARCH
-        self._parts.antenna.broadcast_message(
+        me, kind = self._node_id, MessageType.NODE_SEARCH
+        self._antenna.broadcast_message(
             messages.packet(kind, creator, me, BROADCAST, BROADCAST, BODY.pack(node, number))
         )

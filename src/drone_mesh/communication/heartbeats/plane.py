@@ -5,56 +5,72 @@ from __future__ import annotations
 import math
 from typing import Sequence
 
-from drone_mesh.communication.control.control_plane import IControlHost, IControlPlane
-from drone_mesh.communication.control.parts import NodeBasics
+from drone_mesh.communication.control.control_plane import ControlledNode, IControlPlane
+from drone_mesh.communication.control.node_part import due, receives
 from drone_mesh.communication.heartbeats.delivery import Delivery
 from drone_mesh.communication.heartbeats.forwarding import Forwarding
 from drone_mesh.communication.heartbeats.introduction import Introduction
 from drone_mesh.communication.heartbeats.node_search import NodeSearch
-from drone_mesh.communication.heartbeats.parts import HeartbeatParts
+from drone_mesh.communication.heartbeats.own_heartbeats import OwnHeartbeats
 from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE
 from drone_mesh.communication.routing.interfaces import IRoutingEssentials, IRoutingTechnique
 from drone_mesh.communication.timing.deadlines import Due
 from drone_mesh.communication.timing.medium import Medium
 from drone_mesh.communication.wire import messages
-from drone_mesh.communication.wire.packet_types import MessageType
+from drone_mesh.communication.wire.packet_types import ABOUT, Handler, MessageType
 from drone_mesh.drone.location import Location
+
+_OF_TECHNIQUES = [number for number in range(256) if ABOUT[number].handler is Handler.TECHNIQUE]
 
 
 class HeartbeatPlane(IControlPlane, IRoutingEssentials):
     """Neighbours, connection and routes by PRESENT, HEARTBEAT and MISSING."""
 
-    def __init__(
-        self, basics: NodeBasics, technique: IRoutingTechnique, host: IControlHost
-    ) -> None:
-        self._host = host
+    def __init__(self, node: ControlledNode, technique: IRoutingTechnique) -> None:
+        self._node_id = node.node_id
         self._technique = self.routes = technique
-        self._antenna = basics.antenna
-        self.bids_within_s = basics.timing.check_period_s
-        self._deadlines = basics.deadlines
-        self._neighbours = basics.neighbours
+        self._antenna, self._medium = node.antenna, node.antenna.medium
+        self._check_period_s = self.bids_within_s = node.timing.check_period_s
+        self._deadlines = node.deadlines
+        self._neighbours = node.neighbours
+        self._places = node.places
+        self._pilot = node.pilot
         self._delivery = self.delivery = Delivery(
-            basics,
+            node.node_id,
             technique,
-            self._on_neighbour_lost,
-            self._another_next_hop,
-            self._way_up,
-            self._seek,
+            self,
+            node.antenna,
+            node.neighbours,
+            node.deadlines,
+            node.timing.send_attempts,
+            node.report,
+            node.seals,
         )
-        self._forwarding = Forwarding(basics, technique, self._delivery)
-        self._parts = HeartbeatParts(**vars(basics), routing=technique, delivery=self._delivery)
-        self._introduction = Introduction(self._parts, host, lambda node: self.send_heartbeat(node))
-        self._search = NodeSearch(self._parts, self._answer_search)
-        self._learn_from = technique.learn
-        self.learn = self._learn
+        self._forwarding = Forwarding(
+            node.node_id, technique, self._delivery, self._medium, node.complaints, node.report
+        )
+        self._heartbeats = OwnHeartbeats(node.node_id, technique, node.seals)
+        self._introduction = Introduction(
+            node.node_id,
+            self,
+            technique,
+            node.antenna,
+            node.seals,
+            node.deadlines,
+            self._check_period_s,
+            node.frame,
+            node.rng,
+        )
+        self._search = NodeSearch(
+            node.node_id, node.antenna, node.deadlines, node.complaints, self._answer_search
+        )
+        self.learn = technique.learn
         self.forward = self._forwarding.forward
 
-    def _learn(self, creator: int, from_: int, kind: int, payload: bytes) -> bool:
-        """Learn from a packet, without a foreign neighbour's extension, which is part of a seal."""
-        room = messages.EXTENSION_ROOM.get(kind)
-        if room and self._parts.complaints.is_foreign(from_, self._deadlines.now_s):
-            payload = messages.extended(payload, bytes(room))
-        return self._learn_from(creator, from_, kind, payload)
+    @property
+    def parts(self) -> Sequence[object]:
+        """Itself and its parts that handle packets and timers."""
+        return self, self._introduction, self._search
 
     # Time and surroundings -------------------------------------------------------------------
 
@@ -63,13 +79,11 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         self._delivery.begin()
         self._technique.start_routing(self)
 
-    def on_time(self, now_s: float) -> None:
-        """Introduce the node, and let the technique do what it planned."""
-        if now_s >= self._deadlines.at_s[Due.INTRODUCE]:
-            self._introduction.on_due()
-        if now_s >= self._deadlines.at_s[Due.ROUTING]:
-            self._deadlines.set(Due.ROUTING, math.inf)
-            self._technique.on_time(now_s)
+    @due(Due.ROUTING)
+    def on_technique_due(self) -> None:
+        """Let the technique do what it planned."""
+        self._deadlines.set(Due.ROUTING, math.inf)
+        self._technique.on_time(self._deadlines.now_s)
 
     def on_power(self, on: bool) -> None:
         """Introduce the node soon after the antenna is switched on."""
@@ -86,7 +100,7 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
 
     def neighbour_leaves(self, neighbour: int) -> None:
         """Look for other routes on a shared medium; elsewhere the next failed packet does so."""
-        if self._antenna.medium.shared:
+        if self._medium.shared:
             self._delivery.neighbour_lost(neighbour)
 
     # Packets ---------------------------------------------------------------------------------
@@ -108,10 +122,11 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         if not self._delivery.undelivered(payload, tries):
             self._forwarding.stranded(payload, self._deadlines.now_s)
 
-    def receive_missing(self, payload: bytes, creator: int, from_: int) -> None:
+    @receives(MessageType.MISSING)
+    def on_missing(self, payload: bytes, creator: int, from_: int) -> None:
         """`creator` reports that it cannot reach a node."""
         missing = messages.MissingMessage.from_payload(payload).missing
-        if missing != self._parts.node_id:
+        if missing != self._node_id:
             if missing == self.gateway:
                 self._neighbours.set_hops(creator, NO_ROUTE)
             self._delivery.forget_route(creator, missing, from_)
@@ -120,7 +135,8 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
     def _after_missing(self, missing: int, told: bool) -> None:
         """The routes are updated. `told`: this node alone, not all neighbours."""
 
-    def receive_of_technique(self, payload: bytes, creator: int, from_: int) -> None:
+    @receives(*_OF_TECHNIQUES)
+    def on_packet_of_technique(self, payload: bytes, creator: int, from_: int) -> None:
         """A packet of the technique's own types."""
         kind = messages.type_of(payload)
         self._technique.on_packet(creator, from_, kind, messages.body(payload))
@@ -129,35 +145,28 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         """Ask all nodes for `node`, which answers with a heartbeat."""
         return self._search.search(node)
 
-    def receive_node_search(self, payload: bytes, creator: int, _from: int) -> None:
-        """A gateway looks for a node."""
-        self._search.on_packet(creator, payload)
+    def on_neighbour_lost(self, node: int) -> None:
+        """See IWayFinder, also for the functions below."""
 
-    def _on_neighbour_lost(self, node: int) -> None:
-        """A neighbour did not take a packet; the routes are already updated."""
-
-    def _another_next_hop(self, node: int, but: int) -> int:
-        """A neighbour to try for `node`, not `but`, beside those that the routes know."""
+    def another_next_hop(self, node: int, but: int) -> int:  # noqa: D102
         return NO_ROUTE
 
     # Users' data for nodes to which there is no route -----------------------------------------
 
-    def _way_up(self, but: int) -> int:
-        """A next hop to the preferred gateway, not `but`; NO_ROUTE also if that is this node."""
+    def way_up(self, but: int) -> int:  # noqa: D102
         to = self.next_hop()
-        if to == self._parts.node_id:
+        if to == self._node_id:
             return NO_ROUTE
-        return to if to != but else self._another_next_hop(self.gateway, but)
+        return to if to != but else self.another_next_hop(self.gateway, but)
 
-    def _seek(self, node: int) -> bool:
-        """Users' data for `node` has no way from here."""
+    def seek(self, node: int) -> bool:  # noqa: D102
         return False
 
     # For the routing technique ---------------------------------------------------------------
 
     def get_node_id(self) -> int:
         """This node's id, 0..253."""
-        return self._parts.node_id
+        return self._node_id
 
     def get_preferred_gateway(self) -> int:
         """The gateway that this node uses, itself for a gateway."""
@@ -165,7 +174,7 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
 
     def get_connected_to_gateway(self) -> bool:
         """Whether a gateway answered the last heartbeat, or may still answer."""
-        return self._host.get_connected_to_gateway()
+        return self.connected
 
     def search_other_nodes_in_range(self) -> None:
         """Send PRESENT to each node in range."""
@@ -180,9 +189,9 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
 
         On a busy channel, skip neighbours that were heard recently.
         """
-        patience = max(self._antenna.patience(), self._antenna.medium.heard_periods)
+        patience = max(self._antenna.patience(), self._medium.heard_periods)
         if patience > 0.0:
-            since_s = self._deadlines.now_s - patience * self._parts.timing.check_period_s
+            since_s = self._deadlines.now_s - patience * self._check_period_s
             heard_s = self._neighbours.last_heard_s
             others = [other for other in others if heard_s(other, otherwise=since_s) <= since_s]
         self._delivery.send_own_to_each(self._heartbeat(), others)
@@ -194,7 +203,7 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
     @property
     def medium(self) -> Medium:
         """The properties of the antenna's medium."""
-        return self._antenna.medium
+        return self._medium
 
     def wake_at(self, at_s: float) -> None:
         """Call the technique's `on_time` at this time."""
@@ -202,23 +211,23 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
 
     def send_packet(self, kind: int, neighbour: int, body: bytes) -> bool:
         """Send a packet of the technique's own type to a neighbour."""
-        me = self._parts.node_id
+        me = self._node_id
         return self._delivery.send(
             messages.packet(kind, me, me, neighbour, neighbour, body), neighbour
         )
 
     def broadcast_packet(self, kind: int, body: bytes) -> None:
         """Send a packet of the technique's own type to each node in range."""
-        me = self._parts.node_id
+        me = self._node_id
         self._antenna.broadcast_message(messages.packet(kind, me, me, BROADCAST, BROADCAST, body))
 
     def own_place(self) -> Location | None:
         """The drone's position, if it can report it."""
-        return self._parts.pilot.location()
+        return self._pilot.location()
 
     def place_of(self, node: int) -> Location | None:
         """The last place reported by `node`, or None."""
-        places = self._parts.places
+        places = self._places
         if node == self.gateway:
             return places.gateway
         return places.good if node == places.good_id else None
@@ -228,5 +237,5 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         return self._delivery.send_own(messages.addressed(self._heartbeat(), gateway))
 
     def _heartbeat(self) -> bytes:
-        me = self._parts.node_id
-        return self._parts.heartbeat(me, me, self.get_connected_to_gateway(), self.gateway)
+        me = self._node_id
+        return self._heartbeats.packet(me, me, self.connected, self.gateway)

@@ -11,10 +11,10 @@ from __future__ import annotations
 import logging
 import math
 
-from drone_mesh.communication.control.place_requests import ask_for_place
+from drone_mesh.communication.control.place_requests import PlaceRequests
 from drone_mesh.communication.heartbeats.detours import SWALLOWER_AVOIDED_S, Detours
-from drone_mesh.communication.heartbeats.parts import HeartbeatParts
 from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.timing.deadlines import Deadlines
 
 ASK_PERIODS = 3.0  # in check periods: one packet and its answer in half a minute
 WAIT_PERIODS = 0.9  # in check periods: a question that is younger may be answered yet
@@ -83,10 +83,22 @@ class Swallowing:
 class RelayCheck:
     """The checks of one router. If packets are swallowed, it finds a detour for heartbeats."""
 
-    def __init__(self, parts: HeartbeatParts, detours: Detours) -> None:
-        self._parts = parts
+    def __init__(
+        self,
+        node_id: int,
+        is_needed: bool,
+        check_period_s: float,
+        deadlines: Deadlines,
+        requests: PlaceRequests,
+        detours: Detours,
+    ) -> None:
+        """`is_needed`: the mesh has a key, and its technique takes shortcuts."""
+        self._node_id = node_id
+        self._is_needed = is_needed
+        self._deadlines = deadlines
+        self._requests = requests
         self._detours = detours
-        self.swallowing = Swallowing(parts.timing.check_period_s)
+        self.swallowing = Swallowing(check_period_s)
         self._detour = NO_ROUTE
 
     def run(self, gateway: int, next_hop: int, hops: int, heartbeat_s: float) -> bool:
@@ -95,16 +107,14 @@ class RelayCheck:
         `heartbeat_s`: when it last answered a heartbeat. If it answers only those, later ones go
         through another neighbour.
         """
-        parts, now_s = self._parts, self._parts.now_s
-        sealed = parts.has_key
-        relayed = next_hop not in (gateway, NO_ROUTE)
-        if not (sealed and relayed and parts.routing.TAKES_SHORTCUTS):
+        now_s = self._deadlines.now_s
+        if not self._is_needed or next_hop in (gateway, NO_ROUTE):
             return False
         if self.swallowing.noticed(hops) and self.swallowing.is_over(now_s, heartbeat_s):
             self._detours.avoid(next_hop, now_s + SWALLOWER_AVOIDED_S)
             _log.warning(
                 "node %d: node %d carries heartbeats to gateway %d, but no other packets",
-                parts.node_id,
+                self._node_id,
                 next_hop,
                 gateway,
             )
@@ -119,7 +129,7 @@ class RelayCheck:
         if not self.swallowing.must_ask(now_s):
             return False
         self.swallowing.asked(now_s)
-        ask_for_place(parts, gateway)
+        self._requests.ask(gateway)
         return True
 
     def take_detour(self) -> int:

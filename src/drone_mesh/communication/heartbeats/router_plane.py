@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Sequence
 
-from drone_mesh.communication.control.control_plane import IControlHost
-from drone_mesh.communication.control.parts import NodeBasics
+from drone_mesh.communication.control.control_plane import ControlledNode
+from drone_mesh.communication.control.node_part import due, receives
+from drone_mesh.communication.control.place_requests import PlaceRequests
 from drone_mesh.communication.control.router_states import (
     ConnectionState,
     RepairState,
@@ -28,16 +29,30 @@ class RouterHeartbeats(HeartbeatPlane):
     """Keeps a connection to a gateway by heartbeats that it answers."""
 
     def __init__(
-        self,
-        basics: NodeBasics,
-        technique: IRoutingTechnique,
-        host: IControlHost,
-        states: RouterStates,
+        self, node: ControlledNode, technique: IRoutingTechnique, states: RouterStates
     ) -> None:
-        super().__init__(basics, technique, host)
+        super().__init__(node, technique)
+        self._host = node.host
         self._states = states
-        self._connection = GatewayConnection(self._parts, states, self.introduce)
-        if self._antenna.medium.shared:
+        self._may_be_gateway = node.seals.may_be_gateway
+        self._rng = node.rng
+        self._connection = GatewayConnection(
+            node.node_id,
+            states,
+            technique,
+            self._delivery,
+            self._heartbeats,
+            self._introduction,
+            PlaceRequests(node.node_id, node.pilot, node.antenna, self._delivery, node.deadlines),
+            self._medium,
+            node.deadlines,
+            self._check_period_s,
+            node.neighbours,
+            node.places,
+            node.report,
+            node.seals.has_key,
+        )
+        if self._medium.shared:
             self.forward = self._forward_and_learn
 
     @property
@@ -50,11 +65,15 @@ class RouterHeartbeats(HeartbeatPlane):
         """Hops to it."""
         return self._connection.hops
 
-    def on_time(self, now_s: float) -> None:
-        """Do what is due."""
-        if now_s >= self._deadlines.at_s[Due.ANSWER]:
-            self._connection.answer_missed()
-        super().on_time(now_s)
+    @property
+    def connected(self) -> bool:
+        """Whether it answered the last heartbeat, or may still answer."""
+        return self._states.connected
+
+    @due(Due.ANSWER)
+    def on_answer_missed(self) -> None:
+        """The gateway did not answer in time."""
+        self._connection.answer_missed()
 
     def check(self, due_s: float) -> None:
         """Check neighbours, routes and gateway."""
@@ -92,9 +111,9 @@ class RouterHeartbeats(HeartbeatPlane):
         """The next hop to the preferred gateway, or NO_ROUTE."""
         return self._connection.next_hop()
 
-    def may_use(self, gateway: int) -> bool:
+    def told_of_gateway(self, gateway: int) -> bool:
         """Whether `gateway` is the preferred one. If there is none yet, it becomes that."""
-        return self._connection.may_use(gateway)
+        return self._connection.told_of_gateway(gateway)
 
     def end(self, event: RouterEvent) -> None:
         """Disconnect because of `event`."""
@@ -111,7 +130,8 @@ class RouterHeartbeats(HeartbeatPlane):
 
     # Packets ---------------------------------------------------------------------------------
 
-    def receive_present(self, payload: bytes, creator: int, _from: int) -> None:
+    @receives(MessageType.PRESENT)
+    def on_present(self, payload: bytes, creator: int, _from: int) -> None:
         """A neighbour introduces itself."""
         hops, know_gateway = messages.present_body(payload)
         self._neighbours.set_hops(creator, hops)
@@ -129,9 +149,10 @@ class RouterHeartbeats(HeartbeatPlane):
             else:
                 self._introduction.answer_search(creator)
 
-    def receive_heartbeat(self, payload: bytes, creator: int, from_: int) -> None:
+    @receives(MessageType.HEARTBEAT)
+    def on_heartbeat(self, payload: bytes, creator: int, from_: int) -> None:
         """A heartbeat for this node."""
-        if creator == self._parts.node_id:
+        if creator == self._node_id:
             return  # its own heartbeat came back, which proves nothing
         know_gateway, preferred_gateway, hops = messages.heartbeat_body(payload)
         if creator == from_ and know_gateway and preferred_gateway <= MAX_NODE_ID:
@@ -158,7 +179,7 @@ class RouterHeartbeats(HeartbeatPlane):
         if kind == _HEARTBEAT:
             know_gateway, preferred_gateway, hops = messages.heartbeat_body(payload)
             proves = creator == preferred_gateway and self._host.may_connect(NO_ROUTE, know_gateway)
-            proves = proves and self._parts.seals.may_be_gateway(creator)
+            proves = proves and self._may_be_gateway(creator)
             if proves and self._connection.on_gateway_heartbeat(creator, hops + 1):
                 self._host.on_connected()
         self._forwarding.forward(payload, creator, from_, kind, forward, now_s)
@@ -169,17 +190,17 @@ class RouterHeartbeats(HeartbeatPlane):
 
     def _check_soon(self) -> None:
         """Let the next check come sooner, because the surroundings of this node have changed."""
-        if self._antenna.medium.shared and self._states.connected:
-            share = CHANGE_PERIODS * (0.5 + self._parts.rng.random())
-            soon_s = self._deadlines.now_s + share * self._parts.timing.check_period_s
+        if self._medium.shared and self._states.connected:
+            share = CHANGE_PERIODS * (0.5 + self._rng.random())
+            soon_s = self._deadlines.now_s + share * self._check_period_s
             self._deadlines.set(Due.CHECK, min(soon_s, self._deadlines.get(Due.CHECK)))
 
-    def _another_next_hop(self, node: int, but: int) -> int:
+    def another_next_hop(self, node: int, but: int) -> int:
         if node != self.gateway:
             return NO_ROUTE
         return self._connection.another_next_hop(but)
 
-    def _on_neighbour_lost(self, node: int) -> None:
+    def on_neighbour_lost(self, node: int) -> None:
         self._check_soon()
         self._connection.on_route_lost()
         self._host.on_neighbour_lost(node)

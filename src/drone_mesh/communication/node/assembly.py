@@ -7,13 +7,13 @@ from typing import Callable, NamedTuple
 
 from drone_mesh.communication.events.observer import MeshObserver, ignore_events
 from drone_mesh.communication.interfaces import (
+    NO_SEALS,
     IInternetConnection,
     IMeshNetwork,
     IWirelessCommunication,
 )
-from drone_mesh.communication.node.component import MeshnetworkComponent
+from drone_mesh.communication.node.component import MeshnetworkComponent, NodeSettings
 from drone_mesh.communication.node.gateway import MeshnetworkGateway
-from drone_mesh.communication.node.mesh_node import NodeSettings
 from drone_mesh.communication.node.named_techniques import create_routing_technique
 from drone_mesh.communication.node.node_configuration import NodeConfiguration
 from drone_mesh.communication.node.router import MeshnetworkRouter
@@ -54,7 +54,8 @@ def assemble_node(
 ) -> AssembledNode:
     """A gateway if `internet` is given, otherwise a router; sealed if `security` is given.
 
-    `rng`, `observer` and `debug` as for MeshNode. Raises ValueError for a node id outside 0..253.
+    `rng`, `observer` and `debug` as for MeshnetworkComponent. Raises ValueError for a node id
+    outside 0..253.
     """
     seals = None
     if security is not None:
@@ -63,6 +64,7 @@ def assemble_node(
             antenna, node_id, keys, seal_rng, clock, configuration.timing
         )
     settings: NodeSettings = {
+        "seals": NO_SEALS if seals is None else seals,
         "timing": configuration.timing,
         "options": configuration.repair_options,
         "observer": observer,

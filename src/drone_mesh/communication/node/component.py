@@ -7,43 +7,178 @@ getters of IMeshDebugInfo.
 
 from __future__ import annotations
 
-import abc
 import math
+import random
 import struct
+from typing import TypedDict
 
-from drone_mesh.communication.control.place_requests import LastPlace, tell_last_places
-from drone_mesh.communication.events.observer import MeshEventKind
+from drone_mesh.communication.control.claims import Claims
+from drone_mesh.communication.control.control_plane import (
+    ControlledNode,
+    IControlHost,
+    IControlPlane,
+    IControlTechnique,
+)
+from drone_mesh.communication.control.delivery import ITechnique
+from drone_mesh.communication.control.node_part import due, receivers, receives, timers
+from drone_mesh.communication.control.pilot import Pilot
+from drone_mesh.communication.control.router_states import RouterStates
+from drone_mesh.communication.data.transport import Transport
+from drone_mesh.communication.events.complaints import Complaints
+from drone_mesh.communication.events.observer import (
+    MeshEventKind,
+    MeshObserver,
+    Reporter,
+    ignore_events,
+)
+from drone_mesh.communication.heartbeats.gateway_plane import GatewayHeartbeats
+from drone_mesh.communication.heartbeats.router_plane import RouterHeartbeats
 from drone_mesh.communication.interfaces import (
     BROADCAST,
     MAX_NODE_ID,
+    NO_SEALS,
     PAYLOAD_BYTES,
     IMeshNetwork,
+    IMeshSeals,
+    IWirelessCommunication,
 )
-from drone_mesh.communication.node.mesh_node import MeshNode
+from drone_mesh.communication.neighbours.common_frame import CommonFrame
+from drone_mesh.communication.neighbours.known_places import KnownPlaces
+from drone_mesh.communication.neighbours.neighbour_table import Neighbours
+from drone_mesh.communication.neighbours.seen_motion import SeenMotion
+from drone_mesh.communication.node.flights import Flights
+from drone_mesh.communication.node.own_id import OwnId
+from drone_mesh.communication.node.snapshots import NodeSnapshots
+from drone_mesh.communication.node.whereabouts import Whereabouts
+from drone_mesh.communication.orders.intake import OrderIntake
+from drone_mesh.communication.repair.options import RepairOptions
+from drone_mesh.communication.reports.node_reports import NodeReporter
+from drone_mesh.communication.routing.interfaces import IRoutingTechnique
 from drone_mesh.communication.timing.deadlines import Deadlines, Due
+from drone_mesh.communication.timing.mesh_timing import MeshTiming
 from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.packet_types import (
+    ABOUT,
     FLOATS,
     TYPES_WITH_PLACES,
+    Handler,
     MessageType,
-    receivers,
 )
-from drone_mesh.drone.location import Location
+from drone_mesh.drone.interfaces import IDroneEngine
 
 _PRESENT = int(MessageType.PRESENT)
 _LOCATION = int(MessageType.LOCATION)
 _MOVE_TO_LOCATION = int(MessageType.MOVE_TO_LOCATION)
 
 
-class MeshnetworkComponent(MeshNode, IMeshNetwork):
-    """One node: receives packets, learns from them, dispatches them."""
+class NodeSettings(TypedDict, total=False):
+    """The arguments of every MeshnetworkComponent that have a default."""
+
+    seals: IMeshSeals
+    timing: MeshTiming | None
+    observer: MeshObserver
+    debug: bool
+    options: RepairOptions | None
+
+
+class MeshnetworkComponent(NodeSnapshots, IMeshNetwork, IControlHost):
+    """One node: receives packets, learns from them, and hands them to its parts."""
+
+    _flights: Flights
+    _whereabouts: Whereabouts
+
+    def __init__(
+        self,
+        node_id: int,
+        antenna: IWirelessCommunication,
+        engine: IDroneEngine,
+        routing: ITechnique,
+        rng: random.Random,
+        states: RouterStates | None,
+        *,
+        seals: IMeshSeals = NO_SEALS,
+        timing: MeshTiming | None = None,
+        observer: MeshObserver = ignore_events,
+        debug: bool = True,
+        options: RepairOptions | None = None,
+    ) -> None:
+        """`rng` spreads simultaneous actions of many nodes; `debug`: the antenna displays the node.
+
+        `states` are those of a router; a gateway has none. `seals` are those of its antenna.
+
+        Raises ValueError for a node id outside 0..253.
+        """
+        if not 0 <= node_id <= MAX_NODE_ID:
+            raise ValueError(f"invalid node id {node_id}: must be 0..{MAX_NODE_ID}")
+        self._node_id = node_id
+        self._antenna = antenna
+        self._has_key = seals.has_key
+        self._rng = rng
+        self._timing = (timing or MeshTiming()).lost_after(routing.connection_lost_after_s)
+        self._options = options or RepairOptions()
+        self._debug = debug
+        self._deadlines = deadlines = Deadlines()
+        check_s, medium = self._timing.check_period_s, antenna.medium
+        asked_s = check_s * max(1.0, medium.place_periods)
+        motion = SeenMotion(self._options.range_m, asked_s)
+        self._neighbours = Neighbours(check_s, noticed_late=medium.shared, motion=motion)
+        self._report = Reporter(node_id, deadlines, observer)
+        self.complaints = complaints = Complaints(node_id)
+        self._own_id = OwnId(rng)
+        self.places = KnownPlaces()
+        self._frame = CommonFrame(engine.frame_digest())
+        self._claims = Claims(
+            self._frame, self.places, complaints, deadlines, self._options.range_m
+        )
+        self._engine = engine
+        self._pilot = Pilot(engine, deadlines, complaints)
+        node = ControlledNode(
+            node_id=node_id,
+            host=self,
+            states=states,
+            timing=self._timing,
+            deadlines=deadlines,
+            report=self._report,
+            complaints=complaints,
+            neighbours=self._neighbours,
+            places=self.places,
+            frame=self._frame,
+            claims=self._claims,
+            pilot=self._pilot,
+            antenna=antenna,
+            seals=seals,
+            rng=rng,
+            range_m=self._options.range_m,
+        )
+        self.control = control = _control_plane(node, routing)
+        self._learn, self._forward = control.learn, control.forward  # called for each packet
+        self._orders = OrderIntake(
+            node_id, control, self._pilot, engine, deadlines, medium, complaints, self._report
+        )
+        self._reporter = NodeReporter(
+            self,
+            control,
+            self._timing.report_period_s,
+            deadlines,
+            self._neighbours,
+            antenna,
+            self._pilot,
+            engine,
+        )
+        self.data = Transport(node_id, control, antenna, seals, deadlines, complaints, rng)
+        # A packet or a timer is for the first part that declares it.
+        self._parts: list[object] = [self, *control.parts, self.data, self._orders, self._reporter]
 
     # Driven from outside ---------------------------------------------------------------------
 
     def start(self, now_s: float) -> None:
         """Start the antenna, and debugging if configured; schedule the first check; introduce."""
         self._deadlines.now_s = now_s
-        self._receivers = receivers(self._drop_unknown, self, self.control, self.data, self._orders)
+        handlers = receivers(self._parts)
+        ignored = [number for number in range(256) if ABOUT[number].handler is Handler.ROUTER]
+        handlers = {**dict.fromkeys(ignored, _ignore), **handlers}
+        self._receivers = [handlers.get(number, self._drop_unknown) for number in range(256)]
+        self._timers = [(int(work), do) for work, do in timers(self._parts)]
         self._antenna.start_antenna(self)
         if self._debug:
             self._antenna.debugging_mode(self, True)
@@ -79,32 +214,11 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
 
     def tick(self, now_s: float) -> None:
         """Do what is due."""
-        deadlines = self._deadlines
-        deadlines.now_s = now_s
-        at_s = deadlines.at_s
-        self.control.on_time(now_s)
-        if now_s >= at_s[Due.ASK_POSITION]:
-            self._watch_flight()
-        if now_s >= at_s[Due.ORDER_REPLIES]:
-            self._orders.on_due()
-        if now_s >= at_s[Due.DATA]:
-            self.data.on_due()
-        if now_s >= at_s[Due.NODE_REPORT]:
-            self._reporter.on_due()
-        if now_s >= at_s[Due.OWN_ID]:
-            deadlines.set(Due.OWN_ID, math.inf)
-            self._antenna.switch_power(True)
-        due_s = at_s[Due.CHECK]
-        if now_s >= due_s:
-            period_s = self._timing.check_period_s
-            deadlines.set(Due.CHECK, due_s + period_s * ((now_s - due_s) // period_s + 1.0))
-            if self._antenna.on():
-                self._check(due_s)
-            else:
-                self._antenna_is_off()
-
-    def _check(self, due_s: float) -> None:
-        self.control.check(due_s)
+        self._deadlines.now_s = now_s
+        at_s = self._deadlines.at_s
+        for work, do in self._timers:
+            if now_s >= at_s[work]:
+                do()
 
     def on_msg(self, payload: bytes, now_s: float) -> None:
         """Learn from a packet, then process or forward it. Bad packets are dropped."""
@@ -132,10 +246,14 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
             self._on_neighbour_found(from_)
         if creator == me:  # it came back, so it teaches no route
             self.control.own_came_back(from_)
-        elif not self._learn(creator, from_, kind, payload):
-            return
+        else:
+            teaches, room = payload, messages.EXTENSION_ROOM.get(kind)
+            if room and self.complaints.is_foreign(from_, now_s):  # the extension is part of a seal
+                teaches = messages.extended(payload, bytes(room))
+            if not self._learn(creator, from_, kind, teaches):
+                return
         if kind == _PRESENT and creator == from_:
-            self._parts.heard_origin(creator, messages.frame_digest(payload))
+            self._claims.heard_origin(creator, messages.frame_digest(payload))
         if kind in TYPES_WITH_PLACES and self._frame.refuses(from_):
             self._drop("a place from a node with another or an unknown origin", payload)
             # From a neighbour that has not introduced itself yet, the order is only dropped: its
@@ -148,7 +266,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
             return
         if forward != me and forward != BROADCAST:
             if kind == _LOCATION:
-                self._on_passing_location(creator, payload)
+                self._whereabouts.on_passing_location(creator, payload)
             self._forward(payload, creator, from_, kind, forward, now_s)
         else:
             self._receivers[kind](payload, creator, from_)
@@ -186,71 +304,25 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
         self._deadlines.now_s = now_s
         self.control.on_registered()
 
-    # Implemented by router and gateway -------------------------------------------------------
+    # Its own timers and packets --------------------------------------------------------------
 
-    @property
-    def _served(self) -> bool:
-        """Whether the mesh knows this node, so that another one with its id gives way to it."""
-        return True  # a gateway is looked for as soon as it starts
+    @due(Due.CHECK)
+    def _on_check(self) -> None:
+        now_s, due_s = self._deadlines.now_s, self._deadlines.at_s[Due.CHECK]
+        period_s = self._timing.check_period_s
+        self._deadlines.set(Due.CHECK, due_s + period_s * ((now_s - due_s) // period_s + 1.0))
+        if self._antenna.on():
+            self._check(due_s)
+        else:
+            self._antenna_is_off()
 
-    def _begin(self) -> None:
-        """Start this kind of node, before routing starts."""
+    @due(Due.OWN_ID)
+    def _return_with_own_id(self) -> None:
+        self._deadlines.set(Due.OWN_ID, math.inf)
+        self._antenna.switch_power(True)
 
-    def _antenna_is_off(self) -> None:
-        """Called when the antenna is off: it was switched off, or a check finds it so."""
-
-    def _on_passing_location(self, creator: int, payload: bytes) -> None:
-        """A LOCATION for another node is about to be forwarded."""
-
-    @abc.abstractmethod
-    def _on_location(
-        self, node: int, location: Location, is_goal: bool, gateway: messages.GatewayPlace | None
-    ) -> None:
-        """`node` reports its place, or where it flies to, and perhaps the place of a gateway."""
-
-    def _on_goal(self, neighbour: int, goal: Location) -> None:
-        """A neighbour announces where it is about to fly."""
-
-    def _on_neighbour_found(self, node: int) -> None:
-        """A packet arrived from a node that was not a neighbour."""
-
-    # Receiving: methods for types that every node handles, beside those of its parts -------------
-
-    def receive_location(self, payload: bytes, creator: int, from_: int) -> None:
-        """A node's place or goal, and perhaps the place of a gateway."""
-        location, is_goal = messages.place_in(payload), messages.is_goal(payload)
-        self._on_location(creator, location, is_goal, messages.GatewayPlace.from_payload(payload))
-        if is_goal and creator == from_ and messages.addressee(payload) == BROADCAST:
-            self._on_goal(creator, location)
-
-    def receive_requestlocation(self, payload: bytes, creator: int, from_: int) -> None:
-        """Answer with this node's place; to a drone in flight also with those of silent ones."""
-        asker = messages.place_of_asker(payload)
-        if asker is None or creator == self._node_id or self._frame.refuses(from_):
-            self._send_location(creator)
-            return
-        place, flies_there = asker
-        if flies_there:
-            self._neighbours.motion.flies_for_repair(creator, self._deadlines.now_s)
-        self._neighbours.set_place(creator, place, self._deadlines.now_s, flies_there)
-        self._on_place_taken(place)
-        self._send_location(creator)
-        if flies_there:
-            tell_last_places(self._parts, creator, place, self._options.clearance_m)
-
-    def receive_last_place(self, payload: bytes, _creator: int, _from: int) -> None:
-        """Where another node was last heard."""
-        last = LastPlace.from_payload(payload)
-        if last.node != self._node_id:
-            self._on_last_place(last)
-
-    def receive_gateway_place(self, payload: bytes, _creator: int, _from: int) -> None:
-        """Ignored here: only a router may fly to where a gateway was."""
-
-    def receive_movement_negotiation(self, payload: bytes, creator: int, from_: int) -> None:
-        """Ignored here: only a router takes part in the election of a drone."""
-
-    def receive_seal_challenge(self, payload: bytes, creator: int, _from: int) -> None:
+    @receives(MessageType.SEAL_CHALLENGE)
+    def _on_seal_challenge(self, payload: bytes, creator: int, _from: int) -> None:
         """Log that a neighbour has a key and this node has none."""
         reason = f"a neighbour, node {creator}, has a mesh key and this node has none"
         self.complaints.foreign(creator, reason, payload, self._deadlines.now_s)
@@ -261,39 +333,41 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
     def _drop(self, reason: str, payload: bytes) -> None:
         self.complaints.dropped(reason, payload, self._deadlines.now_s)
 
-    def _on_place_taken(self, place: Location) -> None:
-        """Called when a node that asks for places is at `place` or flies there."""
+    # What a router or a gateway does besides -------------------------------------------------
 
-    def _on_last_place(self, last: LastPlace) -> None:
-        """A node reports where another one was last heard."""
-        heard_s = self._deadlines.now_s - last.age_s
-        self._neighbours.passes(last.node, last.place, heard_s)
+    @property
+    def _served(self) -> bool:
+        """Whether the mesh knows this node, so that another one with its id gives way to it."""
+        return True  # a gateway is looked for as soon as it starts
 
-    def _send_location(self, asker: int) -> None:
-        goal = self._pilot.goal
-        location = goal or self._pilot.location()
-        if location is not None:
-            me, now_s, places = self._node_id, self._deadlines.now_s, self.places
-            answer = messages.own_location(location, goal is not None, now_s, me, asker)
-            if places.gateway is not None:
-                gateway, age_s = self.get_preferred_gateway(), now_s - places.gateway_seen_s
-                extension = messages.GatewayPlace(gateway, places.gateway, age_s)
-                if self._parts.has_key:
-                    self._parts.delivery.send_own(extension.to_payload(me, me, asker, asker))
-                else:
-                    answer = extension.appended_to(answer)
-            self._parts.delivery.send_own(answer)
+    def _begin(self) -> None:
+        """Start this kind of node, before routing starts."""
 
-    # Flight ----------------------------------------------------------------------------------
+    def _check(self, due_s: float) -> None:
+        self.control.check(due_s)
 
-    def _watch_flight(self) -> None:
-        if self._pilot.watch():
-            self._landed()
+    def _antenna_is_off(self) -> None:
+        """Called when the antenna is off: it was switched off, or a check finds it so."""
 
-    def _landed(self) -> None:
-        """The drone is at another place and has other neighbours."""
-        self._neighbours.forget_all()
-        self.control.routes.node_moved_location()
-        self._report(MeshEventKind.LANDED)
-        self.control.introduce()
-        self._orders.on_landed()
+    def _on_neighbour_found(self, node: int) -> None:
+        """A packet arrived from a node that was not a neighbour."""
+
+    # For the control plane -------------------------------------------------------------------
+
+    def on_node_missing(self, node: int, told: bool) -> None:
+        """Messages for it may not arrive."""
+        self.data.on_node_missing(node)
+
+
+def _control_plane(node: ControlledNode, routing: ITechnique) -> IControlPlane:
+    if isinstance(routing, IControlTechnique):
+        return routing.control_plane(node)
+    if not isinstance(routing, IRoutingTechnique):
+        raise TypeError(f"{type(routing).__name__} is no technique")
+    if node.states is None:
+        return GatewayHeartbeats(node, routing)
+    return RouterHeartbeats(node, routing, node.states)
+
+
+def _ignore(_payload: bytes, _creator: int, _from: int) -> None:
+    """A packet for routers has reached a gateway."""

@@ -16,15 +16,13 @@ from drone_mesh.communication.interfaces import (
     IWirelessCommunication,
     KnownNode,
 )
-from drone_mesh.communication.node.component import MeshnetworkComponent
-from drone_mesh.communication.node.mesh_node import NodeSettings
+from drone_mesh.communication.node.component import MeshnetworkComponent, NodeSettings
+from drone_mesh.communication.node.flights import Flights
+from drone_mesh.communication.node.whereabouts import Whereabouts
 from drone_mesh.communication.order_record import OrderRecord
 from drone_mesh.communication.orders.book import OrderBook
-from drone_mesh.communication.orders.final_places import check_place
-from drone_mesh.communication.orders.messages import OrderReply
+from drone_mesh.communication.orders.final_places import FinalPlaces
 from drone_mesh.communication.reports.node_reports import ReportBook, ReportedNode
-from drone_mesh.communication.timing.deadlines import Due
-from drone_mesh.communication.wire.messages import GatewayPlace, type_of
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
@@ -49,25 +47,39 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         rng: random.Random,
         **settings: Unpack[NodeSettings],
     ) -> None:
-        """Like MeshNode; orders arrive through `internet`."""
+        """Like MeshnetworkComponent; orders arrive through `internet`."""
         super().__init__(node_id, antenna, engine, routing, rng, None, **settings)
+        control, deadlines, medium = self.control, self._deadlines, antenna.medium
         self._internet = internet
         self._internet_works = True
         self._heartbeats: dict[int, tuple[int, float]] = {}  # by creator: hops, when
-        self._reports = ReportBook()
-        self._book = OrderBook(self._parts, self._may_find, self.control.search)
-        self._orders.on_own_reply = self._book.on_outcome
+        self._reports = ReportBook(deadlines)
+        self._book = self._orders.book = OrderBook(
+            node_id, control, deadlines, medium, self.complaints, self._report, self._may_find
+        )
+        self._final_places = FinalPlaces(
+            node_id, control, deadlines, self._pilot, self._neighbours, self._options.clearance_m
+        )
+        self._whereabouts = Whereabouts(
+            node_id,
+            control,
+            deadlines,
+            self._pilot,
+            self._neighbours,
+            self.places,
+            self._frame,
+            self._options.clearance_m,
+            self._has_key,
+        )
+        self._flights = self._orders.flights = Flights(
+            self._pilot, self._neighbours, control, self._orders, self._report
+        )
+        self._parts += [self._book, self._reports, self._whereabouts, self._flights]
 
     def stop(self) -> None:
         """Stop the internet connection, the antenna and debugging."""
         self._internet.disconnect()
         super().stop()
-
-    def tick(self, now_s: float) -> None:
-        """Do what is due."""
-        super().tick(now_s)
-        if now_s >= self._deadlines.at_s[Due.ORDERS]:
-            self._book.on_due()
 
     def set_internet(self, works: bool, now_s: float) -> None:
         """Its connection to the outside world works again, or no longer.
@@ -81,10 +93,6 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
             self.control.on_internet(works)
             kind = MeshEventKind.CONNECTED if works else MeshEventKind.DISCONNECTED
             self._report(kind, self._node_id)
-
-    def get_connected_to_gateway(self) -> bool:
-        """True while its internet works; otherwise whether it reaches another gateway."""
-        return self.control.hops != NO_ROUTE
 
     def send_goal_request_to_drone(
         self,
@@ -108,7 +116,7 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         goal = Location(latitude, longitude, height)
         if not allow_shared_place:
             orders, reports = self._book.records(), self._reports.nodes()
-            check_place(self._parts, orders, reports, node_id, goal, self._options.clearance_m)
+            self._final_places.check(node_id, goal, orders, reports)
         number = self._book.enter(node_id, goal)
         if node_id != self._node_id:
             return self._book.send(number)
@@ -149,20 +157,6 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         self._heartbeats[node] = (min(hops, NO_ROUTE), self._deadlines.now_s)
         self._book.on_found(node)
 
-    def receive_node_report(self, payload: bytes, creator: int, _from: int) -> None:
-        """Keep the report."""
-        self._reports.on_packet(creator, type_of(payload), payload, self._deadlines.now_s)
-
-    receive_node_words = receive_node_report
-
-    def receive_order_reply(self, payload: bytes, creator: int, _from: int) -> None:
-        """Enter the reply into the book of orders."""
-        reply = OrderReply.from_payload(payload)
-        if reply is None:
-            self._drop("an invalid reply to an order", payload)
-        else:
-            self._book.on_reply(creator, reply)
-
     def _may_find(self, node: int) -> bool:
         """Whether a search could find this node.
 
@@ -176,12 +170,3 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
 
     def _begin(self) -> None:
         self._internet.connect(self)
-
-    def _on_location(
-        self, node: int, location: Location, is_goal: bool, gateway: GatewayPlace | None
-    ) -> None:
-        now_s = self._deadlines.now_s
-        self._neighbours.set_place(node, location, now_s, is_goal)
-        if node == self.control.gateway:
-            self.places.update_gateway(location, now_s)
-            self.control.gateway_sent_place()

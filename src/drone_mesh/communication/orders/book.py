@@ -9,13 +9,20 @@ import math
 from dataclasses import dataclass, field
 from typing import Callable, Iterable
 
-from drone_mesh.communication.control.parts import NodeParts
-from drone_mesh.communication.events.observer import MeshEventKind, explanation
-from drone_mesh.communication.heartbeats.node_search import NUMBERS_PER_S, SEARCH_EVERY_S
+from drone_mesh.communication.control.control_plane import (
+    NUMBERS_PER_S,
+    SEARCH_AGAIN_S,
+    IControlPlane,
+)
+from drone_mesh.communication.control.node_part import due, receives
+from drone_mesh.communication.events.complaints import Complaints
+from drone_mesh.communication.events.observer import MeshEventKind, Reporter, explanation
 from drone_mesh.communication.order_record import OrderRecord, OrderState
 from drone_mesh.communication.orders.messages import OrderOutcome, OrderQuery, OrderReply
-from drone_mesh.communication.timing.deadlines import Due
+from drone_mesh.communication.timing.deadlines import Deadlines, Due
+from drone_mesh.communication.timing.medium import Medium
 from drone_mesh.communication.wire.messages import GoToLocationMessage, with_order_number
+from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.communication.wire.text_parts import TextAssembly
 from drone_mesh.drone.location import Location
 
@@ -74,19 +81,20 @@ class _Order:
     dropped_parts: TextAssembly = field(default_factory=TextAssembly)
 
 
+@dataclass(eq=False)
 class OrderBook:
     """The orders of one gateway. Only its component calls it."""
 
-    def __init__(
-        self, parts: NodeParts, may_find: Callable[[int], bool], search: Callable[[int], bool]
-    ) -> None:
-        """`may_find`: whether a search could find this drone, to which there is no route.
+    _node_id: int
+    _control: IControlPlane
+    _deadlines: Deadlines
+    _medium: Medium
+    _complaints: Complaints
+    _report_event: Reporter
+    _may_find: Callable[[int], bool]  # whether a search could find a drone without a route
 
-        `search` starts one; False: too soon after another.
-        """
-        self._parts = parts
-        self._may_find = may_find
-        self._search = search
+    def __post_init__(self) -> None:
+        self._slowness = self._medium.stretched(1.0)
         self._orders: dict[int, _Order] = {}  # oldest first
         self._last_number = 0
 
@@ -107,7 +115,7 @@ class OrderBook:
 
     def enter(self, drone: int, goal: Location) -> int:
         """Record a new order; returns its number."""
-        now_s = self._parts.now_s
+        now_s = self._deadlines.now_s
         number = self._next_number()
         self._orders[number] = _Order(number, drone, goal, now_s, changed_s=now_s, heard_s=now_s)
         self._forget_old()
@@ -158,15 +166,21 @@ class OrderBook:
             if order.copies and order.due_s == math.inf:
                 self._wait(order, REPEAT_AFTER_S[order.unanswered])
             return order.copies > 0
-        if self._search(order.drone):
+        if self._control.search(order.drone):
             order.searches += 1
             self._wait(order, FOUND_WITHIN_S)
         else:
-            self._wait(order, SEARCH_EVERY_S)
+            self._wait(order, SEARCH_AGAIN_S)
         return True
 
-    def on_reply(self, drone: int, reply: OrderReply) -> None:
+    @receives(MessageType.ORDER_REPLY)
+    def on_reply(self, payload: bytes, drone: int, _from: int) -> None:
         """A part of a drone's reply; acts when the last missing part has arrived."""
+        reply = OrderReply.from_payload(payload)
+        if reply is None:
+            what, now_s = "an invalid reply to an order", self._deadlines.now_s
+            self._complaints.dropped(what, payload, now_s)
+            return
         order = self._orders.get(reply.number)
         if order is None:
             return
@@ -184,19 +198,20 @@ class OrderBook:
         order = self._orders.get(number)
         if order is None or order.settled:
             return
-        order.unanswered, order.heard_s = 0, self._parts.now_s
+        order.unanswered, order.heard_s = 0, self._deadlines.now_s
         if outcome is OrderOutcome.UNKNOWN:
             reason = "the drone no longer knows this order"
         order.settled = outcome is not OrderOutcome.ACCEPTED
         if outcome in (OrderOutcome.ACCEPTED, OrderOutcome.ARRIVED):
             self._replace(order, self._older(order), for_good=True)
         self._move(order, _STATE_AFTER[outcome], reason)
-        is_own = order.drone == self._parts.node_id
+        is_own = order.drone == self._node_id
         self._wait(order, math.inf if order.settled or is_own else QUERY_PERIOD_S)
 
+    @due(Due.ORDERS)
     def on_due(self) -> None:
         """Repeat orders without a reply, and query drones that are under way."""
-        now_s = self._parts.now_s
+        now_s = self._deadlines.now_s
         for order in list(self._orders.values()):
             if order.due_s <= now_s:
                 self._pursue(order)
@@ -225,22 +240,22 @@ class OrderBook:
             if order.unanswered > MOST_QUERIES:
                 self._lost(order, "it fell silent on its way")
                 return
-            query = OrderQuery.packet(order.number, self._parts.node_id, order.drone)
+            query = OrderQuery.packet(order.number, self._node_id, order.drone)
             if has_route:
-                self._parts.delivery.send_own(query)
+                self._control.delivery.send_own(query)
             self._wait(order, QUERY_PERIOD_S)
 
     def _has_route(self, order: _Order) -> bool:
         """Without one nothing is repeated: the drone may be in flight, out of reach."""
-        return self._parts.routing.may_reach(order.drone)
+        return self._control.routes.may_reach(order.drone)
 
     def _send(self, order: _Order) -> bool:
-        taken = self._parts.delivery.send_own(self._packet(order))
+        taken = self._control.delivery.send_own(self._packet(order))
         order.copies += taken
         return taken
 
     def _packet(self, order: _Order) -> bytes:
-        me, to = self._parts.node_id, order.drone
+        me, to = self._node_id, order.drone
         latitude, longitude, height = order.goal
         packet = GoToLocationMessage(me, me, to, to, latitude, longitude, int(height)).to_payload()
         return with_order_number(packet, order.number)
@@ -269,7 +284,7 @@ class OrderBook:
     def _move(self, order: _Order, state: OrderState, reason: str = "") -> None:
         if state is order.state:
             return
-        order.state, order.reason, order.changed_s = state, reason, self._parts.now_s
+        order.state, order.reason, order.changed_s = state, reason, self._deadlines.now_s
         order.due_s = math.inf
         order.seeking = False
         self._report(order)
@@ -279,17 +294,17 @@ class OrderBook:
         if order.state in _FAILURES:
             words = explanation(number, goal, order.state.in_words(order.reason))
             reason = f"an order for drone {order.drone} failed"
-            self._parts.complaints.add(reason, words, self._parts.now_s)
-        self._parts.report(EVENT_OF[order.state], order.drone, order.reason, number, goal)
+            self._complaints.add(reason, words, self._deadlines.now_s)
+        self._report_event(EVENT_OF[order.state], order.drone, order.reason, number, goal)
 
     def _wait(self, order: _Order, seconds: float) -> None:
         """Repeat or query after so many seconds, on a slow medium more."""
-        order.due_s = self._parts.now_s + self._parts.antenna.medium.stretched(seconds)
+        order.due_s = self._deadlines.now_s + seconds * self._slowness
         self._schedule()
 
     def _schedule(self) -> None:
         due_s = min((order.due_s for order in self._orders.values()), default=math.inf)
-        self._parts.deadlines.set(Due.ORDERS, due_s)
+        self._deadlines.set(Due.ORDERS, due_s)
 
     def _open_for(self, drone: int) -> list[_Order]:
         return [
@@ -304,6 +319,6 @@ class OrderBook:
 
     def _next_number(self) -> int:
         if not self._last_number:
-            self._last_number = int(self._parts.now_s * NUMBERS_PER_S) % HIGHEST_NUMBER
+            self._last_number = int(self._deadlines.now_s * NUMBERS_PER_S) % HIGHEST_NUMBER
         self._last_number = self._last_number % HIGHEST_NUMBER + 1
         return self._last_number

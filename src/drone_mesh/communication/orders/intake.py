@@ -8,14 +8,21 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass
-from typing import Callable
+from typing import Protocol
 
-from drone_mesh.communication.control.parts import NodeParts
-from drone_mesh.communication.events.observer import MeshEventKind
+from drone_mesh.communication.control.control_plane import IControlPlane
+from drone_mesh.communication.control.node_part import due, receives
+from drone_mesh.communication.control.pilot import Pilot
+from drone_mesh.communication.events.complaints import Complaints
+from drone_mesh.communication.events.observer import MeshEventKind, Reporter
+from drone_mesh.communication.orders.book import OrderBook
 from drone_mesh.communication.orders.messages import OrderOutcome, OrderQuery, reply_packets
-from drone_mesh.communication.timing.deadlines import Due
+from drone_mesh.communication.timing.deadlines import Deadlines, Due
+from drone_mesh.communication.timing.medium import Medium
 from drone_mesh.communication.wire.messages import GoToLocationMessage, order_number
+from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.drone.goal import check_goal
+from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused
 
@@ -24,8 +31,12 @@ ARRIVED_WITHIN_M = 1.5  # a MAVLink drone has arrived within 1 m (drone/route.py
 REPLY_AGAIN_S = 1.0  # how often a reply without a route is retried
 REPLY_TRIES = 120  # then the gateway queries
 
-OwnReply = Callable[[int, OrderOutcome, str], None]
-"""Receives replies of the gateway's own drone: order number, outcome, reason."""
+
+class ITakesOff(Protocol):
+    """Who must know of flights."""
+
+    def took_off(self) -> None:
+        """The drone leaves its place because of an order."""
 
 
 @dataclass
@@ -38,23 +49,32 @@ class _KnownOrder:
     tries_left: int = 0  # to send the latest outcome
 
 
+@dataclass(eq=False)
 class OrderIntake:
     """Checks the orders for one drone, starts its flights, and replies to numbered orders."""
 
-    def __init__(self, parts: NodeParts, took_off: Callable[[], None]) -> None:
-        """`took_off` is called when an order has started a flight."""
-        self._parts = parts
-        self._took_off = took_off
-        self._known: deque[_KnownOrder] = deque(maxlen=ORDERS_KEPT)
-        self.on_own_reply: OwnReply = _ignore
+    _node_id: int
+    _control: IControlPlane
+    _pilot: Pilot
+    _engine: IDroneEngine
+    _deadlines: Deadlines
+    _medium: Medium
+    _complaints: Complaints
+    _report: Reporter
 
-    def receive_move_to_location(self, payload: bytes, creator: int, _from: int) -> None:
+    def __post_init__(self) -> None:
+        self.flights: ITakesOff  # set by the node, like the book
+        self.book: OrderBook | None = None  # a gateway's: its own drone replies to it
+        self._known: deque[_KnownOrder] = deque(maxlen=ORDERS_KEPT)
+
+    @receives(MessageType.MOVE_TO_LOCATION)
+    def on_order(self, payload: bytes, creator: int, _from: int) -> None:
         """An order from the air: accepted, or refused with a log line."""
         order = GoToLocationMessage.from_payload(payload)
         try:
             self.take(creator, order.location, order_number(payload))
         except GoalRefused as error:
-            self._parts.complaints.add("order refused", str(error), self._parts.now_s)
+            self._complaints.add("order refused", str(error), self._deadlines.now_s)
 
     def take(self, gateway: int, goal: Location, number: int = 0) -> None:
         """Fly to `goal`, unless the drone already does: two gateways may order the same flight.
@@ -79,8 +99,8 @@ class OrderIntake:
                 self._reply(other, OrderOutcome.REPLACED, _by(order, other.gateway))
         self._reply(order, OrderOutcome.ACCEPTED)
         if starts:
-            self._parts.report(MeshEventKind.FLIGHT_ORDERED, gateway, order=number, place=goal)
-            self._took_off()
+            self._report(MeshEventKind.FLIGHT_ORDERED, gateway, order=number, place=goal)
+            self.flights.took_off()
 
     def on_foreign_order(self, order: GoToLocationMessage, number: int, passed_by: int) -> None:
         """An order from a neighbour whose places may refer to another frame: not flown."""
@@ -94,11 +114,12 @@ class OrderIntake:
         """An order for another drone, dropped here for the same reason: tell its gateway."""
         if number:
             reason = f"node {passed_by} has another --origin"
-            me, gateway = self._parts.node_id, order.creator
+            me, gateway = self._node_id, order.creator
             for packet in reply_packets(number, OrderOutcome.REFUSED, reason, me, gateway):
-                self._parts.delivery.send_own(packet)
+                self._control.delivery.send_own(packet)
 
-    def receive_order_query(self, payload: bytes, gateway: int, _from: int) -> None:
+    @receives(MessageType.ORDER_QUERY)
+    def on_query(self, payload: bytes, gateway: int, _from: int) -> None:
         """A gateway queries the state of an order."""
         number = OrderQuery.number_in(payload)
         known = self._find(gateway, number)
@@ -113,7 +134,7 @@ class OrderIntake:
         orders = self._under_way()
         if not orders:
             return
-        pilot, engine = self._parts.pilot, self._parts.engine
+        pilot, engine = self._pilot, self._engine
         here = pilot.location()
         why = engine.why_ended() or engine.why_not_fly() or pilot.flight_end
         for order in orders:
@@ -126,9 +147,10 @@ class OrderIntake:
             else:
                 self._reply(order, OrderOutcome.GIVEN_UP, f"{why}; {off_m:.1f} m from the goal")
 
+    @due(Due.ORDER_REPLIES)
     def on_due(self) -> None:
         """Send the replies that had no route before."""
-        self._parts.deadlines.set(Due.ORDER_REPLIES, math.inf)
+        self._deadlines.set(Due.ORDER_REPLIES, math.inf)
         for order in self._known:
             if order.tries_left:
                 self._send(order)
@@ -136,13 +158,12 @@ class OrderIntake:
     def _obey(self, goal: Location) -> bool:
         """Start the flight; returns False if the drone already flies there."""
         check_goal(*goal)
-        pilot = self._parts.pilot
-        why_not = self._parts.engine.why_not_fly()
+        why_not = self._engine.why_not_fly()
         if why_not:
-            raise GoalRefused(f"drone {self._parts.node_id} cannot fly: {why_not}")
-        if pilot.goal == goal:
+            raise GoalRefused(f"drone {self._node_id} cannot fly: {why_not}")
+        if self._pilot.goal == goal:
             return False
-        pilot.obey(goal)
+        self._pilot.obey(goal)
         return True
 
     def _find(self, gateway: int, number: int) -> _KnownOrder | None:
@@ -162,26 +183,25 @@ class OrderIntake:
 
     def _reply(self, order: _KnownOrder, outcome: OrderOutcome, reason: str = "") -> None:
         order.outcome, order.reason = outcome, reason
-        if order.gateway == self._parts.node_id:
-            self.on_own_reply(order.number, outcome, reason)
+        if order.gateway == self._node_id:
+            if self.book is not None:
+                self.book.on_outcome(order.number, outcome, reason)
         elif order.number:
             order.tries_left = REPLY_TRIES
             self._send(order)
 
     def _send(self, order: _KnownOrder) -> None:
         """Send the reply towards its gateway; right after a landing there is no route yet."""
-        parts = self._parts
         packets = reply_packets(
-            order.number, order.outcome, order.reason, parts.node_id, order.gateway
+            order.number, order.outcome, order.reason, self._node_id, order.gateway
         )
-        has_route = parts.routing.may_reach(order.gateway)
-        if has_route and all([parts.delivery.send_own(packet) for packet in packets]):
+        delivery, has_route = self._control.delivery, self._control.routes.may_reach(order.gateway)
+        if has_route and all([delivery.send_own(packet) for packet in packets]):
             order.tries_left = 0
         elif order.tries_left:
             order.tries_left -= 1
-            parts.deadlines.set(
-                Due.ORDER_REPLIES, parts.now_s + parts.antenna.medium.stretched(REPLY_AGAIN_S)
-            )
+            again_s = self._medium.stretched(REPLY_AGAIN_S)
+            self._deadlines.set(Due.ORDER_REPLIES, self._deadlines.now_s + again_s)
 
 
 def _by(order: _KnownOrder, gateway: int) -> str:
@@ -193,7 +213,3 @@ def _by(order: _KnownOrder, gateway: int) -> str:
 
 
 _NOWHERE = Location(math.nan, math.nan, math.nan)
-
-
-def _ignore(_number: int, _outcome: OrderOutcome, _reason: str) -> None:
-    """A router's own drone gets no orders from itself."""

@@ -5,24 +5,29 @@ from __future__ import annotations
 import abc
 import math
 from collections import deque
+from dataclasses import dataclass
 from typing import Mapping, NamedTuple
 
 from drone_mesh.communication.control.control_plane import IControlPlane
-from drone_mesh.communication.control.parts import NodeParts
-from drone_mesh.communication.control.place_requests import ask_all_for_places, ask_for_place
+from drone_mesh.communication.control.pilot import Pilot
+from drone_mesh.communication.control.place_requests import PlaceRequests
 from drone_mesh.communication.control.router_states import RepairState, RouterEvent, RouterStates
-from drone_mesh.communication.events.observer import MeshEventKind
-from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE
+from drone_mesh.communication.events.observer import MeshEventKind, Reporter
+from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE, IWirelessCommunication
+from drone_mesh.communication.neighbours.known_places import KnownPlaces
+from drone_mesh.communication.neighbours.neighbour_table import Neighbours
 from drone_mesh.communication.repair.heights import may_be_flown_to
 from drone_mesh.communication.repair.options import RepairOptions
 from drone_mesh.communication.repair.spots import NEAR, PITCH
-from drone_mesh.communication.timing.deadlines import Due
+from drone_mesh.communication.timing.deadlines import Deadlines, Due
+from drone_mesh.communication.timing.mesh_timing import MeshTiming
 from drone_mesh.communication.wire.messages import (
     GatewayPlace,
     MovementNegotiationMessage,
     addressed,
     own_location,
 )
+from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
 
 RADIO_FAILED = "its radio does not work"
@@ -45,32 +50,36 @@ class NeighbourView(NamedTuple):
     hops: int  # to its gateway, as last reported; 255: it has none
 
 
+@dataclass(eq=False)
 class RepairActions(abc.ABC):
     """A strategy's view of its router, and its possible actions. Places in metres, x east.
 
     ConnectionRepair adds what changes the course of a repair.
     """
 
-    def __init__(
-        self,
-        parts: NodeParts,
-        states: RouterStates,
-        control: IControlPlane,
-        options: RepairOptions,
-    ) -> None:
-        self.node_id = parts.node_id
-        self.medium = parts.antenna.medium
-        self.range_m = options.range_m  # of the radio, as far as known
-        self.clearance_m = options.clearance_m  # least distance between drones at rest
-        self.check_period_s = parts.timing.check_period_s
+    node_id: int
+    _states: RouterStates
+    _control: IControlPlane
+    _options: RepairOptions
+    _timing: MeshTiming
+    _deadlines: Deadlines
+    _antenna: IWirelessCommunication
+    _engine: IDroneEngine
+    _pilot: Pilot
+    _requests: PlaceRequests
+    _neighbours: Neighbours
+    _places: KnownPlaces
+    _report: Reporter
+
+    def __post_init__(self) -> None:
+        self.medium = self._antenna.medium
+        self.range_m = self._options.range_m  # of the radio, as far as known
+        self.clearance_m = self._options.clearance_m  # least distance between drones at rest
+        self.check_period_s = self._timing.check_period_s
         # The time without a gateway until the emergency
-        self.connection_lost_after_s = parts.timing.connection_lost_after_s
+        self.connection_lost_after_s = self._timing.connection_lost_after_s
         # For so long a bid counts, and the bids of neighbours are awaited
-        self.bids_within_s = control.bids_within_s
-        self._parts = parts
-        self._states = states
-        self._control = control
-        self._options = options
+        self.bids_within_s = self._control.bids_within_s
         self._tried_goals: list[Location] = []  # goals of this drone since it was last connected
         self._tried_spots: deque[Location] = deque(maxlen=TRIED_SPOTS)  # where it landed for these
 
@@ -79,7 +88,7 @@ class RepairActions(abc.ABC):
     @property
     def now_s(self) -> float:
         """The time, in seconds of the core's clock."""
-        return self._parts.now_s
+        return self._deadlines.now_s
 
     @property
     def connected(self) -> bool:
@@ -94,33 +103,33 @@ class RepairActions(abc.ABC):
     @property
     def silent(self) -> bool:
         """Whether all neighbours (2 or more) fell silent together, so the medium may be down."""
-        return self._parts.neighbours.silent
+        return self._neighbours.silent
 
     def hears_power(self) -> bool | None:
         """Whether there is power in the channel of its radio now; None: it cannot measure it."""
-        return self._parts.antenna.hears_power()
+        return self._antenna.hears_power()
 
     def neighbours(self) -> Mapping[int, NeighbourView]:
         """The nodes in direct reach."""
-        return {node: self._view(node) for node in self._parts.routing.get_set_of_children()}
+        return {node: self._view(node) for node in self._control.routes.get_set_of_children()}
 
     def is_unheard(self) -> bool:
         """Whether this node hears others but none of them hears it."""
-        return bool(self._parts.neighbours.deaf()) and not self.neighbours()
+        return bool(self._neighbours.deaf()) and not self.neighbours()
 
     def reachable(self) -> Mapping[int, NeighbourView]:
         """All nodes with a route to them and a reported place."""
-        places = self._parts.neighbours.places()
+        places = self._neighbours.places()
         return {node: self._view(node) for node in places if self.reaches(node)}
 
     def reaches(self, node: int) -> bool:
         """Whether there is a route to `node`."""
-        return self._parts.routing.get_direction_to_node(node) != NO_ROUTE
+        return self._control.routes.get_direction_to_node(node) != NO_ROUTE
 
     @property
     def lost_next_hop(self) -> int:
         """The next hop to the gateway before the connection was lost; NO_ROUTE: unknown."""
-        return self._parts.places.good_id
+        return self._places.good_id
 
     @property
     def steps(self) -> list[Step]:
@@ -128,7 +137,7 @@ class RepairActions(abc.ABC):
 
         The last one has the owner NO_ROUTE; it is for a drone that has no other.
         """
-        places, gateway = self._parts.places, self._control.gateway
+        places, gateway = self._places, self._control.gateway
         candidates = [
             (places.good, places.good_id),
             (places.gateway, gateway),
@@ -143,20 +152,20 @@ class RepairActions(abc.ABC):
     @property
     def gateway_place(self) -> Location | None:
         """The last reported place of the preferred gateway."""
-        return self._parts.places.gateway
+        return self._places.gateway
 
     def own_place(self) -> Location | None:
         """The position of this drone; None: unknown."""
-        return self._parts.pilot.location()
+        return self._pilot.location()
 
     def why_not_fly(self) -> str:
         """Why the drone cannot fly for a repair; empty if it can.
 
         Without a radio it would be connected nowhere, and tell nobody where it lands.
         """
-        if not self._parts.antenna.works():
+        if not self._antenna.works():
             return RADIO_FAILED
-        return self._parts.engine.why_not_repair()
+        return self._engine.why_not_repair()
 
     @abc.abstractmethod
     def goal_of(self, step: Step) -> Location:
@@ -165,7 +174,7 @@ class RepairActions(abc.ABC):
     def was_at(self, step: Step) -> bool:
         """Whether this drone is at the step's place, or flew there since its last connection."""
         radius_m = self.clearance_m * (2 * PITCH if step.home else NEAR)
-        here = self._parts.pilot.place() if step.owner == NO_ROUTE else None
+        here = self._pilot.place() if step.owner == NO_ROUTE else None
         places = [*self._tried_goals, *filter(None, [here])]
         return any(step.place.distance_m(place) < radius_m for place in places)
 
@@ -200,21 +209,21 @@ class RepairActions(abc.ABC):
         packet = MovementNegotiationMessage(creator, me, me, me, score).to_payload()
         if about is not None:
             packet = GatewayPlace(self._control.gateway, about, 0.0).appended_to(packet)
-        for neighbour in sorted(self._parts.routing.get_set_of_children() - {creator, but_not_to}):
-            self._parts.delivery.send_own(addressed(packet, neighbour))
+        for neighbour in sorted(self._control.routes.get_set_of_children() - {creator, but_not_to}):
+            self._control.delivery.send_own(addressed(packet, neighbour))
 
     def ask_places(self) -> None:
         """Request the places of all nodes in range; the answers arrive in `on_place`."""
-        ask_all_for_places(self._parts)
+        self._requests.ask_all()
 
     def ask_place(self, node: int) -> None:
         """Request the place of one node, along the route to it."""
-        ask_for_place(self._parts, node)
+        self._requests.ask(node)
 
     def announce_place(self, place: Location) -> None:
         """Send the place to which this drone flies to all nodes in range."""
         packet = own_location(place, True, self.now_s, self.node_id, BROADCAST)
-        self._parts.antenna.broadcast_message(packet)
+        self._antenna.broadcast_message(packet)
 
     def present(self) -> None:
         """Introduce this node to all nodes in range."""
@@ -222,7 +231,7 @@ class RepairActions(abc.ABC):
 
     def wait_until(self, at_s: float) -> None:
         """Call `on_time` at this time instead of an earlier request; infinity: not at all."""
-        self._parts.deadlines.set(Due.REPAIR, at_s)
+        self._deadlines.set(Due.REPAIR, at_s)
 
     def happened(self, event: RouterEvent) -> None:
         """Change the states of the router (see router_states). An election needs this."""
@@ -234,10 +243,10 @@ class RepairActions(abc.ABC):
 
     def report(self, kind: MeshEventKind, peer: int = NO_ROUTE, detail: str = "") -> None:
         """Report an event to the node's observer."""
-        self._parts.report(kind, peer, detail)
+        self._report(kind, peer, detail)
 
     def _view(self, node: int) -> NeighbourView:
-        heard, hops = self._parts.neighbours.place_of(node), self._parts.neighbours.hops_of(node)
+        heard, hops = self._neighbours.place_of(node), self._neighbours.hops_of(node)
         if heard is None:
             return NeighbourView(None, math.inf, hops)
         return NeighbourView(heard.place, self.now_s - heard.heard_s, hops)

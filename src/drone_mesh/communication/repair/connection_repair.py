@@ -7,41 +7,42 @@ docs/repair.md, "Lost connection" and "Flight".
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
-from drone_mesh.communication.control.control_plane import IControlPlane
-from drone_mesh.communication.control.parts import NodeParts
-from drone_mesh.communication.control.router_states import RepairState, RouterEvent, RouterStates
+from drone_mesh.communication.control.node_part import receives
+from drone_mesh.communication.control.router_states import RepairState, RouterEvent
 from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.repair.actions import RADIO_FAILED, RepairActions, Step
 from drone_mesh.communication.repair.election import NO_BID, TOOK_OFF, TOOK_OFF_HOME
 from drone_mesh.communication.repair.heights import above_ground, at_whole_metres
 from drone_mesh.communication.repair.interfaces import IRepairStrategy
-from drone_mesh.communication.repair.options import RepairOptions
 from drone_mesh.communication.repair.repair_flight import ASK_AGAIN_S, ASK_SEALED_S, RepairFlight
 from drone_mesh.communication.repair.spots import PITCH, Landing, own_spot, spot_beside_rivals
 from drone_mesh.communication.repair.status import NOTHING_TO_REPAIR, RepairStatus
 from drone_mesh.communication.repair.taken_places import TakenPlaces
+from drone_mesh.communication.wire.messages import GatewayPlace, MovementNegotiationMessage
+from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.drone.location import Location
 
 MOVING_PATIENCE = 3.0  # while drones move by themselves, a lost link may come back
 ROUNDING_S = 1e-6  # sums of periods are not exact
 
 
+@dataclass(eq=False)
 class ConnectionRepair(RepairActions):
     """The repair of one router. It drives the `RepairState` of the router's states."""
 
-    def __init__(
-        self,
-        parts: NodeParts,
-        states: RouterStates,
-        control: IControlPlane,
-        strategy: IRepairStrategy,
-        options: RepairOptions,
-    ) -> None:
-        super().__init__(parts, states, control, options)
-        self._strategy = strategy
-        self._taken = TakenPlaces(parts, options)
+    _strategy: IRepairStrategy
+    _has_key: bool
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._taken = TakenPlaces(
+            self.node_id, self._deadlines, self._neighbours, self._places, self._options
+        )
+        again_s = ASK_SEALED_S if self.medium.shared and self._has_key else ASK_AGAIN_S
+        self._ask_again_s = self.medium.stretched(again_s)
         # Valid from LOSS_NOTICED until the router is AT_REST:
         self._lost_since_s = math.inf
         self._emergency_s = math.inf  # when the time is up, as far as known
@@ -50,7 +51,7 @@ class ConnectionRepair(RepairActions):
         self._flight: RepairFlight | None = None
         self._flies_to_place_of = NO_ROUTE
         self._landed_unheard = False  # away from where it stood, and it has heard no node since
-        strategy.start(self)
+        self._strategy.start(self)
 
     # What the router reports -----------------------------------------------------------------
 
@@ -59,9 +60,9 @@ class ConnectionRepair(RepairActions):
 
         Time is counted between due times, so that a late check does not cost a period.
         """
-        state, here = self._states.repair, self._parts.pilot.place()
+        state, here = self._states.repair, self._pilot.place()
         if here is not None:
-            self._parts.neighbours.motion.reported(self.node_id, here, due_s)
+            self._neighbours.motion.reported(self.node_id, here, due_s)
         if state is RepairState.AT_REST:
             self._notice_loss(due_s)
         elif state is RepairState.LOST:
@@ -126,12 +127,20 @@ class ConnectionRepair(RepairActions):
         if self._flight is not None:
             self._flight.on_taken(place)
 
+    @receives(MessageType.MOVEMENT_NEGOTIATION)
+    def on_bid_packet(self, payload: bytes, creator: int, from_: int) -> None:
+        """A neighbour bids for the flight, or announces one to the gateway's place."""
+        if creator != self.node_id:
+            bid = MovementNegotiationMessage.from_payload(payload)
+            gateway = GatewayPlace.from_payload(payload)
+            self.on_bid(creator, bid.cost, from_, None if gateway is None else gateway.place)
+
     def on_bid(self, node: int, score: float, from_: int, about: Location | None) -> None:
         """A node of the group bids; `from_` sent or relayed that bid (see IRepairStrategy)."""
         if score in (TOOK_OFF, TOOK_OFF_HOME):
-            self._parts.neighbours.motion.flies_for_repair(node, self.now_s)
+            self._neighbours.motion.flies_for_repair(node, self.now_s)
             if about is not None:
-                self._parts.neighbours.set_place(node, about, self.now_s, is_goal=True)
+                self._neighbours.set_place(node, about, self.now_s, is_goal=True)
                 self.on_taken(about)
         self._strategy.on_bid(node, score, from_, about)
 
@@ -181,7 +190,7 @@ class ConnectionRepair(RepairActions):
         """See RepairActions, which describes the functions below as well."""
         if self.why_not_fly():
             return
-        self._parts.report(MeshEventKind.FLIGHT_DECIDED, step.owner)
+        self._report(MeshEventKind.FLIGHT_DECIDED, step.owner)
         flight = self._new_flight(step, self.goal_of(step))
         flight.stops_when_connected = until_connected or step.home
         self._flies_to_place_of = step.owner if step in self.steps else NO_ROUTE
@@ -191,9 +200,9 @@ class ConnectionRepair(RepairActions):
         elif self._flight is not None and self._tried_goals:
             self._tried_goals.pop()  # it turns back before it has been there
             self._tried_spots.pop()
-        self._parts.neighbours.forget_all()
-        self._parts.neighbours.takes_off(by_order=False)
-        self._parts.routing.node_moved_location()
+        self._neighbours.forget_all()
+        self._neighbours.takes_off(by_order=False)
+        self._control.routes.node_moved_location()
         flight.fly_on()
         self._flight = None
         self._took_off()
@@ -240,10 +249,10 @@ class ConnectionRepair(RepairActions):
         flight, self._flight = self._flight, None
         was_repair = flight is not None
         self._landed_unheard = (
-            flight is not None and not flight.leads_back and not self._parts.neighbours.ids()
+            flight is not None and not flight.leads_back and not self._neighbours.ids()
         )
         if was_repair and self._flies_to_place_of == self._control.gateway and not self.connected:
-            self._parts.places.gateway_not_found()
+            self._places.gateway_not_found()
         self._control.end(RouterEvent.LANDED)
         if was_repair:
             self._strategy.on_landed()
@@ -262,7 +271,10 @@ class ConnectionRepair(RepairActions):
 
     def _new_flight(self, step: Step, goal: Location) -> RepairFlight:
         return RepairFlight(
-            self._parts,
+            self.node_id,
+            self._pilot,
+            self._requests,
+            self._neighbours,
             self.present,
             step,
             goal,
@@ -272,8 +284,7 @@ class ConnectionRepair(RepairActions):
         )
 
     def _await_answers(self) -> None:
-        again_s = ASK_SEALED_S if self.medium.shared and self._parts.has_key else ASK_AGAIN_S
-        self.wait_until(self.now_s + self.medium.stretched(again_s))
+        self.wait_until(self.now_s + self._ask_again_s)
 
     def goal_of(self, step: Step) -> Location:  # noqa: D102
         if step.owner == self.node_id:
@@ -289,7 +300,7 @@ class ConnectionRepair(RepairActions):
 
     def _rivals(self, step: Step) -> list[int]:
         """Drones out of reach that may fly to the same place, because it is within their range."""
-        neighbours = self._parts.neighbours
+        neighbours = self._neighbours
         others = neighbours.out_of_reach() - {step.owner}
         places = {node: neighbours.place_of(node) for node in others}
         return [
@@ -307,7 +318,7 @@ class ConnectionRepair(RepairActions):
         """
         near_m = 2 * PITCH * self.clearance_m
         tried = [spot for spot in self._tried_spots if spot.distance_m(step.place) < near_m]
-        neighbours = self._parts.neighbours
+        neighbours = self._neighbours
         heard = [neighbours.place_of(node) for node in sorted(neighbours.ids())]
         origin = self.own_place() or step.place
         places = [origin, *(known.place for known in heard if known is not None)]
@@ -321,16 +332,16 @@ class ConnectionRepair(RepairActions):
         return Landing(origin, [] if step.home else links)
 
     def _emergency(self) -> None:
-        if self._parts.antenna.works():
-            self._parts.report(MeshEventKind.EMERGENCY)
+        if self._antenna.works():
+            self._report(MeshEventKind.EMERGENCY)
             self._strategy.on_emergency()
         elif self._strategy.reason != RADIO_FAILED:
-            self._parts.report(MeshEventKind.EMERGENCY, detail=f"{RADIO_FAILED}: it stays")
+            self._report(MeshEventKind.EMERGENCY, detail=f"{RADIO_FAILED}: it stays")
             self._strategy.reason = RADIO_FAILED
 
     def _plan_emergency(self) -> None:
         patience = self._strategy.patience(self.silent)
-        motion = self._parts.neighbours.motion
+        motion = self._neighbours.motion
         if motion.moved_since(self._lost_since_s - motion.within_s):
             patience = max(patience, MOVING_PATIENCE)
         self._emergency_s = self._lost_since_s + self.connection_lost_after_s * patience
@@ -348,8 +359,8 @@ class ConnectionRepair(RepairActions):
         self._clear()
         self._strategy.reason = ""
         self._strategy.on_stopped()
-        self._parts.places.left_own_place(self._control.gateway)
-        self._parts.neighbours.motion.forget(self.node_id)
+        self._places.left_own_place(self._control.gateway)
+        self._neighbours.motion.forget(self.node_id)
 
     def _clear(self) -> None:
         """Forget what was under way, except the end of a flight, which is always processed."""

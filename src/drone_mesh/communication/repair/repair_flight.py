@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Callable
 
-from drone_mesh.communication.control.parts import NodeParts
-from drone_mesh.communication.control.place_requests import ask_all_for_places
+from drone_mesh.communication.control.pilot import Pilot
+from drone_mesh.communication.control.place_requests import PlaceRequests
+from drone_mesh.communication.neighbours.neighbour_table import Neighbours
 from drone_mesh.communication.repair.actions import Step
 from drone_mesh.communication.repair.heights import above_ground, at_whole_metres
 from drone_mesh.communication.repair.options import RepairOptions
@@ -30,7 +31,10 @@ class RepairFlight:
 
     def __init__(
         self,
-        parts: NodeParts,
+        node_id: int,
+        pilot: Pilot,
+        requests: PlaceRequests,
+        neighbours: Neighbours,
         introduce: Callable[[], None],
         step: Step,
         goal: Location,
@@ -41,13 +45,16 @@ class RepairFlight:
         """To `goal`, at or near the place of `step`. `introduce` broadcasts a PRESENT."""
         self.goal = goal
         self._step = step
-        self.group = parts.neighbours.ids()  # the neighbours that it leaves behind
+        self.group = neighbours.ids()  # the neighbours that it leaves behind
         self.stops_when_connected = False
         self.asks_left = 0  # on the ground
         self._wanted = at_whole_metres(step.place)  # or beside it
         self._taken = taken
         self._landing = landing
-        self._parts = parts
+        self._node_id = node_id
+        self._pilot = pilot
+        self._requests = requests
+        self._neighbours = neighbours
         self._introduce = introduce
         self._clearance_m = options.clearance_m
         self._leg_m = LEG * options.range_m
@@ -63,11 +70,11 @@ class RepairFlight:
     @property
     def leads_back(self) -> bool:
         """Whether its goal is the place where this drone stood before."""
-        return self._step.owner == self._parts.node_id
+        return self._step.owner == self._node_id
 
     def each_second(self) -> None:
         """Called once a second in flight."""
-        ask_all_for_places(self._parts)
+        self._requests.ask_all()
         if self.stops_when_connected:
             self._introduce()
 
@@ -77,11 +84,11 @@ class RepairFlight:
 
     def stop_here(self, next_hop: int) -> None:
         """Land at the nearest free spot, in reach of `next_hop` if possible."""
-        here = self._parts.pilot.location()
+        here = self._pilot.location()
         if here is not None and not self.on_ground:
             below = Location(here.latitude, here.longitude, self.goal.height)
             if below.distance_m(self.goal) >= self._clearance_m:
-                relay = self._parts.neighbours.place_of(next_hop)
+                relay = self._neighbours.place_of(next_hop)
                 self._wanted = below
                 self._landing = Landing(here, [] if relay is None else [relay.place])
                 self._go_to(below if self._taken.is_free(below) else self._spot())
@@ -109,7 +116,7 @@ class RepairFlight:
 
     def arrived(self) -> bool:
         """Ask for the places of others after landing. Returns False if another leg follows."""
-        here = self._parts.pilot.location()
+        here = self._pilot.location()
         if self._leg_is_short(here):
             self.fly_on()
             return False
@@ -119,13 +126,13 @@ class RepairFlight:
     def ask_on_ground(self) -> None:
         """It is on the ground: begin to ask who else is there."""
         self.asks_left = ASKS_ON_GROUND
-        ask_all_for_places(self._parts, may_fly_on=True)
+        self._requests.ask_all(may_fly_on=True)
 
     def ask_again(self) -> bool:
         """Ask once more who is near. Returns False after the last time: the flight is over."""
         self.asks_left -= 1
         if self.on_ground:
-            ask_all_for_places(self._parts, may_fly_on=True)
+            self._requests.ask_all(may_fly_on=True)
         return self.on_ground
 
     def _go_to(self, goal: Location) -> None:
@@ -141,7 +148,7 @@ class RepairFlight:
         clear of others, like the flight, and none just before the goal. The others are told where
         it ends at once: this drone may fall silent within a second.
         """
-        here = self._parts.pilot.location()
+        here = self._pilot.location()
         self._leg_from, self._leg_end = here, above_ground(self.goal)
         longest_m = self._leg_m + LANDED_WITHIN_M
         if (
@@ -152,8 +159,8 @@ class RepairFlight:
             end = at_whole_metres(here.towards(self.goal, self._leg_m))
             free = self._taken.is_free(end)
             self._leg_end = end if free else self._beside(end, Landing(self.goal))
-        self._parts.pilot.step_back_to(self._leg_end)
-        ask_all_for_places(self._parts)
+        self._pilot.step_back_to(self._leg_end)
+        self._requests.ask_all()
 
     def _leg_is_short(self, here: Location | None) -> bool:
         """Whether this was not the last leg, and the drone makes progress."""
@@ -170,5 +177,5 @@ class RepairFlight:
 
     def _beside(self, place: Location, landing: Landing) -> Location:
         """A free spot; two drones that divert at the same time skip different numbers of spots."""
-        skip = self._parts.node_id % 5 if self._diversions > 1 else 0
+        skip = self._node_id % 5 if self._diversions > 1 else 0
         return self._taken.beside(place, landing, skip)

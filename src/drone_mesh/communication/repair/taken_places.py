@@ -5,34 +5,40 @@ docs/repair.md, "Places of silent drones".
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Sequence
 
-from drone_mesh.communication.control.parts import NodeParts
+from drone_mesh.communication.neighbours.known_places import KnownPlaces
+from drone_mesh.communication.neighbours.neighbour_table import Neighbours
 from drone_mesh.communication.repair.heights import above_ground
 from drone_mesh.communication.repair.options import LostPlace, RepairOptions
 from drone_mesh.communication.repair.spots import Landing, free_spot
+from drone_mesh.communication.timing.deadlines import Deadlines
 from drone_mesh.drone.location import Location
 
 ROUNDING_M = 0.09  # a place in a beacon has tenths of a metre, on three axes
 FRESH_S = 5.0  # with EXACT, a drone that was silent for longer takes no place
 
 
+@dataclass(eq=False)
 class TakenPlaces:
     """The places of other drones, as one node knows them, and the spots that are clear of them."""
 
-    def __init__(self, parts: NodeParts, options: RepairOptions) -> None:
-        self._parts = parts
-        self._options = options
+    _node_id: int
+    _deadlines: Deadlines
+    _neighbours: Neighbours
+    _places: KnownPlaces
+    _options: RepairOptions
 
     def all(self) -> list[Location]:
         """Where each other node was last heard, and the gateway's place."""
-        now_s, me = self._parts.now_s, self._parts.node_id
-        gateway = self._parts.places.gateway  # it may be there, although it is off now
+        now_s, me = self._deadlines.now_s, self._node_id
+        gateway = self._places.gateway  # it may be there, although it is off now
         kept_free = [] if gateway is None else [above_ground(gateway)]
         exact = self._options.lost_place is LostPlace.EXACT
         return kept_free + [
             above_ground(heard.place)
-            for node, heard in self._parts.neighbours.taken()
+            for node, heard in self._neighbours.taken()
             if node != me and not (exact and now_s - heard.heard_s > FRESH_S)
         ]
 

@@ -6,68 +6,85 @@ docs/protocol.md, "Node reports".
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import NamedTuple
 
-from drone_mesh.communication.control.parts import NodeParts
-from drone_mesh.communication.interfaces import MAX_NODE_ID, IMeshDebugInfo
+from drone_mesh.communication.control.control_plane import IControlPlane
+from drone_mesh.communication.control.node_part import due, receives
+from drone_mesh.communication.control.pilot import Pilot
+from drone_mesh.communication.interfaces import (
+    MAX_NODE_ID,
+    IMeshDebugInfo,
+    IWirelessCommunication,
+)
+from drone_mesh.communication.neighbours.neighbour_table import Neighbours
 from drone_mesh.communication.reports.node_report import (
     NOTHING_REPORTED,
     NodeReport,
     NodeWords,
 )
-from drone_mesh.communication.timing.deadlines import Due
+from drone_mesh.communication.timing.deadlines import Deadlines, Due
 from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.communication.wire.text_parts import TextAssembly
+from drone_mesh.drone.interfaces import IDroneEngine
 
 WORDS_AGAIN_REPORTS = 10  # unchanged words are repeated for a new gateway
 
 
+@dataclass(eq=False)
 class NodeReporter:
     """Sends the reports of one router, at most one per period. Called only by its component."""
 
-    def __init__(self, parts: NodeParts, mesh: IMeshDebugInfo) -> None:
-        """`mesh` is the component itself."""
-        self._parts = parts
-        self._mesh = mesh
+    _node: IMeshDebugInfo  # the component itself
+    _control: IControlPlane
+    _period_s: float  # between two reports; 0: none
+    _deadlines: Deadlines
+    _neighbours: Neighbours
+    _antenna: IWirelessCommunication
+    _pilot: Pilot
+    _engine: IDroneEngine
+
+    def __post_init__(self) -> None:
         self._words = ""  # the last ones sent
         self._words_in = 0  # reports until they are repeated
 
     def start(self, share: float) -> None:
         """Send the first report after this share of a period, if there is a period."""
-        period_s = self._parts.timing.report_period_s
-        if period_s:
-            self._parts.deadlines.set(Due.NODE_REPORT, self._parts.now_s + share * period_s)
+        if self._period_s:
+            first_s = self._deadlines.now_s + share * self._period_s
+            self._deadlines.set(Due.NODE_REPORT, first_s)
 
+    @due(Due.NODE_REPORT)
     def on_due(self) -> None:
         """Send a report if a gateway is connected."""
-        parts, mesh = self._parts, self._mesh
-        parts.deadlines.set(Due.NODE_REPORT, parts.now_s + parts.timing.report_period_s)
-        gateway = mesh.get_preferred_gateway()
-        connected = mesh.get_connected_to_gateway() and gateway <= MAX_NODE_ID
-        if not connected or gateway == parts.node_id:
+        self._deadlines.set(Due.NODE_REPORT, self._deadlines.now_s + self._period_s)
+        control, me = self._control, self._node.get_node_id()
+        gateway = control.gateway
+        connected = control.connected and gateway <= MAX_NODE_ID
+        if not connected or gateway == me:
             return
-        why_not, percent = parts.engine.why_not_fly(), parts.engine.battery_percent()
+        why_not, percent = self._engine.why_not_fly(), self._engine.battery_percent()
         report = NodeReport(
-            neighbours=len(parts.neighbours.ids()),
-            hops=mesh.get_hops_from_gateway_away(),
-            next_hop=parts.routing.get_direction_to_node(gateway),
-            place=parts.pilot.place(),
+            neighbours=len(self._neighbours.ids()),
+            hops=control.hops,
+            next_hop=control.routes.get_direction_to_node(gateway),
+            place=self._pilot.place(),
             battery_percent=None if percent is None else round(max(0.0, min(100.0, percent))),
-            flying=parts.pilot.goal is not None,
+            flying=self._pilot.goal is not None,
             can_fly=not why_not,
-            tries=parts.antenna.channel_use().tries,
-            shares_id=mesh.get_shares_id(),
+            tries=self._antenna.channel_use().tries,
+            shares_id=self._node.get_shares_id(),
         )
-        parts.delivery.send_own(report.packet(parts.node_id, gateway))
-        self._send_words(why_not, gateway)
+        control.delivery.send_own(report.packet(me, gateway))
+        self._send_words(why_not, me, gateway)
 
-    def _send_words(self, words: str, gateway: int) -> None:
+    def _send_words(self, words: str, me: int, gateway: int) -> None:
         self._words_in -= 1
         if words == self._words and (not words or self._words_in > 0):
             return
         self._words, self._words_in = words, WORDS_AGAIN_REPORTS
-        for packet in NodeWords.packets(words, self._parts.node_id, gateway):
-            self._parts.delivery.send_own(packet)
+        for packet in NodeWords.packets(words, me, gateway):
+            self._control.delivery.send_own(packet)
 
 
 class ReportedNode(NamedTuple):
@@ -85,7 +102,8 @@ class ReportBook:
     `_nodes` is never modified, only replaced.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, deadlines: Deadlines) -> None:
+        self._deadlines = deadlines
         self._nodes: dict[int, ReportedNode] = {}
         self._words: dict[int, TextAssembly] = {}
 
@@ -93,19 +111,23 @@ class ReportBook:
         """All nodes that have reported, by id."""
         return [node for _, node in sorted(self._nodes.items())]
 
-    def on_packet(self, creator: int, kind: int, payload: bytes, now_s: float) -> None:
-        """A NODE_REPORT or NODE_WORDS arrived."""
-        known = self._nodes.get(creator)
-        known = known or ReportedNode(creator, NOTHING_REPORTED, "", -math.inf)
-        if kind == MessageType.NODE_REPORT:
-            report = NodeReport.from_payload(payload)
-            words = "" if report.can_fly else known.why_not_fly
-            self._put(ReportedNode(creator, report, words, now_s))
-            return
+    @receives(MessageType.NODE_REPORT)
+    def on_report(self, payload: bytes, creator: int, _from: int) -> None:
+        """The figures of a node."""
+        report = NodeReport.from_payload(payload)
+        words = "" if report.can_fly else self._known(creator).why_not_fly
+        self._put(ReportedNode(creator, report, words, self._deadlines.now_s))
+
+    @receives(MessageType.NODE_WORDS)
+    def on_words(self, payload: bytes, creator: int, _from: int) -> None:
+        """A part of the reason why its drone cannot fly."""
         assembly = self._words.setdefault(creator, TextAssembly())
         whole = assembly.add(*NodeWords.part_in(payload))
         if whole is not None:
-            self._put(known._replace(why_not_fly=whole))
+            self._put(self._known(creator)._replace(why_not_fly=whole))
+
+    def _known(self, node: int) -> ReportedNode:
+        return self._nodes.get(node) or ReportedNode(node, NOTHING_REPORTED, "", -math.inf)
 
     def _put(self, node: ReportedNode) -> None:
         self._nodes = {**self._nodes, node.node_id: node}

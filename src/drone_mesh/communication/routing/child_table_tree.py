@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Sequence
+
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.routing.interfaces import IRoutingEssentials, IRoutingTechnique
 from drone_mesh.communication.wire.packet_types import MessageType
@@ -23,6 +25,15 @@ class ChildTableTree(IRoutingTechnique):
     def get_direction_to_node(self, node: int) -> int:
         """The node itself if it is a child, else the child with the lowest id that has it."""
         return self._next_hops.get(node, NO_ROUTE)
+
+    def may_reach(self, node: int) -> bool:
+        """Whether there is a next hop."""
+        return self.get_direction_to_node(node) != NO_ROUTE
+
+    def directions(self, node: int, came_from: int, creator: int) -> Sequence[int]:
+        """The next hop; the same as in the interface, in fewer calls for each packet."""
+        to = self.get_direction_to_node(node)
+        return () if to == NO_ROUTE else (to,)
 
     def start_routing(self, essentials: IRoutingEssentials) -> None:
         """Introduce this node to its surroundings."""

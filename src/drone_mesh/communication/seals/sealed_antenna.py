@@ -53,6 +53,8 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
     may be called by any other.
     """
 
+    has_key = True
+
     def __init__(
         self,
         antenna: IWirelessCommunication,

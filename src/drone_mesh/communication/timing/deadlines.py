@@ -7,20 +7,20 @@ import math
 
 
 class Due(enum.IntEnum):
-    """The kinds of work that a component schedules."""
+    """The kinds of work that a component schedules, in the order in which it does what is due."""
 
-    CHECK = 0  # the periodic check of routes and connection
+    ANSWER = 0  # the latest moment for the gateway's answer to a heartbeat
     INTRODUCE = 1  # after the antenna came back
-    ASK_POSITION = 2  # in flight
-    ANSWER = 3  # the latest moment for the gateway's answer to a heartbeat
-    REPAIR = 4  # the repair's timer
-    ROUTING = 5  # the routing technique's timer
-    ORDER_REPLIES = 6  # a drone's outstanding replies to orders
-    ORDERS = 7  # a gateway's open orders
-    DATA = 8  # users' messages
-    NODE_REPORT = 9  # the next report to the gateway
-    GOAL = 10  # repeats a drone's goal after take-off
-    OWN_ID = 11  # the end of the time in which it gives way to another radio with its id
+    ROUTING = 2  # the routing technique's timer
+    ASK_POSITION = 3  # in flight
+    ORDER_REPLIES = 4  # a drone's outstanding replies to orders
+    DATA = 5  # users' messages
+    NODE_REPORT = 6  # the next report to the gateway
+    OWN_ID = 7  # the end of the time in which it gives way to another radio with its id
+    CHECK = 8  # the periodic check of routes and connection
+    GOAL = 9  # repeats a drone's goal after take-off
+    REPAIR = 10  # the repair's timer
+    ORDERS = 11  # a gateway's open orders
 
 
 class Deadlines:

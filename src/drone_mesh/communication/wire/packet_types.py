@@ -1,15 +1,15 @@
 """The packet types of the mesh: one declaration per type (docs/wire.md, "Packets").
 
-Everything that differs by type follows from here: the checks and the dispatch of a component, the
-kinds that pages show, the counters of the lab and, through `scripts/packet_tables`, the table in
-docs/wire.md and the Wireshark dissector.
+Everything that differs by type follows from here: the checks of a component, the kinds that pages
+show, the counters of the lab and, through `scripts/packet_tables`, the table in docs/wire.md and
+the Wireshark dissector.
 """
 
 from __future__ import annotations
 
 import enum
 import struct
-from typing import Callable, NamedTuple, Sequence
+from typing import NamedTuple
 
 TECHNIQUE_TYPES = range(8, 64)
 DATA_TYPES = range(128, 256)  # users' data; data/packets.py describes their bodies
@@ -40,6 +40,7 @@ class Handler(enum.Enum):
     """Who handles a packet when it has arrived; the values are words of docs/wire.md."""
 
     NODE = "every node"
+    ROUTER = "a router"  # a gateway ignores it
     GATEWAY = "a gateway"
     SEAL = "the seals"  # without a key, a node at most reports that a neighbour has one
     CONTROL = "the control plane"
@@ -85,7 +86,7 @@ class PacketType(NamedTuple):
 _UNKNOWN = PacketType(PacketKind.OTHER, Handler.NOBODY)
 _TECHNIQUE = PacketType(PacketKind.OTHER, Handler.TECHNIQUE)
 _DATA = PacketType(PacketKind.DATA, Handler.USERS, priority=Priority.DATA)
-_NODE, _GATEWAY, _SEAL = Handler.NODE, Handler.GATEWAY, Handler.SEAL
+_NODE, _ROUTER, _GATEWAY, _SEAL = Handler.NODE, Handler.ROUTER, Handler.GATEWAY, Handler.SEAL
 _CONTROL = Handler.CONTROL
 # Bodies that fill a line
 _PLACE = "float32 latitude, float32 longitude, int16 height"
@@ -133,7 +134,7 @@ class MessageType(enum.IntEnum):
     # The bid of its creator to fly
     MOVEMENT_NEGOTIATION = (
         7,
-        PacketType(PacketKind.REPAIR, _NODE, "float32 cost", "MovementNegotiationMessage"),
+        PacketType(PacketKind.REPAIR, _ROUTER, "float32 cost", "MovementNegotiationMessage"),
     )
     # The technique beacon: how a node stands to its gateway, neighbours and the nodes below it
     BEACON = (
@@ -160,24 +161,21 @@ class MessageType(enum.IntEnum):
     # Where another node was last heard, for a drone that is about to land near there
     LAST_PLACE = 69, PacketType(PacketKind.POSITION, _NODE, _LAST_PLACE, "LastPlace")
     # Where a gateway was, in a mesh with a key
-    GATEWAY_PLACE = 125, PacketType(PacketKind.POSITION, _NODE, _GATEWAY_PLACE, "GatewayPlace")
+    GATEWAY_PLACE = 125, PacketType(PacketKind.POSITION, _ROUTER, _GATEWAY_PLACE, "GatewayPlace")
     # Asks a neighbour to prove that it has the key, and the proof
     SEAL_CHALLENGE = 126, PacketType(PacketKind.OTHER, _SEAL, made_of="HopSeal")
     SEAL_ANSWER = 127, PacketType(PacketKind.OTHER, _SEAL, made_of="HopSeal")
 
 
-_ABOUT_AND_HANDLER = {
-    **dict.fromkeys(range(256), (_UNKNOWN, "")),
-    **dict.fromkeys(TECHNIQUE_TYPES, (_TECHNIQUE, "receive_of_technique")),
-    **dict.fromkeys(DATA_TYPES, (_DATA, "receive_data")),
-    **{int(kind): (kind.about, f"receive_{kind.name.lower()}") for kind in MessageType},
-}
-
-ABOUT = tuple(about for about, _handler in _ABOUT_AND_HANDLER.values())
+ABOUT = tuple(
+    {
+        **dict.fromkeys(range(256), _UNKNOWN),
+        **dict.fromkeys(TECHNIQUE_TYPES, _TECHNIQUE),
+        **dict.fromkeys(DATA_TYPES, _DATA),
+        **{int(kind): kind.about for kind in MessageType},
+    }.values()
+)
 """What is declared about each number, also about those that are no MessageType."""
-
-HANDLER_NAMES = tuple(handler for _about, handler in _ABOUT_AND_HANDLER.values())
-"""The method that handles packets with this number; empty: no node handles them."""
 
 FLOATS = {number: about.floats for number, about in enumerate(ABOUT) if about.floats is not None}
 """What unpacks the floats of bodies, by the numbers of the types that have any."""
@@ -187,15 +185,3 @@ UNANSWERED = frozenset(number for number in range(256) if not ABOUT[number].answ
 UNJITTERED = frozenset(number for number in range(256) if not ABOUT[number].jittered)
 
 TYPES_WITH_PLACES = frozenset(number for number in range(256) if ABOUT[number].has_place)
-
-
-Receiver = Callable[[bytes, int, int], None]
-"""Handles a packet, given with its creator and the sender of this hop."""
-
-
-def receivers(otherwise: Receiver, *parts: object) -> Sequence[Receiver]:
-    """By number: the method for that type of the first part that has one, or `otherwise`."""
-    return [
-        next((getattr(part, name) for part in parts if name and hasattr(part, name)), otherwise)
-        for name in HANDLER_NAMES
-    ]

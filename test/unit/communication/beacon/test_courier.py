@@ -18,8 +18,7 @@ class Node:
     def __init__(self, shared=False):
         self.neighbours, self.otherwise = [], HOLD
         self.taken, self.refused, self.returned = [], [], []
-        self.antenna, self.deadlines = RecordingAntenna(), Deadlines()
-        self.antenna.medium = Medium(shared=shared)
+        self.antenna, self.deadlines = RecordingAntenna(Medium(shared=shared)), Deadlines()
         told = self.taken.append, self.refused.append, lambda *it: self.returned.append(it)
         self.courier = Courier(
             1, self.antenna, self.deadlines, 2, self.verdict, *told, lambda it: it[:25] + bytes(7)

@@ -12,6 +12,7 @@ from drone_mesh.communication.beacon.courier import DROP, Courier
 from drone_mesh.communication.beacon.packets import NO_ANCESTORS, Beacon
 from drone_mesh.communication.beacon.proofs import Proofs
 from drone_mesh.communication.beacon.routes import BeaconRoutes
+from drone_mesh.communication.control.place_requests import PlaceRequests
 from drone_mesh.communication.events.complaints import Complaints
 from drone_mesh.communication.neighbours.known_places import KnownPlaces
 from drone_mesh.communication.timing.deadlines import Deadlines
@@ -33,16 +34,14 @@ class Node:
             9, self.antenna, Deadlines(), 1, lambda transit: DROP if transit.sent_s else 1,
             *3 * [lambda *_: None], lambda payload: payload,
         )  # fmt: skip
-        self.basics = SimpleNamespace(
-            node_id=9,
-            has_key=has_key,
-            rng=AlwaysHalf(),
-            seals=SimpleNamespace(may_be_gateway=self.proved.__contains__),
-            places=KnownPlaces(),
-            complaints=Complaints(9),
-            pilot=SimpleNamespace(goal=None, place=lambda: Location(0.0, 0.0, 0.0)),
-        )
-        self.proofs = Proofs(self.basics, self.routes, courier, is_gateway)
+        self.complaints, self.places = Complaints(9), KnownPlaces()
+        pilot = SimpleNamespace(goal=None, place=lambda: Location(0.0, 0.0, 0.0))
+        requests = PlaceRequests(9, pilot, self.antenna, courier, Deadlines())
+        seals = SimpleNamespace(may_be_gateway=self.proved.__contains__, has_key=has_key)
+        self.proofs = Proofs(
+            9, is_gateway, self.routes, courier, requests, self.places, seals,
+            self.complaints, AlwaysHalf(),
+        )  # fmt: skip
 
     def connect(self):
         self.routes.heard(1, Beacon(0, 5, 1, 0, NO_ANCESTORS, 1.0))
@@ -77,7 +76,7 @@ def test_heartbeats_are_frequent_until_the_second_answer_and_then_come_once_a_mi
         node.proofs.heard(packet("07 01 04 09 09 01 07"), 7)  # another gateway
     assert node.proofs.next_s == 10.0
     node.proved.add(0)
-    node.basics.places.update_gateway(Location(0.0, 0.0, 0.0), 0.0)
+    node.places.update_gateway(Location(0.0, 0.0, 0.0), 0.0)
     assert node.sent(10.0) == [TO_GATEWAY]
     assert node.routes.tried[0] == 1  # only the first one was in vain
     node.proofs.heard(ANSWER, 0)
@@ -123,5 +122,5 @@ def test_without_a_key_a_heartbeat_is_of_another_technique_and_none_is_sent():
     node = Node(has_key=False)
     node.connect()
     node.proofs.heard(ANSWER, 0)
-    assert node.basics.complaints.counts == {"dropped a heartbeat of another technique": 1}
+    assert node.complaints.counts == {"dropped a heartbeat of another technique": 1}
     assert node.proofs.next_s == math.inf

@@ -13,6 +13,7 @@ from drone_mesh.communication.data.ordering import PortOrder
 from drone_mesh.communication.data.outgoing import LIFETIME_S
 from drone_mesh.communication.data.packets import Head, Poll
 from drone_mesh.communication.data.reassembly import Whole
+from drone_mesh.communication.timing.deadlines import Deadlines
 from drone_mesh.communication.timing.medium import UNDISTURBED
 
 ROOM = 27
@@ -142,11 +143,11 @@ def test_a_port_on_which_messages_wait_is_not_forgotten_for_others():
 def test_a_flooded_fragment_counts_as_known_for_five_seconds(after_s, is_new):
     repeated = []
     antenna = SimpleNamespace(broadcast_message=repeated.append)
-    parts = SimpleNamespace(node_id=1, now_s=0.0, antenna=antenna)
-    flood = Flood(parts)
+    clock = Deadlines()
+    flood = Flood(1, antenna, clock)
     fragment = bytes((2, 2, 128, 254, 254, 9)).ljust(32, b"\0")
     assert flood.repeat(fragment)
-    parts.now_s = after_s
+    clock.now_s = after_s
     assert flood.repeat(fragment) is is_new
     assert len(repeated) == 1 + is_new
 
@@ -176,7 +177,7 @@ def test_a_few_messages_under_one_number_are_repeated_once_and_the_others_not_at
     orders, repeated
 ):
     antenna = SimpleNamespace(broadcast_message=lambda _fragment: None)
-    flood = Flood(SimpleNamespace(node_id=1, now_s=0.0, antenna=antenna))
+    flood = Flood(1, antenna, Deadlines())
     outcomes = [flood.repeat(flooded(order)) for order in orders * 3]
     assert outcomes == [True] * repeated + [False] * (len(outcomes) - repeated)
 

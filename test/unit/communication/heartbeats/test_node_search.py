@@ -15,8 +15,7 @@ LOST_BEHIND_2 = "02 02 05 01 01 05"  # 2 cannot reach 5
 
 def gateway_rig(medium=SHARED):
     """Gateway 1 with an order under way to drone 5, behind 2; at 2 s: the search is number 32."""
-    rig = Rig(gateway=True)
-    rig.antenna.medium = medium
+    rig = Rig(gateway=True, medium=medium)
     rig.wait(2.0)
     rig.hear(FROM_5_THROUGH_2)
     assert order(rig)
@@ -34,8 +33,7 @@ def searches(rig):
 
 def router_rig():
     """Router 1, a neighbour of gateway 0."""
-    rig = Rig()
-    rig.antenna.medium = SHARED
+    rig = Rig(medium=SHARED)
     rig.connect_to_gateway()
     return rig
 

@@ -60,10 +60,9 @@ def test_a_heartbeat_of_a_gateway_connects_with_one_hop_more_than_it_made(hops, 
 
 
 def test_a_router_that_does_not_know_its_distance_waits_as_long_as_for_ten_hops():
-    rig = Rig()
-    rig.antenna.medium = replace(Medium(), answer_s=1.0, answer_per_hop_s=0.2)
+    rig = Rig(medium=replace(Medium(), answer_s=1.0, answer_per_hop_s=0.2))
     rig.know_neighbour(0)
-    rig.mesh.control.may_use(0)
+    rig.mesh.control.told_of_gateway(0)
     for wait_s, sent in ((2.9, 1), (0.2, 0), (0.0, 1)):
         rig.mesh.control.send_heartbeat(0)
         assert len(rig.sent(HEARTBEAT)) == sent
@@ -622,10 +621,9 @@ def test_a_neighbour_that_led_nowhere_is_given_up_for_the_next_one_that_offers_a
 # A shared channel ----------------------------------------------------------------------------
 
 
-def shared_rig():
-    rig = Rig()
-    rig.antenna.medium = Medium(shared=True, answer_s=1.0, heartbeats=3, missing_quiet_s=5.0)
-    return rig
+def shared_rig(**numbers):
+    shared = Medium(shared=True, answer_s=1.0, heartbeats=3, missing_quiet_s=5.0)
+    return Rig(medium=replace(shared, **numbers))
 
 
 def test_a_packet_that_would_go_straight_back_concerns_only_the_neighbour_that_sent_it():
@@ -650,8 +648,7 @@ PRESENT_OF_3 = "03 03 03 01 fe 01 01"  # one hop from its gateway, as node 2 is
 
 
 def test_a_packet_for_the_gateway_that_a_hop_does_not_take_goes_through_another_neighbour():
-    rig = shared_rig()
-    rig.antenna.medium = replace(rig.antenna.medium, silence_s=3.0)
+    rig = shared_rig(silence_s=3.0)
     rig.connect_through(2)
     rig.hear(PRESENT_OF_3)
     rig.mesh.on_undelivered(packet("01 01 04 02 00 01 00"), 9, rig.now_s)
@@ -660,16 +657,14 @@ def test_a_packet_for_the_gateway_that_a_hop_does_not_take_goes_through_another_
 
 @pytest.mark.parametrize(("given_up_s", "lost"), [(2.9, False), (3.0, True)])
 def test_a_neighbour_that_was_heard_lately_survives_one_packet_that_is_given_up(given_up_s, lost):
-    rig = shared_rig()
-    rig.antenna.medium = replace(rig.antenna.medium, silence_s=3.0)
+    rig = shared_rig(silence_s=3.0)
     rig.connect_through(2)
     rig.mesh.on_undelivered(packet("01 01 04 02 00 01 00"), 9, given_up_s)
     assert (2 not in rig.mesh.get_neighbours()) is lost
 
 
 def test_a_packet_goes_through_no_neighbour_that_is_farther_from_the_gateway():
-    rig = shared_rig()
-    rig.antenna.medium = replace(rig.antenna.medium, silence_s=3.0)
+    rig = shared_rig(silence_s=3.0)
     rig.connect_through(2)
     rig.hear("03 03 03 01 fe 03 01")
     rig.mesh.on_undelivered(packet("01 01 04 02 00 01 00"), 9, rig.now_s)
@@ -703,8 +698,7 @@ def test_after_the_loss_of_a_neighbour_the_next_check_comes_soon_and_then_once_a
 
 def test_a_neighbour_that_was_just_heard_is_not_probed():
     """At the checks after 5 and 15 s; node 3 is heard 4 s before the second one, node 4 is not."""
-    rig = shared_rig()
-    rig.antenna.medium = replace(rig.antenna.medium, heard_periods=0.9)
+    rig = shared_rig(heard_periods=0.9)
     rig.know_neighbour(3, 4)
     rig.wait_until(11.0)
     rig.know_neighbour(3)
@@ -714,8 +708,7 @@ def test_a_neighbour_that_was_just_heard_is_not_probed():
 
 @pytest.mark.parametrize(("place_periods", "asked_s"), [(0.0, [5, 15, 25, 35]), (2.5, [5, 35])])
 def test_a_router_asks_for_a_place_that_it_knows_only_from_time_to_time(place_periods, asked_s):
-    rig = shared_rig()
-    rig.antenna.medium = replace(rig.antenna.medium, place_periods=place_periods)
+    rig = shared_rig(place_periods=place_periods)
     rig.connect_through(2)
     asked = []
     for check_s in (5, 15, 25, 35):
@@ -728,8 +721,7 @@ def test_a_router_asks_for_a_place_that_it_knows_only_from_time_to_time(place_pe
 
 
 def test_another_next_hop_is_asked_for_its_place_at_the_next_check():
-    rig = shared_rig()
-    rig.antenna.medium = replace(rig.antenna.medium, place_periods=2.5)
+    rig = shared_rig(place_periods=2.5)
     rig.connect_through(2)
     rig.hear("02 02 01 01 01 00 00 80 3f")
     rig.connect_through(3)
@@ -739,8 +731,7 @@ def test_another_next_hop_is_asked_for_its_place_at_the_next_check():
 
 def test_a_queued_packet_teaches_the_routes_when_the_antenna_reports_its_outcome():
     routing = EtxTree()
-    rig = Rig(routing=routing)
-    rig.antenna.medium = Medium(shared=True)
+    rig = Rig(routing=routing, medium=Medium(shared=True))
     rig.connect_through(2)
     rig.mesh.control.send_heartbeat(0)
     assert routing.links.etx(2) == 1.0
@@ -753,11 +744,9 @@ def test_a_router_that_takes_off_announces_its_goal():
     rig.connect_through(2)
     rig.hear("00 02 06 01 01 00 00 80 3f")  # latitude 1
     goal = packet("01 01 01 fe fe 00 00 80 3f 00 00 00 00 00 00 00 00 00 80")
-    assert rig.broadcasts() == [goal]
-    rig.wait(0.2)
-    assert rig.broadcasts() == [goal]
-    rig.wait(0.2)
-    assert rig.broadcasts() == []
+    for expected in ([goal], [goal], []):
+        assert [sent for sent in rig.broadcasts() if sent[2] != PRESENT] == expected
+        rig.wait(0.2)
 
 
 @pytest.mark.parametrize(("latitude", "stays"), [("00 00 00 41", True), ("00 00 10 41", False)])

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from rig import Rig
-
+from drone_mesh.communication.neighbours.known_places import KnownPlaces
+from drone_mesh.communication.neighbours.neighbour_table import Neighbours
+from drone_mesh.communication.neighbours.seen_motion import SeenMotion
 from drone_mesh.communication.repair.options import RepairOptions
 from drone_mesh.communication.repair.taken_places import TakenPlaces
+from drone_mesh.communication.timing.deadlines import Deadlines
 from drone_mesh.drone.location import Location
 
 
 def test_a_spot_that_is_clear_of_a_rounded_place_is_clear_of_the_drone_itself():
-    parts = Rig().mesh._parts
+    deadlines, places = Deadlines(), KnownPlaces()
+    neighbours = Neighbours(10.0, noticed_late=False, motion=SeenMotion(9.0, 10.0))
     drone = Location(latitude=0.951, longitude=0.0, height=0.0)
     told = Location(latitude=round(drone.latitude, 1), longitude=0.0, height=0.0)  # in a beacon
-    parts.neighbours.set_place(7, told, 0.0)
-    taken = TakenPlaces(parts, RepairOptions(clearance_m=1.0))
+    neighbours.set_place(7, told, 0.0)
+    options = RepairOptions(clearance_m=1.0)
+    taken = TakenPlaces(1, deadlines, neighbours, places, options)
     spot = Location(latitude=-0.05, longitude=0.0, height=0.0)
     assert spot.distance_m(told) > 1.0 > 0.96
     assert not taken.is_free(spot)

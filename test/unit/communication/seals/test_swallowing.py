@@ -9,11 +9,10 @@ from proofs.stranger import Hole
 from seal_rig import KEY, packet
 
 from drone_mesh.communication.data.ticket import TO_GATEWAY, TicketState
-from drone_mesh.communication.heartbeats import relay_check
 from drone_mesh.communication.heartbeats.detours import Detours
 from drone_mesh.communication.heartbeats.relay_check import RelayCheck, Swallowing
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.routing.child_table_tree import ChildTableTree
+from drone_mesh.communication.timing.deadlines import Deadlines
 from drone_mesh.communication.timing.mesh_timing import MeshTiming
 from drone_mesh.inprocess import Network
 
@@ -84,14 +83,10 @@ def check_of_node_8(now_s=100.0):
     """Two questions to the gateway, through 1, have no answer; the second was sent at 90 s."""
     neighbours = SimpleNamespace(ids=lambda: (1, 2), hops_of=lambda _node: 1)
     detours = Detours(neighbours)
-    parts = SimpleNamespace(
-        node_id=8,
-        now_s=now_s,
-        timing=MeshTiming(),
-        has_key=True,
-        routing=ChildTableTree(),
-    )
-    check = RelayCheck(parts, detours)
+    clock = Deadlines()
+    clock.now_s = now_s
+    requests = SimpleNamespace(ask=lambda _gateway: None)
+    check = RelayCheck(8, True, MeshTiming().check_period_s, clock, requests, detours)
     check.swallowing.answered()
     for at_s in (80.0, 90.0):
         check.swallowing.asked(at_s)
@@ -103,8 +98,7 @@ def check_of_node_8(now_s=100.0):
     [(100.0, 89.0), (93.0, 91.0)],
     ids=["heartbeats are not answered either", "the answer may be on its way"],
 )
-def test_a_relay_is_not_suspected_while(now_s, heartbeat_s, monkeypatch):
-    monkeypatch.setattr(relay_check, "ask_for_place", lambda _parts, _gateway: None)
+def test_a_relay_is_not_suspected_while(now_s, heartbeat_s):
     check, _detours = check_of_node_8(now_s)
     check.run(gateway=0, next_hop=1, hops=2, heartbeat_s=heartbeat_s)
     assert check.take_detour() == NO_ROUTE

@@ -9,20 +9,14 @@ import sys
 from pathlib import Path
 
 import pytest
+from rig import Rig
 
-from drone_mesh.communication.beacon.plane import BeaconPlane
-from drone_mesh.communication.data.transport import Transport
-from drone_mesh.communication.heartbeats.gateway_plane import GatewayHeartbeats
-from drone_mesh.communication.heartbeats.plane import HeartbeatPlane
-from drone_mesh.communication.heartbeats.router_plane import RouterHeartbeats
-from drone_mesh.communication.node.component import MeshnetworkComponent
-from drone_mesh.communication.node.gateway import MeshnetworkGateway
-from drone_mesh.communication.node.router import MeshnetworkRouter
+from drone_mesh.communication.beacon.plane import BeaconTechnique
+from drone_mesh.communication.control.node_part import receivers
 from drone_mesh.communication.orders import messages as order_messages
-from drone_mesh.communication.orders.intake import OrderIntake
 from drone_mesh.communication.reports import node_report
 from drone_mesh.communication.wire import messages, packet_types
-from drone_mesh.communication.wire.packet_types import HANDLER_NAMES, Handler, MessageType
+from drone_mesh.communication.wire.packet_types import ABOUT, Handler, MessageType
 
 ROOT = Path(__file__).resolve().parents[4]
 FORMS = {"bool": "?", "uint8": "B", "int16": "h", "uint16": "H", "uint32": "I", "float32": "f"}
@@ -50,43 +44,37 @@ def test_the_declared_body_is_that_of_the_class(made_of):
     assert struct_format(declared.body) == made_of.BODY.format
 
 
+def handled(**how):
+    """The types that a node declares a method for."""
+    return set(receivers(Rig(**how).mesh._parts))
+
+
+OF_ROUTER, OF_GATEWAY = handled(), handled(gateway=True)
+WITH_BEACONS = handled(routing=BeaconTechnique())
+
+
 @pytest.mark.parametrize("kind", MessageType, ids=lambda kind: kind.name)
-def test_who_handles_a_type_has_a_method_for_it(kind):
-    name = HANDLER_NAMES[kind]
-    handles = {cls: hasattr(cls, name) for cls in (MeshnetworkRouter, MeshnetworkGateway)}
+def test_who_handles_a_type_declares_a_method_for_it(kind):
+    handles = {kind in OF_ROUTER, kind in OF_GATEWAY}
     if kind.about.handler is Handler.NODE:
-        assert set(handles.values()) == {not hasattr(OrderIntake, name)}
-    elif kind.about.handler is Handler.CONTROL:
-        assert not any(handles.values())
-        by_heartbeats = {hasattr(plane, name) for plane in (RouterHeartbeats, GatewayHeartbeats)}
-        by_beacons = hasattr(BeaconPlane, name)
-        # With a key, beacons need heartbeats for the nonces of the seals.
-        assert by_heartbeats == {kind is MessageType.HEARTBEAT or not by_beacons}
-        assert by_beacons or by_heartbeats == {True}
+        assert handles == {True}
+    elif kind.about.handler is Handler.ROUTER:
+        assert (kind in OF_ROUTER, kind in OF_GATEWAY) == (True, False)
     elif kind.about.handler is Handler.GATEWAY:
-        assert handles == {MeshnetworkRouter: False, MeshnetworkGateway: True}
+        assert (kind in OF_ROUTER, kind in OF_GATEWAY) == (False, True)
+    elif kind.about.handler is Handler.CONTROL:
+        # With a key, beacons need heartbeats for the nonces of the seals.
+        assert handles == {kind is MessageType.HEARTBEAT or kind not in WITH_BEACONS}
+        assert kind in WITH_BEACONS or handles == {True}
     elif kind.about.handler is Handler.NOBODY:
-        assert not any(handles.values())
+        assert handles == {False}
 
 
-def test_each_handler_is_for_a_declared_type():
-    handlers = {
-        name
-        for cls in (
-            MeshnetworkComponent,
-            MeshnetworkGateway,
-            MeshnetworkRouter,
-            HeartbeatPlane,
-            RouterHeartbeats,
-            GatewayHeartbeats,
-            BeaconPlane,
-            OrderIntake,
-            Transport,
-        )
-        for name in vars(cls)
-        if name.startswith("receive_")
-    }
-    assert handlers <= set(HANDLER_NAMES)
+def test_data_and_the_types_of_techniques_have_handlers_and_other_numbers_none():
+    for number in range(256):
+        has_one = ABOUT[number].handler not in (Handler.NOBODY, Handler.SEAL)
+        if number not in set(MessageType):
+            assert (number in OF_ROUTER, number in OF_GATEWAY) == (has_one, has_one)
 
 
 def test_the_page_and_the_dissector_have_the_declared_types():
@@ -104,8 +92,8 @@ WIND = """
 """
 FOUND = """
 from rig import Rig
+from drone_mesh.communication.control.node_part import receives
 from drone_mesh.communication.wire.packet_types import MessageType
-from drone_mesh.communication.node.router import MeshnetworkRouter
 from drone_mesh.lab.metrics import METRICS
 from drone_mesh.raspberry.radio_tests import decoded
 from drone_mesh.state.packets import kind_of
@@ -113,12 +101,13 @@ from drone_mesh.state.packets import kind_of
 print(MessageType.WIND.about.made_of, kind_of(99).value, "own_wind" in METRICS)
 print(decoded(bytes((1, 1, 99, 2, 2)).ljust(32, bytes(1))))
 
-class Sock(MeshnetworkRouter):
-    def receive_wind(self, payload, creator, from_):
+class Sock:
+    @receives(MessageType.WIND)
+    def on_wind(self, payload, creator, from_):
         print("blows", creator, from_, payload[9])
 
 rig = Rig()
-rig.mesh.__class__ = Sock
+rig.mesh._parts.append(Sock())
 rig.mesh.start(0.0)
 rig.mesh.on_msg(bytes.fromhex("00 00 03 01 fe 00 01").ljust(32, bytes(1)), 0.0)
 rig.mesh.on_msg(bytes.fromhex("05 00 63 01 01 00 00 80 3f 07").ljust(32, bytes(1)), 0.0)
@@ -129,7 +118,7 @@ rig.mesh.on_msg(bytes.fromhex("05 00 63 01 01 00 00 80 3f 09").ljust(32, bytes(1
 
 
 def test_a_type_that_is_added_is_found_everywhere(tmp_path):
-    """One line in a copy of the package: checks, dispatch, page, dots, lab, docs, dissector."""
+    """A line in a copy of the package, and a method: checks, page, dots, lab, docs, dissector."""
     for folder in ("src", "scripts"):
         shutil.copytree(
             ROOT / folder, tmp_path / folder, ignore=shutil.ignore_patterns("__pycache__")

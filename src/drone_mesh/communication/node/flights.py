@@ -1,0 +1,111 @@
+"""Flights: what a node does when its drone takes off, flies and has landed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from drone_mesh.communication.control.control_plane import IControlPlane
+from drone_mesh.communication.control.node_part import due
+from drone_mesh.communication.control.pilot import Pilot
+from drone_mesh.communication.control.router_states import RepairState, RouterStates
+from drone_mesh.communication.events.observer import MeshEventKind, Reporter
+from drone_mesh.communication.interfaces import IWirelessCommunication
+from drone_mesh.communication.neighbours.neighbour_table import Neighbours
+from drone_mesh.communication.orders.intake import OrderIntake
+from drone_mesh.communication.repair.connection_repair import ConnectionRepair
+from drone_mesh.communication.timing.deadlines import Deadlines, Due
+
+GOAL_AGAIN_S = 0.15  # broadcasts are not acknowledged, and it is soon out of reach
+SHORT_FLIGHT = 0.25  # of the range: the discs before and after share 84 % of their area
+
+
+@dataclass(eq=False)
+class Flights:
+    """The flights of a gateway, which is connected anywhere."""
+
+    _pilot: Pilot
+    _neighbours: Neighbours
+    _control: IControlPlane
+    _orders: OrderIntake
+    _report: Reporter
+
+    def took_off(self) -> None:
+        """The drone leaves its place because of an order."""
+
+    @due(Due.ASK_POSITION)
+    def watch(self) -> None:
+        """Look where the drone is, in flight."""
+        if self._pilot.watch():
+            self._landed()
+
+    def _landed(self) -> None:
+        """The drone is at another place and has other neighbours."""
+        self._neighbours.forget_all()
+        self._control.routes.node_moved_location()
+        self._report(MeshEventKind.LANDED)
+        self._control.introduce()
+        self._orders.on_landed()
+
+
+@dataclass(eq=False)
+class RouterFlights(Flights):
+    """The flights of a router, by order or for a repair."""
+
+    _states: RouterStates
+    _repair: ConnectionRepair
+    _deadlines: Deadlines
+    _antenna: IWirelessCommunication
+
+    def took_off(self) -> None:
+        """The drone leaves its place because of an order: tell the neighbours where it flies."""
+        goal = self._pilot.goal
+        if self._repair.medium.shared and goal is not None:
+            self._repair.announce_place(goal)
+            self._deadlines.set(Due.GOAL, self._deadlines.now_s + GOAL_AGAIN_S)
+            for neighbour in sorted(self._neighbours.ids()):
+                heard = self._neighbours.place_of(neighbour)
+                if heard is not None and heard.place.distance_m(goal) >= self._repair.range_m:
+                    self._control.neighbour_leaves(neighbour)
+        self._neighbours.takes_off(by_order=True)
+        if not self._is_short():
+            self._repair.on_ordered_flight()
+
+    def _is_short(self) -> bool:
+        """Whether most neighbours will remain in reach, so that the router remains a relay."""
+        if not self._states.connected or self._states.repair is RepairState.FLYING:
+            return False
+        return self._pilot.distance_m() <= SHORT_FLIGHT * self._repair.range_m
+
+    @due(Due.GOAL)
+    def announce_goal_again(self) -> None:
+        """Tell the neighbours once more where the drone flies."""
+        self._deadlines.set(Due.GOAL, math.inf)
+        goal = self._pilot.goal
+        if goal is not None:
+            self._repair.announce_place(goal)
+
+    @due(Due.ASK_POSITION)
+    def watch(self) -> None:
+        """Look where the drone is, in flight."""
+        if not self._pilot.watch():
+            self._repair.on_flight_second()
+        elif self._repair.on_arrived():
+            self._landed()
+
+    @due(Due.REPAIR)
+    def on_repair_due(self) -> None:
+        """Go on with the repair, which may end its flight."""
+        if self._repair.on_due():
+            self._landed()
+
+    def _landed(self) -> None:
+        self._neighbours.stands(self._deadlines.now_s)
+        if self._states.repair is RepairState.FLYING:
+            self._repair.on_landed()
+            super()._landed()
+            return
+        self._report(MeshEventKind.LANDED)
+        self._orders.on_landed()
+        if self._antenna.on():
+            self._control.check(self._deadlines.now_s)

@@ -1,0 +1,89 @@
+"""NodeSnapshots: what a component tells about itself, for display. Any thread may call it."""
+
+from __future__ import annotations
+
+from drone_mesh.communication.control.control_plane import IControlPlane
+from drone_mesh.communication.interfaces import (
+    NO_ROUTE,
+    IMeshDebugInfo,
+    IWirelessCommunication,
+)
+from drone_mesh.communication.neighbours.known_places import KnownPlaces
+from drone_mesh.communication.neighbours.neighbour_table import Neighbours
+from drone_mesh.communication.node.own_id import OwnId
+from drone_mesh.communication.repair.status import NOTHING_TO_REPAIR, RepairStatus
+from drone_mesh.communication.timing.deadlines import Deadlines
+from drone_mesh.communication.timing.medium import ChannelUse
+
+
+class NodeSnapshots(IMeshDebugInfo):
+    """The getters of a component; the component sets the fields."""
+
+    _node_id: int
+    control: IControlPlane
+    places: KnownPlaces
+    _neighbours: Neighbours
+    _own_id: OwnId
+    _deadlines: Deadlines
+    _antenna: IWirelessCommunication
+
+    def get_node_id(self) -> int:
+        """This node's id, 0..253."""
+        return self._node_id
+
+    def get_connected_to_gateway(self) -> bool:
+        """Whether a gateway answered the last heartbeat, or may still answer.
+
+        Of a gateway: true while its internet works; otherwise whether it reaches another one.
+        """
+        return self.control.connected
+
+    def get_preferred_gateway(self) -> int:
+        """Id of the gateway that this node uses, perhaps itself; NO_ROUTE while it knows none."""
+        return self.control.gateway
+
+    def get_hops_from_gateway_away(self) -> int:
+        """Hops to that gateway, 0 for a gateway with internet; 255 while unknown."""
+        return self.control.hops
+
+    def get_total_message_sent(self) -> int:
+        """Packets sent successfully, own and forwarded ones, broadcasts not counted."""
+        return self.control.delivery.total_sent
+
+    def get_last_good_known_location_id(self) -> int:
+        """Id of the node whose place this one would fly to, or NO_ROUTE."""
+        return self.places.good_id
+
+    def get_last_good_known_location_seen_s(self) -> float:
+        """When the node was at that place (seconds of the core's clock)."""
+        return self.places.good_seen_s
+
+    def get_router_tech_table_size(self) -> int:
+        """Known nodes; one that is known through two neighbours counts twice."""
+        return self.control.routes.get_table_size()
+
+    def get_neighbours(self) -> dict[int, float]:
+        """Direct neighbours, and when each was last heard (seconds of the core's clock)."""
+        return self._neighbours.heard_s()
+
+    def get_route_to_gateway(self) -> int:
+        """The neighbour that leads to the preferred gateway; a gateway returns its own id."""
+        return self.get_direction_to(self.get_preferred_gateway())
+
+    def get_direction_to(self, node: int) -> int:
+        """The neighbour that leads to `node`; this node's own id for itself."""
+        if node in (self._node_id, NO_ROUTE):
+            return node
+        return self.control.routes.get_direction_to_node(node)
+
+    def get_shares_id(self) -> bool:
+        """Whether another radio with this node's id was heard lately."""
+        return self._own_id.is_shared(self._deadlines.now_s)
+
+    def get_repair_status(self) -> RepairStatus:
+        """What the node does about a lost connection, and why."""
+        return NOTHING_TO_REPAIR
+
+    def get_channel_use(self) -> ChannelUse:
+        """The antenna's use of a shared channel."""
+        return self._antenna.channel_use()

@@ -1,0 +1,190 @@
+"""Whereabouts: what a node is told of the places of others, and what it tells them.
+
+docs/repair.md, "Places to step back to" and "Places of silent drones".
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from drone_mesh.communication.control.claims import Claims
+from drone_mesh.communication.control.control_plane import IControlPlane
+from drone_mesh.communication.control.node_part import receives
+from drone_mesh.communication.control.pilot import Pilot
+from drone_mesh.communication.interfaces import BROADCAST
+from drone_mesh.communication.neighbours.common_frame import CommonFrame
+from drone_mesh.communication.neighbours.known_places import KnownPlaces
+from drone_mesh.communication.neighbours.neighbour_table import Neighbours
+from drone_mesh.communication.node.last_place import LastPlace
+from drone_mesh.communication.repair.connection_repair import ConnectionRepair
+from drone_mesh.communication.timing.deadlines import Deadlines
+from drone_mesh.communication.wire import messages
+from drone_mesh.communication.wire.messages import GatewayPlace
+from drone_mesh.communication.wire.packet_types import MessageType
+from drone_mesh.drone.location import Location
+
+NEAR_CLEARANCES = 3.0  # a drone that moves aside once is still within that
+MOST_TOLD = 4  # more drones do not stand that near to one place
+
+
+@dataclass(eq=False)
+class Whereabouts:
+    """The places of others, as a gateway needs them, and the answers of every node."""
+
+    _node_id: int
+    _control: IControlPlane
+    _deadlines: Deadlines
+    _pilot: Pilot
+    _neighbours: Neighbours
+    _places: KnownPlaces
+    _frame: CommonFrame
+    _clearance_m: float
+    _has_key: bool
+
+    @receives(MessageType.LOCATION)
+    def on_location(self, payload: bytes, creator: int, from_: int) -> None:
+        """A node's place or goal, and perhaps the place of a gateway."""
+        place, is_goal = messages.place_in(payload), messages.is_goal(payload)
+        self._set_place(creator, place, is_goal, GatewayPlace.from_payload(payload))
+        if is_goal and creator == from_ and messages.addressee(payload) == BROADCAST:
+            self._flies_to(creator, place)
+
+    def _set_place(
+        self, node: int, place: Location, is_goal: bool, gateway: GatewayPlace | None
+    ) -> None:
+        """`node` reports its place, or where it flies to, and perhaps the place of a gateway."""
+        now_s = self._deadlines.now_s
+        self._neighbours.set_place(node, place, now_s, is_goal)
+        if node == self._control.gateway:
+            self._places.update_gateway(place, now_s)
+            self._control.gateway_sent_place()
+
+    def _flies_to(self, neighbour: int, goal: Location) -> None:
+        """A neighbour announces where it is about to fly."""
+
+    def on_passing_location(self, creator: int, payload: bytes) -> None:
+        """A LOCATION for another node is about to be forwarded."""
+
+    @receives(MessageType.REQUESTLOCATION)
+    def on_request(self, payload: bytes, creator: int, from_: int) -> None:
+        """Answer with this node's place; to a drone in flight also with those of silent ones."""
+        asker = messages.place_of_asker(payload)
+        if asker is None or creator == self._node_id or self._frame.refuses(from_):
+            self._answer(creator)
+            return
+        place, flies_there = asker
+        now_s = self._deadlines.now_s
+        if flies_there:
+            self._neighbours.motion.flies_for_repair(creator, now_s)
+        self._neighbours.set_place(creator, place, now_s, flies_there)
+        self._is_taken(place)
+        self._answer(creator)
+        if flies_there:
+            self._tell_last_places(creator, place)
+
+    def _is_taken(self, place: Location) -> None:
+        """A node that asks for places is at `place` or flies there."""
+
+    def _answer(self, asker: int) -> None:
+        goal = self._pilot.goal
+        place = goal or self._pilot.location()
+        if place is None:
+            return
+        me, now_s, places = self._node_id, self._deadlines.now_s, self._places
+        answer = messages.own_location(place, goal is not None, now_s, me, asker)
+        if places.gateway is not None:
+            age_s = now_s - places.gateway_seen_s
+            extension = GatewayPlace(self._control.gateway, places.gateway, age_s)
+            if self._has_key:
+                self._control.delivery.send_own(extension.to_payload(me, me, asker, asker))
+            else:
+                answer = extension.appended_to(answer)
+        self._control.delivery.send_own(answer)
+
+    def _tell_last_places(self, asker: int, goal: Location) -> None:
+        """Tell a drone in flight which nodes were last heard near its goal."""
+        near = sorted(
+            (heard.place.distance_m(goal), node, heard)
+            for node, heard in self._neighbours.taken()
+            if node not in (asker, self._node_id)
+        )
+        for away_m, node, heard in near[:MOST_TOLD]:
+            if away_m < NEAR_CLEARANCES * self._clearance_m:
+                last = LastPlace(node, heard.place, self._deadlines.now_s - heard.heard_s)
+                self._control.delivery.send_own(last.packet(self._node_id, asker))
+
+    @receives(MessageType.LAST_PLACE)
+    def on_last_place(self, payload: bytes, _creator: int, _from: int) -> None:
+        """Where another node was last heard."""
+        last = LastPlace.from_payload(payload)
+        if last.node != self._node_id:
+            self._was_heard(last)
+
+    def _was_heard(self, last: LastPlace) -> None:
+        heard_s = self._deadlines.now_s - last.age_s
+        self._neighbours.passes(last.node, last.place, heard_s)
+
+
+@dataclass(eq=False)
+class RouterWhereabouts(Whereabouts):
+    """The places of others, as a router needs them that may have to fly for its connection."""
+
+    _claims: Claims
+    _repair: ConnectionRepair
+
+    def on_passing_location(self, creator: int, payload: bytes) -> None:
+        """Relays use the gateway's place as well, unless only the addressee can check it."""
+        if not self._has_key and creator == self._control.gateway:
+            place = messages.place_in(payload)
+            if self._claims.may_be_at(place, gateway=True, says_so=not messages.is_goal(payload)):
+                self._places.update_gateway(place, self._deadlines.now_s)
+
+    def _set_place(
+        self, node: int, place: Location, is_goal: bool, gateway: GatewayPlace | None
+    ) -> None:
+        now_s, control = self._deadlines.now_s, self._control
+        is_gateway = node == control.gateway
+        # A gateway is followed to its goal; a relay's goal is not where this node had a link to it.
+        is_next_hop = node == control.next_hop() and (is_gateway or not is_goal)
+        if is_gateway:
+            control.gateway_sent_place()
+        elif gateway is not None:
+            self._gateway_was_at(gateway)
+        judged = is_gateway or is_next_hop
+        if judged and not self._claims.may_be_at(place, is_gateway, says_so=not is_goal):
+            return
+        self._neighbours.set_place(node, place, now_s, is_goal)
+        if is_gateway:
+            self._places.update_gateway(place, now_s)
+        if is_next_hop:
+            self._places.update_next_hop(node, place, now_s)
+        self._repair.on_place(node, place)
+
+    def _flies_to(self, neighbour: int, goal: Location) -> None:
+        here = self._pilot.goal or self._pilot.location()
+        if here is not None and here.distance_m(goal) >= self._repair.range_m:
+            self._control.neighbour_leaves(neighbour)
+
+    def _is_taken(self, place: Location) -> None:
+        self._repair.on_taken(place)
+
+    def _was_heard(self, last: LastPlace) -> None:
+        super()._was_heard(last)
+        heard = self._neighbours.place_of(last.node)
+        if heard is not None:
+            self._repair.on_taken(heard.place)
+        self._repair.on_taken(last.place)
+
+    @receives(MessageType.GATEWAY_PLACE)
+    def on_gateway_place(self, payload: bytes, _creator: int, _from: int) -> None:
+        """Where a gateway was, in a mesh with a key."""
+        gateway = GatewayPlace.from_payload(payload)
+        if gateway is not None:
+            self._gateway_was_at(gateway)
+
+    def _gateway_was_at(self, gateway: GatewayPlace) -> None:
+        if not self._control.told_of_gateway(gateway.gateway):
+            return
+        if self._claims.may_be_at(gateway.place, gateway=True, says_so=False):
+            seen_s = self._deadlines.now_s - gateway.age_s
+            self._places.hear_of_gateway(gateway.place, seen_s, self._control.connected)
