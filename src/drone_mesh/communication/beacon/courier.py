@@ -60,7 +60,7 @@ class Courier(IDelivery):
         on_returned: Callable[[int, int], None],
         without_proof: Callable[[bytes], bytes],
     ) -> None:
-        """`attempts`: of a packet for one neighbour where the antenna itself makes only one.
+        """`attempts`: of a packet for one neighbour.
 
         `on_sent`, `on_failed`: a neighbour took a packet, or did not; `on_returned`: it sent one
         back, for this addressee; `without_proof`: see IMeshSeals.
@@ -68,7 +68,7 @@ class Courier(IDelivery):
         self._node_id = node_id
         self._antenna = antenna
         self._deadlines = deadlines
-        self._attempts = 1 if antenna.medium.shared else attempts
+        self._attempts = attempts
         self._verdict = verdict
         self._on_sent = on_sent
         self._on_failed = on_failed
@@ -168,11 +168,9 @@ class Courier(IDelivery):
         for _attempt in range(self._attempts):
             if self._antenna.send_message_to(payload):
                 self.total_sent += 1
-                if not self._antenna.medium.shared:
-                    self._on_sent(to)
+                self._on_sent(to)
                 return True
-        if not self._antenna.medium.shared:
-            self._on_failed(to)
+        self._on_failed(to)
         return False
 
     def _identity(self, payload: bytes) -> Hashable:
@@ -194,3 +192,12 @@ class Courier(IDelivery):
             self._turn_s = now_s + REMEMBERED_S
             self._known, self._earlier = {}, self._known
         self._known[identity] = transit
+
+
+class QueuedCourier(Courier):
+    """On a shared channel the antenna queues packets, and reports their fate later."""
+
+    def _hand_over(self, payload: bytes, to: int) -> bool:
+        taken = self._antenna.send_message_to(payload)
+        self.total_sent += taken
+        return taken

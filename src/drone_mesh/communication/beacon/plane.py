@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from drone_mesh.communication.beacon.connection import Connection
-from drone_mesh.communication.beacon.courier import Courier
+from drone_mesh.communication.beacon.courier import Courier, QueuedCourier
 from drone_mesh.communication.beacon.losses import LUCKY
 from drone_mesh.communication.beacon.nodes_below import NodesBelow
 from drone_mesh.communication.beacon.own_beacons import OwnBeacons
@@ -68,7 +68,8 @@ class BeaconPlane(IControlPlane):
         self._trickle = Trickle(medium, node.rng)
         self._searches = Searches(self._me, self._routes, self._broadcast, medium.hop_s)
         self._verdicts = Verdicts(self._routes, self._searches, self._deadlines)
-        self._courier = self.delivery = Courier(
+        carry = QueuedCourier if medium.shared else Courier
+        self._courier = self.delivery = carry(
             self._me,
             self._antenna,
             self._deadlines,

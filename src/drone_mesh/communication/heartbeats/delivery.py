@@ -1,19 +1,22 @@
 """Delivery: sends packets to neighbours, and informs them of lost nodes.
 
+ImmediateDelivery is the way of the document; for a shared channel see queued_delivery.
+
 docs/protocol.md, "Sending" and "Missing nodes".
 """
 
 from __future__ import annotations
 
+import abc
 import math
 from collections import deque
+from dataclasses import dataclass
 from typing import Protocol, Sequence
 
 from drone_mesh.communication.control.delivery import IDelivery
 from drone_mesh.communication.events.observer import MeshEventKind, Reporter
 from drone_mesh.communication.heartbeats.circulation import CirculationGuard, Passage
 from drone_mesh.communication.interfaces import (
-    BROADCAST,
     NO_ROUTE,
     IMeshSeals,
     IWirelessCommunication,
@@ -45,43 +48,30 @@ class IWayFinder(Protocol):
         """Users' data for `node` has no way from here: search for it. False: this is no gateway."""
 
 
+@dataclass(eq=False)
 class Delivery(IDelivery):
     """Sends the packets of one node; the routes learn from success and failure.
 
-    Called only by the node's component and its parts.
+    There are two ways, of which the medium decides: the outcome is known at once
+    (`ImmediateDelivery`), or the antenna queues a packet and reports the outcome later
+    (`QueuedDelivery`). Called only by the node's component and its parts.
     """
 
-    def __init__(
-        self,
-        node_id: int,
-        routing: IRoutingTechnique,
-        ways: IWayFinder,
-        antenna: IWirelessCommunication,
-        neighbours: Neighbours,
-        deadlines: Deadlines,
-        attempts: int,
-        report: Reporter,
-        seals: IMeshSeals,
-    ) -> None:
-        """`attempts` that fail: then the receiver counts as lost."""
-        self._node_id = node_id
-        self._routing = routing
-        self._ways = ways
-        self._antenna = antenna
-        self._shared = antenna.medium.shared
-        self._neighbours = neighbours
-        self._deadlines = deadlines
-        self._attempts = attempts
-        self._report = report
-        self._reported_s: dict[int, float] = {}  # shared medium: when each was announced
-        self._gave_up: set[int] = set()  # neighbours that were heard but took no packets
+    _node_id: int
+    _routing: IRoutingTechnique
+    _ways: IWayFinder
+    _antenna: IWirelessCommunication
+    _neighbours: Neighbours
+    _deadlines: Deadlines
+    _attempts: int  # that fail: then the receiver counts as lost
+    _report: Reporter
+    _seals: IMeshSeals
+
+    def __post_init__(self) -> None:
         self._strangers = Strangers()
         self._known = self._strangers.known  # read for each packet
-        self._announced = RateLimit(REPEATS)
-        self._missing_to_report: deque[tuple[int, int, int]] = deque()
-        self._reporting = False
-        self._without_proof = seals.without_proof  # which is put on later than it is sent
-        self._kept_s = antenna.medium.stretched(SENT_KEPT_S)
+        self._without_proof = self._seals.without_proof  # which is put on later than it is sent
+        self._kept_s = self._antenna.medium.stretched(SENT_KEPT_S)
         self._relayed = CirculationGuard(self._kept_s)  # own packets
         self._begun_s = -math.inf  # what this node sent before its start comes back, too
         self.total_sent = 0
@@ -104,20 +94,11 @@ class Delivery(IDelivery):
             now_s = self._deadlines.now_s
             identity = messages.identity(self._without_proof(payload))
             self._relayed.passed(identity, self._node_id, to, now_s)
-        if self._shared:
-            return self._hand_over(payload)
-        while failures < self._attempts or failures < self._most_attempts(payload):
-            if self._antenna.send_message_to(payload):
-                self.total_sent += 1
-                if not is_known:
-                    self._known.add(to)
-                self._routing.sent(to, True, failures + 1)
-                return True
-            failures += 1
-        self._routing.sent(to, False, failures)
-        if not messages.asks_for_place(payload):
-            self.neighbour_lost(to, came_from)
-        return False
+        return self._transmit(payload, to, failures, came_from)
+
+    @abc.abstractmethod
+    def _transmit(self, payload: bytes, to: int, failures: int, came_from: int) -> bool:
+        """Hand a packet to the antenna, as for `send`."""
 
     def begin(self) -> None:
         """The node starts."""
@@ -132,48 +113,10 @@ class Delivery(IDelivery):
         """Whether it knows all packets of this node that may be under way."""
         return self._deadlines.now_s - self._begun_s > self._kept_s
 
-    def _most_attempts(self, payload: bytes) -> int:
-        return self._attempts * (DATA_PERSISTENCE if messages.is_data(payload) else 1)
-
-    def _hand_over(self, payload: bytes) -> bool:
-        """Have the antenna queue a packet; it reports the outcome later."""
-        taken = self._antenna.send_message_to(payload)
-        self.total_sent += taken
-        return taken
-
     def delivered(self, to: int, tries: int) -> None:
         """The antenna has delivered a packet from a batch or from its queue."""
         self._known.add(to)
         self._routing.sent(to, True, tries)
-
-    def undelivered(self, payload: bytes, tries: int) -> bool:
-        """The antenna gave up a packet. Returns whether the packet takes another route.
-
-        A neighbour that was heard recently counts as lost only after two failures in a row, because
-        the channel may be busy.
-        """
-        to, other = messages.receiver(payload), messages.addressee(payload)
-        is_known = self._routing.get_direction_to_node(other) != NO_ROUTE
-        self.total_sent -= 1
-        self._routing.sent(to, False, tries)
-        silent_since_s = self._deadlines.now_s - self._antenna.medium.silence_s
-        heard = self._neighbours.last_heard_s(to, otherwise=silent_since_s) > silent_since_s
-        if messages.asks_for_place(payload):
-            pass  # others decide: who keeps only these from arriving must not cut a mesh
-        elif heard and messages.is_data(payload):
-            pass  # users' packets crowd the channel; their loss says little about a heard neighbour
-        elif heard and to not in self._gave_up:
-            self._gave_up.add(to)
-        else:
-            self._gave_up.discard(to)
-            self.neighbour_lost(to)
-        detour = self._routing.get_direction_to_node(other)
-        if detour in (NO_ROUTE, to) and other != to:
-            by_default = messages.is_data(payload) and not is_known
-            detour = self._ways.way_up(to) if by_default else self._ways.another_next_hop(other, to)
-        if detour in (NO_ROUTE, to):
-            return False
-        return self.send(messages.readdressed(payload, detour), detour)
 
     def send_own(self, payload: bytes) -> bool:
         """Send this node's own packet to its addressee, trying one route after the other."""
@@ -206,23 +149,13 @@ class Delivery(IDelivery):
             taken |= self.send(packet, to)
         return taken
 
+    @abc.abstractmethod
     def send_own_to_each(self, payload: bytes, others: Sequence[int]) -> None:
-        """Like `send_own`, to each of these; packets for direct neighbours leave together."""
-        routing = self._routing
-        if self._shared:
-            for other in others:
-                self.send_own(messages.addressed(payload, other))
-            return
-        direct = [other for other in others if routing.get_direction_to_node(other) == other]
-        packets = [messages.addressed(payload, other) for other in direct]
-        for other, packet, taken in zip(direct, packets, self._antenna.send_messages(packets)):
-            if taken:
-                self.total_sent += 1
-                self.delivered(other, 1)
-            elif not self.send(packet, other, failures=1):
-                self.send_own(packet)
-        for other in set(others).difference(direct):
-            self.send_own(messages.addressed(payload, other))
+        """Like `send_own`, to each of these."""
+
+    @abc.abstractmethod
+    def undelivered(self, payload: bytes, tries: int) -> bool:
+        """The antenna gave up a queued packet. Returns whether the packet takes another route."""
 
     # Lost nodes ------------------------------------------------------------------------------
 
@@ -247,6 +180,77 @@ class Delivery(IDelivery):
             self._neighbours.lost(gateway, self._deadlines.now_s)
         self._routing.gateway_taken(neighbour, gateway)
 
+    @abc.abstractmethod
+    def report_missing(
+        self, missing: int, first: int = NO_ROUTE, reported_by: int = NO_ROUTE
+    ) -> None:
+        """Tell the neighbours of a missing node, `first` before the others, not `reported_by`."""
+
+    @abc.abstractmethod
+    def came_back(self, missing: int, neighbour: int) -> None:
+        """`neighbour` sent a packet for `missing` that this node could only send straight back."""
+
+    @abc.abstractmethod
+    def neighbour_leaves(self, neighbour: int) -> None:
+        """A neighbour or this node flies, and they will be out of reach of each other."""
+
+    def neighbour_lost(self, node: int, came_from: int = NO_ROUTE) -> None:
+        """A neighbour is out of reach, or about to be: find other routes.
+
+        `came_from`: the neighbour to inform first.
+        """
+        self._strangers.gave_up(node, self._deadlines.now_s)
+        if self._neighbours.lost(node, self._deadlines.now_s):
+            self._report(MeshEventKind.NEIGHBOUR_LOST, node)
+        if self._routing.cant_communicate_with_node(node):
+            self._report(MeshEventKind.NODE_MISSING, node)
+            self.report_missing(node, first=came_from)
+        self._ways.on_neighbour_lost(node)
+
+
+class ImmediateDelivery(Delivery):
+    """Tries again at once; who takes no packet is lost, and each neighbour is told so."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._announced = RateLimit(REPEATS)
+        self._missing_to_report: deque[tuple[int, int, int]] = deque()
+        self._reporting = False
+
+    def _transmit(self, payload: bytes, to: int, failures: int, came_from: int) -> bool:
+        while failures < self._attempts or failures < self._most_attempts(payload):
+            if self._antenna.send_message_to(payload):
+                self.total_sent += 1
+                self._known.add(to)
+                self._routing.sent(to, True, failures + 1)
+                return True
+            failures += 1
+        self._routing.sent(to, False, failures)
+        if not messages.asks_for_place(payload):
+            self.neighbour_lost(to, came_from)
+        return False
+
+    def _most_attempts(self, payload: bytes) -> int:
+        return self._attempts * (DATA_PERSISTENCE if messages.is_data(payload) else 1)
+
+    def send_own_to_each(self, payload: bytes, others: Sequence[int]) -> None:
+        """Like `send_own`, to each of these; packets for direct neighbours leave together."""
+        routing = self._routing
+        direct = [other for other in others if routing.get_direction_to_node(other) == other]
+        packets = [messages.addressed(payload, other) for other in direct]
+        for other, packet, taken in zip(direct, packets, self._antenna.send_messages(packets)):
+            if taken:
+                self.total_sent += 1
+                self.delivered(other, 1)
+            elif not self.send(packet, other, failures=1):
+                self.send_own(packet)
+        for other in set(others).difference(direct):
+            self.send_own(messages.addressed(payload, other))
+
+    def undelivered(self, payload: bytes, tries: int) -> bool:
+        """Does not happen: `send` tells the outcome."""
+        return False
+
     def report_missing(
         self, missing: int, first: int = NO_ROUTE, reported_by: int = NO_ROUTE
     ) -> None:
@@ -255,9 +259,6 @@ class Delivery(IDelivery):
         A neighbour that does not take the packet is itself lost. Its loss is queued, not handled
         within this call, so that the call depth does not grow with the number of neighbours.
         """
-        if self._antenna.medium.shared:
-            self._announce_missing(missing)
-            return
         if not self._announced.count(missing, self._deadlines.now_s):
             return
         self._missing_to_report.append((missing, first, reported_by))
@@ -277,37 +278,8 @@ class Delivery(IDelivery):
             self._reporting = False
 
     def came_back(self, missing: int, neighbour: int) -> None:
-        """`neighbour` sent a packet for `missing` that this node could only send straight back.
+        """Tell all neighbours, and the one that sent it first."""
+        self.report_missing(missing, first=neighbour)
 
-        On a shared medium only that neighbour is informed, because for all others the route still
-        works.
-        """
-        if not self._antenna.medium.shared:
-            self.report_missing(missing, first=neighbour)
-            return
-        me = self._node_id
-        packet = messages.MissingMessage(me, me, neighbour, neighbour, missing)
-        self.send(packet.to_payload(), neighbour)
-
-    def _announce_missing(self, missing: int) -> None:
-        """Send one MISSING to all neighbours, unless the same was sent a moment ago."""
-        now_s, me = self._deadlines.now_s, self._node_id
-        if now_s - self._reported_s.get(missing, -math.inf) < self._antenna.medium.missing_quiet_s:
-            return
-        self._reported_s[missing] = now_s
-        self._antenna.broadcast_message(
-            messages.MissingMessage(me, me, BROADCAST, BROADCAST, missing).to_payload()
-        )
-
-    def neighbour_lost(self, node: int, came_from: int = NO_ROUTE) -> None:
-        """A neighbour is out of reach, or about to be: find other routes.
-
-        `came_from`: the neighbour to inform first.
-        """
-        self._strangers.gave_up(node, self._deadlines.now_s)
-        if self._neighbours.lost(node, self._deadlines.now_s):
-            self._report(MeshEventKind.NEIGHBOUR_LOST, node)
-        if self._routing.cant_communicate_with_node(node):
-            self._report(MeshEventKind.NODE_MISSING, node)
-            self.report_missing(node, first=came_from)
-        self._ways.on_neighbour_lost(node)
+    def neighbour_leaves(self, neighbour: int) -> None:
+        """Does nothing: the next packet that fails looks for other routes."""

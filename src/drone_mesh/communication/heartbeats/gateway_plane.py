@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Sequence
-
 from drone_mesh.communication.control.control_plane import ControlledNode
 from drone_mesh.communication.control.node_part import receives
 from drone_mesh.communication.control.router_states import RouterEvent, RouterStates
-from drone_mesh.communication.heartbeats.plane import HeartbeatPlane
+from drone_mesh.communication.heartbeats.connection import GatewayConnection
 from drone_mesh.communication.heartbeats.router_plane import RouterHeartbeats
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.routing.interfaces import IRoutingTechnique
@@ -15,24 +13,35 @@ from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.packet_types import MessageType
 
 
+class OwnGateway(GatewayConnection):
+    """The connection of a gateway with internet: to itself. Nobody else has to answer."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.gateway, self.hops = self._node_id, 0
+
+    def next_hop(self) -> int:
+        """Itself."""
+        return self._node_id
+
+
 class GatewayHeartbeats(RouterHeartbeats):
     """Answers heartbeats. While its internet does not work, it is a router instead."""
 
     def __init__(self, node: ControlledNode, technique: IRoutingTechnique) -> None:
         super().__init__(node, technique, RouterStates())
-        self._has_internet = True
+        self._to_another = self._connection  # while its internet does not work
+        self._own = self._connected_by(node, OwnGateway)
+        self._connection = self._own
 
     @property
-    def gateway(self) -> int:
-        """This gateway's own id; without internet, the other gateway that it uses."""
-        return self._node_id if self._has_internet else super().gateway
+    def _has_internet(self) -> bool:
+        return self._connection is self._own
 
     @property
     def hops(self) -> int:
-        """Hops to that gateway; 0 for itself."""
-        if self._has_internet:
-            return 0
-        return super().hops if self._states.connected else NO_ROUTE
+        """Hops to the gateway that it uses; 0 to itself."""
+        return super().hops if self._has_internet or self._states.connected else NO_ROUTE
 
     @property
     def connected(self) -> bool:
@@ -41,37 +50,9 @@ class GatewayHeartbeats(RouterHeartbeats):
 
     def on_internet(self, works: bool) -> None:
         """Be a gateway, or a router that says so to all who take it for one."""
-        self._connection.end(RouterEvent.ROUTE_LOST)
-        self._has_internet = works
+        self._to_another.end(RouterEvent.ROUTE_LOST)
+        self._connection = self._own if works else self._to_another
         self.introduce()
-
-    def check(self, due_s: float) -> None:
-        """Check neighbours and routes."""
-        if self._has_internet:
-            self._technique.maintain_routing()
-        else:
-            super().check(due_s)
-
-    def send_heartbeat(self, other: int) -> bool:
-        """Send a heartbeat to `other`; a gateway with internet expects no answer."""
-        if self._has_internet:
-            return HeartbeatPlane.send_heartbeat(self, other)
-        return super().send_heartbeat(other)
-
-    def send_heartbeats(self, others: Sequence[int]) -> None:
-        """Send a heartbeat to each of these."""
-        if self._has_internet:
-            HeartbeatPlane.send_heartbeats(self, others)
-        else:
-            super().send_heartbeats(others)
-
-    def next_hop(self) -> int:
-        """Itself, or the next hop to another gateway."""
-        return self.gateway if self._has_internet else super().next_hop()
-
-    def told_of_gateway(self, gateway: int) -> bool:
-        """Whether that is the preferred one."""
-        return gateway == self.gateway if self._has_internet else super().told_of_gateway(gateway)
 
     @receives(MessageType.PRESENT)
     def on_present(self, payload: bytes, creator: int, _from: int) -> None:
@@ -105,7 +86,7 @@ class GatewayHeartbeats(RouterHeartbeats):
 
     # Users' data for nodes that this gateway does not know --------------------------------------
 
-    def seek(self, node: int) -> bool:
+    def seek(self, node: int) -> bool:  # noqa: D102
         if self.way_up(NO_ROUTE) != NO_ROUTE:
             return False
         self._search.seek(node)

@@ -7,11 +7,12 @@ from typing import Sequence
 
 from drone_mesh.communication.control.control_plane import ControlledNode, IControlPlane
 from drone_mesh.communication.control.node_part import due, receives
-from drone_mesh.communication.heartbeats.delivery import Delivery
+from drone_mesh.communication.heartbeats.delivery import Delivery, ImmediateDelivery
 from drone_mesh.communication.heartbeats.forwarding import Forwarding
 from drone_mesh.communication.heartbeats.introduction import Introduction
 from drone_mesh.communication.heartbeats.node_search import NodeSearch
 from drone_mesh.communication.heartbeats.own_heartbeats import OwnHeartbeats
+from drone_mesh.communication.heartbeats.queued_delivery import QueuedDelivery
 from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE
 from drone_mesh.communication.routing.interfaces import IRoutingEssentials, IRoutingTechnique
 from drone_mesh.communication.timing.deadlines import Due
@@ -35,7 +36,8 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         self._neighbours = node.neighbours
         self._places = node.places
         self._pilot = node.pilot
-        self._delivery = self.delivery = Delivery(
+        deliver = QueuedDelivery if self._medium.shared else ImmediateDelivery
+        self._delivery: Delivery = deliver(
             node.node_id,
             technique,
             self,
@@ -46,6 +48,7 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
             node.report,
             node.seals,
         )
+        self.delivery = self._delivery
         self._forwarding = Forwarding(
             node.node_id, technique, self._delivery, self._medium, node.complaints, node.report
         )
@@ -100,8 +103,7 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
 
     def neighbour_leaves(self, neighbour: int) -> None:
         """Look for other routes on a shared medium; elsewhere the next failed packet does so."""
-        if self._medium.shared:
-            self._delivery.neighbour_lost(neighbour)
+        self._delivery.neighbour_leaves(neighbour)
 
     # Packets ---------------------------------------------------------------------------------
 

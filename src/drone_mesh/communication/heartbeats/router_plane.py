@@ -36,10 +36,17 @@ class RouterHeartbeats(HeartbeatPlane):
         self._states = states
         self._may_be_gateway = node.seals.may_be_gateway
         self._rng = node.rng
-        self._connection = GatewayConnection(
+        self._connection = self._connected_by(node, GatewayConnection)
+        if self._medium.shared:
+            self.forward = self._forward_and_learn
+
+    def _connected_by(
+        self, node: ControlledNode, kind: type[GatewayConnection]
+    ) -> GatewayConnection:
+        return kind(
             node.node_id,
-            states,
-            technique,
+            self._states,
+            self._technique,
             self._delivery,
             self._heartbeats,
             self._introduction,
@@ -52,8 +59,6 @@ class RouterHeartbeats(HeartbeatPlane):
             node.report,
             node.seals.has_key,
         )
-        if self._medium.shared:
-            self.forward = self._forward_and_learn
 
     @property
     def gateway(self) -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from rig import RecordingAntenna, packet
 
-from drone_mesh.communication.beacon.courier import DROP, HOLD, Courier
+from drone_mesh.communication.beacon.courier import DROP, HOLD, Courier, QueuedCourier
 from drone_mesh.communication.timing.deadlines import Deadlines
 from drone_mesh.communication.timing.medium import Medium
 
@@ -20,7 +20,7 @@ class Node:
         self.taken, self.refused, self.returned = [], [], []
         self.antenna, self.deadlines = RecordingAntenna(Medium(shared=shared)), Deadlines()
         told = self.taken.append, self.refused.append, lambda *it: self.returned.append(it)
-        self.courier = Courier(
+        self.courier = (QueuedCourier if shared else Courier)(
             1, self.antenna, self.deadlines, 2, self.verdict, *told, lambda it: it[:25] + bytes(7)
         )
 
