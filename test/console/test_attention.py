@@ -34,6 +34,27 @@ def test_alarms_last_until_they_are_over_and_acknowledged(page):
     page.wait_for("no alarm", lambda: not count.is_visible() and alarms.count() == 0)
 
 
+MESH_ALARM = """async () => {
+  const { Alarms } = await import("/static/alarms.js");
+  const { Mesh } = await import("/static/mesh.js");
+  const mesh = new Mesh();
+  new Alarms(mesh, () => {}, () => {});
+  const alarm = { text: "the radio channel is jammed", nodes: [], since: 61, over: false };
+  mesh.apply({ clock: {}, alarms: [alarm] });
+  const find = (what) => document.querySelector(what);
+  const texts = ["#alarm-count", "#alarms li span"].map((what) => find(what).innerText);
+  return [...texts, find("#alarms button").ariaLabel];
+}"""
+
+
+def test_an_alarm_of_the_whole_mesh_is_one_alarm_without_nodes(page):
+    assert page.page.evaluate(MESH_ALARM) == [
+        "1 alarm",
+        "The mesh: the radio channel is jammed (since 61 s)",
+        "Acknowledge: the mesh: the radio channel is jammed",
+    ]
+
+
 def test_what_many_nodes_do_at_once_is_one_sentence(page):
     row = page.page.locator("#events li:has-text('reached gateway 0')")
     page.wait_for("a sentence", lambda: row.count() == 1)

@@ -561,3 +561,63 @@ def test_ids_of_three_digits_fit_into_their_dots(page):
         }"""
     )
     assert max(widths) < 0.95
+
+
+def test_beside_small_drones_there_are_the_ids_of_all_or_of_none(page):
+    sizes = page.page.evaluate(
+        """async () => {
+          const { labelSize } = await import("/static/draw.js");
+          const sizes = (radius) => [[7, 99], [7, 253]].map((ids) => labelSize(ids, radius));
+          return [4.5, 6, 13].map(sizes);
+        }"""
+    )
+    assert sizes[0][0] > 0  # 15 px from drone to drone
+    assert sizes[0][1] == 0
+    assert sizes[1][1] > 0  # 20 px: three digits, too
+    assert sizes[2] == [10, 10]
+
+
+GRID_CALLS = """() => new Promise((done) => {
+  const calls = [];
+  for (const name of ["stroke", "fillText"]) {
+    const call = CanvasRenderingContext2D.prototype[name];
+    CanvasRenderingContext2D.prototype[name] = function (...what) {
+      if (this.canvas.id === "map" && (name === "stroke" || / m$/.test(what[0]))) calls.push(name);
+      return call.call(this, ...what);
+    };
+  }
+  document.querySelector("#zoom-in").click();
+  requestAnimationFrame(() => requestAnimationFrame(() => done(calls)));
+})"""
+
+
+def test_no_line_of_the_grid_is_drawn_through_its_numbers(page):
+    assert page.page.evaluate(GRID_CALLS)[:3] == ["stroke", "fillText", "fillText"]
+
+
+SHOWN_RATES = """async (whole) => {
+  const { Charts } = await import("/static/charts.js");
+  const { Mesh } = await import("/static/mesh.js");
+  const mesh = new Mesh();
+  const texts = [];
+  const write = CanvasRenderingContext2D.prototype.fillText;
+  CanvasRenderingContext2D.prototype.fillText = function (text, ...place) {
+    if (this.canvas.id === "chart-rate") texts.push(text);
+    return write.call(this, text, ...place);
+  };
+  new Charts(mesh);
+  document.querySelector("#charts-whole").setAttribute("aria-pressed", whole);
+  const samples = Array.from({ length: 300 }, (_, i) => ({
+    stamp_s: i, routers_on: 1, routers_connected: 1, mean_hops: 1, most_hops: 1,
+    messages: i < 20 ? 9000 * i : 180000 + 12 * i,
+  }));
+  texts.length = 0;
+  mesh.apply({ clock: {}, samples });
+  CanvasRenderingContext2D.prototype.fillText = write;
+  return texts;
+}"""
+
+
+def test_a_chart_is_scaled_by_what_it_shows(page):
+    assert "10k" not in page.page.evaluate(SHOWN_RATES, False)
+    assert "10k" in page.page.evaluate(SHOWN_RATES, True)

@@ -31,6 +31,7 @@ class JammerTest(unittest.TestCase):
             return len(routers) == 3 and all("is jammed" in node.repair for node in routers)
 
         mesh.wait("all say that their channel is jammed", 90, all_say_so)
+        self.assertTrue(all(node.jammed for node in states[-1].nodes if node.id != 0))
         mesh.pass_time(60.0)
         jammer.publish(False)
         mesh.wait("all connected again", 30, mesh.connected)

@@ -12,6 +12,7 @@ from drone_mesh.state.condition import Condition, condition_of
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus, another_radio
 
 LOW_BATTERY_PERCENT = 20.0
+JAMMED = "the radio channel is jammed"
 _ORDER_FAILURES = {  # the words of the alarm; the reason follows
     MeshEventKind.ORDER_REFUSED.value: "refused an order",
     MeshEventKind.ORDER_LOST_CONTACT.value: "lost contact during an order",
@@ -22,9 +23,9 @@ _ORDER_ENDS = (MeshEventKind.ORDER_ARRIVED.value, MeshEventKind.ORDER_ACCEPTED.v
 
 @dataclass(frozen=True)
 class Alarm:
-    """One alarm of one node."""
+    """One alarm of one node, or of the mesh as a whole."""
 
-    node: int
+    node: int | None  # None: the whole mesh
     text: str  # what is wrong, after the name of the node
     since_s: float  # simulated
     until_s: float = math.inf  # inf: it lasts
@@ -35,12 +36,14 @@ class AlarmBook:
     """All alarms of a mesh. Belongs to one thread."""
 
     def __init__(self) -> None:
-        self._alarms: dict[tuple[int, str], Alarm] = {}  # by node and text, oldest first
+        self._alarms: dict[tuple[int | None, str], Alarm] = {}  # by node and text, oldest first
         self._was_connected: set[int] = set()
 
     def update(self, mesh: MeshStatus) -> None:
         """Compare with a state of the mesh: alarms begin and end."""
-        now: set[tuple[int, str]] = set()
+        now: set[tuple[int | None, str]] = set()
+        if any(node.jammed for node in mesh.nodes):
+            now.add((None, JAMMED))
         switched_off = {node.id for node in mesh.nodes if not node.on and node.battery != 0.0}
         self._was_connected -= switched_off
         for node in mesh.nodes:
@@ -85,20 +88,24 @@ class AlarmBook:
         return len(seen)
 
     def groups(self) -> list[dict[str, Any]]:
-        """For pages: nodes with the same alarm together, those that last and are new first."""
-        found: dict[tuple[bool, bool, str], list[Alarm]] = {}
+        """For pages: nodes with the same alarm together, those that last and are new first.
+
+        An entry without nodes is about the whole mesh.
+        """
+        found: dict[tuple[bool, bool, bool, str], list[Alarm]] = {}
         for alarm in self._alarms.values():
-            key = alarm.acknowledged, alarm.until_s < math.inf, alarm.text
+            is_over, of_node = alarm.until_s < math.inf, alarm.node is not None
+            key = alarm.acknowledged, is_over, of_node, alarm.text
             found.setdefault(key, []).append(alarm)
         return [
             {
                 "text": text,
-                "nodes": sorted(alarm.node for alarm in alarms),
+                "nodes": sorted(alarm.node for alarm in alarms if alarm.node is not None),
                 "since": round(min(alarm.since_s for alarm in alarms), 1),
                 "over": over,
                 "acknowledged": acknowledged,
             }
-            for (acknowledged, over, text), alarms in sorted(
+            for (acknowledged, over, _of_node, text), alarms in sorted(
                 found.items(), key=lambda item: item[0]
             )
         ]
@@ -108,10 +115,10 @@ class AlarmBook:
         self._alarms.clear()
         self._was_connected.clear()
 
-    def _of_orders(self, drone: int) -> list[tuple[int, str]]:
+    def _of_orders(self, drone: int) -> list[tuple[int | None, str]]:
         return [key for key in self._alarms if key[0] == drone and _of_order(key[1])]
 
-    def _end(self, key: tuple[int, str], now_s: float) -> None:
+    def _end(self, key: tuple[int | None, str], now_s: float) -> None:
         alarm = self._alarms[key]
         if alarm.acknowledged:
             del self._alarms[key]

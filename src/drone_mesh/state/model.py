@@ -62,6 +62,7 @@ class NodeStatus:
     battery: float = math.nan  # percent; NaN: none, or unknown
     crashed: bool = False
     shares_id: bool = False  # another radio with its id was heard lately
+    jammed: bool = False  # it hears nobody, and measures power in its channel
     why_not_fly: str = ""  # why its drone cannot fly now; empty: it can, or unknown
     repair: str = ""  # what the node does about a lost connection, and why; empty: nothing
     repair_reason: str = ""  # that why alone: of a node that does not fly or bid, or lands early

@@ -48,6 +48,7 @@ def describe_component(
     status.data_queued, status.data_given_up = data.messages_queued, data.messages_given_up
     repair = component.get_repair_status() if on else NOTHING_TO_REPAIR
     status.repair, status.repair_reason = repair.in_words(now_s), repair.reason
+    status.jammed = repair.jammed
     status.repair_state = REPAIR_STATES.index(repair.state)
     status.bid, status.place_of = repair.bid, repair.place_of
     waits = repair.state is RepairState.LOST

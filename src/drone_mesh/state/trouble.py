@@ -95,6 +95,9 @@ def summarise(nodes: Sequence[NodeStatus], troubles: Sequence[Trouble]) -> Summa
     if crashed:
         parts.append(f"{crashed} crashed")
     worst = max((trouble.severity for trouble in troubles), default=Severity.OK)
+    jammed = sum(node.jammed for node in nodes)
+    if jammed:
+        parts.append(f"radio channel jammed at {jammed}")
     return Summary(worst, ", ".join(parts))
 
 

@@ -152,8 +152,10 @@ def test_while_their_channel_is_jammed_no_drone_moves():
     network.run_for(600.0)
     assert not network.connected(8)
     assert "its channel is jammed" in network.status().nodes[8].repair
+    assert network.status().nodes[8].jammed
     network.air.jammed = False
     assert network.run_until(network.all_connected, within_s=20.0)
+    assert not network.status().nodes[8].jammed
     assert flown(network) == set()
 
 

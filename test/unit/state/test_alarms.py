@@ -80,6 +80,18 @@ def test_an_acknowledged_alarm_stays_until_it_is_over_and_comes_back_as_new():
     assert said(book) == [("low battery", [1], False, False)]
 
 
+def test_a_jammer_is_an_alarm_of_the_whole_mesh_and_the_first_one():
+    book = AlarmBook()
+    book.update(state(1.0, well(1), well(2)))
+    book.update(state(2.0, NodeStatus(1, jammed=True), NodeStatus(2, jammed=True)))
+    assert said(book) == [
+        ("the radio channel is jammed", [], False, False),
+        ("lost the gateway", [1, 2], False, False),
+    ]
+    book.update(state(3.0, well(1), well(2)))
+    assert ("the radio channel is jammed", [], True, False) in said(book)
+
+
 def test_a_failed_order_is_an_alarm_until_a_later_order_is_accepted():
     book = AlarmBook()
     book.on_events([EventRecord(1.0, 0, "order refused", (4,), "battery at 9 %", 7, PLACE)])

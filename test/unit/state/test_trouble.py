@@ -101,3 +101,9 @@ def test_a_battery_is_named_when_it_is_low_and_when_it_is_empty():
         "cannot fly: battery at 18 %",
         "battery empty",
     ]
+
+
+def test_the_line_about_the_mesh_names_a_jammer():
+    nodes = [NodeStatus(0, role=Role.GATEWAY, connected=True), NodeStatus(1, jammed=True)]
+    text = "0 of 1 routers connected, radio channel jammed at 1"
+    assert summarise(nodes, find_trouble(nodes)).text == text

@@ -31,6 +31,7 @@ from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
 
 RADIO_FAILED = "its radio does not work"
+JAMMED = "its channel is jammed"
 TRIED_SPOTS = 4  # more take all spots around a place, so that the drone drifts away
 
 

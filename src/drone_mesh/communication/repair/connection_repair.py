@@ -13,7 +13,7 @@ from drone_mesh.communication.control.node_part import receives
 from drone_mesh.communication.control.router_states import RepairState, RouterEvent
 from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.repair.actions import RADIO_FAILED, RepairActions, Step
+from drone_mesh.communication.repair.actions import JAMMED, RADIO_FAILED, RepairActions, Step
 from drone_mesh.communication.repair.election import NO_BID, TOOK_OFF, TOOK_OFF_HOME
 from drone_mesh.communication.repair.heights import above_ground, at_whole_metres
 from drone_mesh.communication.repair.interfaces import IRepairStrategy
@@ -182,6 +182,7 @@ class ConnectionRepair(RepairActions):
             winner=strategy.winner if state is RepairState.WATCHING else NO_ROUTE,
             emergency_s=self._emergency_s,
             silent=self.silent,
+            jammed=strategy.reason == JAMMED,
         )
 
     # Actions of the strategy -----------------------------------------------------------------

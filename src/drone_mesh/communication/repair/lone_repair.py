@@ -12,7 +12,7 @@ import math
 
 from drone_mesh.communication.control.router_states import RepairState
 from drone_mesh.communication.events.observer import MeshEventKind
-from drone_mesh.communication.repair.actions import RepairActions, Step
+from drone_mesh.communication.repair.actions import JAMMED, RepairActions, Step
 from drone_mesh.communication.repair.interfaces import SILENCE_PATIENCE, IRepairStrategy
 from drone_mesh.drone.location import Location
 
@@ -126,9 +126,9 @@ class LoneRepair(IRepairStrategy):
             return
         if samples and sum(samples) >= JAMMED_SHARE * len(samples):
             if self._jammed_s == -math.inf:
-                mesh.report(MeshEventKind.EMERGENCY, detail="its channel is jammed: it stays")
+                mesh.report(MeshEventKind.EMERGENCY, detail=f"{JAMMED}: it stays")
             self._jammed_s = mesh.now_s
-            self.reason = "its channel is jammed"
+            self.reason = JAMMED
         elif mesh.now_s - self._jammed_s < mesh.connection_lost_after_s:
             self.reason = "its channel was jammed a moment ago"  # the others need time, too
         else:

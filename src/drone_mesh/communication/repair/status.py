@@ -27,6 +27,7 @@ class RepairStatus(NamedTuple):
     emergency_s: float = math.inf  # when its patience ends, in seconds of the core's clock
     silent: bool = False  # all its neighbours, two or more, fell silent together
     landed: bool = False  # the flight ends: it checks whether another drone is there
+    jammed: bool = False  # it hears nobody, and measures power in its channel
 
     def in_words(self, now_s: float) -> str:
         """One short sentence about the node; empty if nothing is to be repaired."""

@@ -25,7 +25,7 @@ export class Alarms {
     if (shown === this.shown) return;
     this.shown = shown;
     const open = alarms.filter((alarm) => !alarm.acknowledged);
-    const count = open.reduce((sum, { nodes }) => sum + nodes.length, 0);
+    const count = open.reduce((sum, { nodes }) => sum + Math.max(1, nodes.length), 0);
     const button = byId("alarm-count");
     button.hidden = !count;
     button.textContent = count === 1 ? "1 alarm" : `${count} alarms`;
@@ -40,7 +40,7 @@ export class Alarms {
     const row = document.createElement("li");
     row.classList.toggle("over", over || acknowledged);
     const words = document.createElement("span");
-    words.append(...idLinks(this.mesh, nodes), ` ${text}`);
+    words.append(...(nodes.length ? idLinks(this.mesh, nodes) : ["The mesh:"]), ` ${text}`);
     const notes = [`since ${since.toFixed(0)} s`, over && "over", acknowledged && "acknowledged"];
     words.append(` (${notes.filter(Boolean).join(", ")})`);
     row.append(words);
@@ -49,7 +49,7 @@ export class Alarms {
     button.type = "button";
     button.className = "live";
     button.textContent = "Acknowledge";
-    button.setAttribute("aria-label", `Acknowledge: ${nodes.length} ${text}`);
+    button.setAttribute("aria-label", `Acknowledge: ${nodes.length || "the mesh:"} ${text}`);
     button.addEventListener("click", () => this.acknowledge(text));
     row.append(button);
     return row;

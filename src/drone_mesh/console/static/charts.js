@@ -7,6 +7,7 @@ const BOTTOM_PX = 17;
 const TOP_PX = 8;
 const RIGHT_PX = 8;
 const BETWEEN_TIMES_PX = 10;
+const SHOWN = 120; // samples, two minutes: the start of a large mesh would flatten all that follows
 const RATE_OVER = 10; // samples; one check period of the mesh at normal speed
 
 export class Charts {
@@ -14,6 +15,11 @@ export class Charts {
     this.mesh = mesh;
     this.colours = readColours();
     this.hover = null; // 0..1 across every chart
+    this.whole = document.getElementById("charts-whole"); // pressed: all samples are shown
+    this.whole.addEventListener("click", () => {
+      this.whole.setAttribute("aria-pressed", !this.#isWhole());
+      this.redraw();
+    });
     this.charts = [
       {
         id: "share",
@@ -52,7 +58,12 @@ export class Charts {
 
   redraw() {
     this.samples = withRates(this.mesh.samples);
+    if (!this.#isWhole()) this.samples = this.samples.slice(-SHOWN);
     for (const chart of this.charts) this.#draw(chart);
+  }
+
+  #isWhole() {
+    return this.whole.getAttribute("aria-pressed") === "true";
   }
 
   themeChanged() {

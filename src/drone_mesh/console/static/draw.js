@@ -1,9 +1,10 @@
 // Draws one picture of the mesh on a canvas.
 
 const DIGIT_WIDTH = 0.7; // of a bold digit, as a share of its height
-const SMALLEST_ID_PX = 8.5; // in a drone; a smaller id is drawn beside it
-const LABEL_PX = 10;
-const ROOM_PER_DIGIT_PX = 6;
+const SMALLEST_ID_PX = 8; // in a drone; a smaller id is drawn beside it
+const LABEL_PX = 10; // of an id beside its drone, at most
+const SMALLEST_LABEL_PX = 7;
+const BETWEEN_LABELS_PX = 2;
 const SHARE_OF_ROOM = 0.3; // radius of a drone, of the room that it has
 const LEAST_ARMS_PX = 7; // smallest radius of a drone that is drawn with arms and rotors
 const MOTORS = [
@@ -156,10 +157,12 @@ export function drawMesh(context, camera, mesh, colours, options, goals) {
   for (const node of mesh.nodes.values()) drawHeading(context, camera, node, colours, radius);
   for (const node of mesh.nodes.values()) drawPath(context, camera, node, colours, radius);
   const drones = drawingOrder(mesh);
+  const labelPx = labelSize([...mesh.nodes.keys()], radius);
   const draw = (some) => {
     for (const node of some) {
       const selected = node.id === mesh.selected || mesh.group.has(node.id);
-      drawn.drones += drawDrone(context, camera, node, selected, colours, radius, mesh.clock.shape);
+      const { shape } = mesh.clock;
+      drawn.drones += drawDrone(context, camera, node, selected, colours, radius, shape, labelPx);
     }
   };
   draw(drones.filter((node) => !options.cast.has(node.id)));
@@ -256,28 +259,44 @@ function drawGrid(context, camera, colours, top) {
   const step = niceStep(70 / camera.scale);
   const [left, high] = camera.toWorld(0, 0);
   const [right, low] = camera.toWorld(camera.width, camera.height);
+  const across = multiples(step, left, right).map((x) => [x, camera.toScreen(x, 0)[0]]);
+  const up = multiples(step, low, high).map((y) => [y, camera.toScreen(0, y)[1]]);
   context.strokeStyle = colours.grid;
-  context.fillStyle = colours.muted;
-  context.font = "11px system-ui, sans-serif";
   context.lineWidth = 1;
   context.setLineDash([]);
   context.beginPath();
-  context.textAlign = "center";
-  for (let x = Math.ceil(left / step) * step; x <= right; x += step) {
-    const px = Math.round(camera.toScreen(x, 0)[0]) + 0.5;
-    context.moveTo(px, 0);
-    context.lineTo(px, camera.height);
-    if (px > 60 && px < camera.width - 20) context.fillText(metres(x, step), px, camera.height - 8);
+  for (const [, px] of across) {
+    context.moveTo(Math.round(px) + 0.5, 0);
+    context.lineTo(Math.round(px) + 0.5, camera.height);
   }
-  context.textAlign = "right";
-  for (let y = Math.ceil(low / step) * step; y <= high; y += step) {
-    const py = Math.round(camera.toScreen(0, y)[1]) + 0.5;
-    context.moveTo(0, py);
-    context.lineTo(camera.width, py);
-    if (py > top + 12 && py < camera.height - 24)
-      context.fillText(metres(y, step), camera.width - 8, py - 4);
+  for (const [, py] of up) {
+    context.moveTo(0, Math.round(py) + 0.5);
+    context.lineTo(camera.width, Math.round(py) + 0.5);
   }
   context.stroke();
+  context.font = "11px system-ui, sans-serif";
+  context.fillStyle = colours.muted;
+  context.strokeStyle = colours.card; // around a text, so that no line crosses it
+  context.lineWidth = 4;
+  const write = (text, px, py) => {
+    context.strokeText(text, px, py);
+    context.fillText(text, px, py);
+  };
+  context.textAlign = "center";
+  for (const [x, px] of across)
+    if (px > 60 && px < camera.width - 20) write(metres(x, step), px, camera.height - 8);
+  context.textAlign = "right";
+  for (const [y, py] of up)
+    if (py > top + 12 && py < camera.height - 24) write(metres(y, step), camera.width - 8, py - 4);
+}
+
+/** The multiples of `step` from `low` to `high`. */
+function multiples(step, low, high) {
+  const first = Math.ceil(low / step);
+  return Array.from(
+    { length: Math.max(0, Math.floor(high / step) - first + 1) },
+    (_, i) => (first + i) * step,
+  );
 }
 
 /** A box from above, with the height of its top where there is room for it. */
@@ -420,7 +439,7 @@ function drawArms(context, px, py, node, colours, r) {
   }
 }
 
-function drawDrone(context, camera, node, selected, colours, radius, shape) {
+function drawDrone(context, camera, node, selected, colours, radius, shape, labelPx) {
   if (!node.position) return 0;
   const [px, py] = onScreen(camera, node, radius);
   const colour = colours[node.colour];
@@ -444,9 +463,8 @@ function drawDrone(context, camera, node, selected, colours, radius, shape) {
   context.lineWidth = hollow ? 2 : 1.5;
   context.stroke();
   if (idSize(node.id, r) < SMALLEST_ID_PX) {
-    // Beside the drone, if the next one leaves room there.
-    if (selected || radius / SHARE_OF_ROOM > ROOM_PER_DIGIT_PX * (String(node.id).length + 1))
-      drawLabel(context, node.id, px, py + r + LABEL_PX, colours);
+    if (selected) drawLabel(context, node.id, px, py + r + LABEL_PX, colours, LABEL_PX);
+    else if (labelPx) drawLabel(context, node.id, px, py + r + labelPx, colours, labelPx);
   } else {
     context.fillStyle = hollow ? colour : colours.card;
     context.font = `600 ${idSize(node.id, r)}px system-ui, sans-serif`;
@@ -458,14 +476,21 @@ function drawDrone(context, camera, node, selected, colours, radius, shape) {
   return 1;
 }
 
-function drawLabel(context, text, px, py, colours) {
-  context.font = `600 ${LABEL_PX}px system-ui, sans-serif`;
+function drawLabel(context, text, px, py, colours, size) {
+  context.font = `600 ${size}px system-ui, sans-serif`;
   context.textAlign = "center";
   context.strokeStyle = colours.card;
   context.lineWidth = 3;
   context.strokeText(text, px, py);
   context.fillStyle = colours.ink;
   context.fillText(text, px, py);
+}
+
+/** Height of the digits of ids beside drones of this radius, px; 0: not all of them have room. */
+export function labelSize(ids, radius) {
+  const digits = String(Math.max(0, ...ids)).length;
+  const size = (radius / SHARE_OF_ROOM - BETWEEN_LABELS_PX) / (DIGIT_WIDTH * digits);
+  return size < SMALLEST_LABEL_PX ? 0 : Math.min(LABEL_PX, size);
 }
 
 /** Height of an id's digits, px, so that they fit into a drone of radius `r`. */
