@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import socket
 
+from drone_mesh.arguments import is_whole
 from drone_mesh.errors import ConfigurationError
 
 MAX_PORT = 65535
@@ -15,6 +16,13 @@ _HINTS = {
     errno.EACCES: "only root may use it; choose a port from 1024 up",
     errno.EADDRNOTAVAIL: "it is not an address of this machine",
 }
+
+
+def port_of(value: object) -> int:
+    """This port as a number. Raises ConfigurationError."""
+    if not (is_whole(str(value)) and 0 <= int(str(value)) <= MAX_PORT):
+        raise ConfigurationError(f"invalid port {value}: must be a whole number 0..{MAX_PORT}")
+    return int(str(value))
 
 
 def listen(bind_address: str, port: int) -> socket.socket:

@@ -1,8 +1,9 @@
 """roslaunch with an exit status: 1 if a node that the launch requires fails.
 
 `roslaunch` itself exits with 0 then, so a script cannot see that a launch failed. What roslaunch
-takes for the address of a master or for a namespace, and is none, is an error here. `scripts/run`
-uses this module: python3 -m drone_mesh.ros.graph.launching [what roslaunch accepts ...]
+takes for the address of a master or for a namespace, and is none, is an error here, before anything
+starts; so is a place or a port that the web console of factory.launch could only refuse later.
+`scripts/run` uses it: python3 -m drone_mesh.ros.graph.launching [what roslaunch accepts ...]
 """
 
 from __future__ import annotations
@@ -10,18 +11,21 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from typing import ClassVar
+from typing import ClassVar, Mapping
 
 import roslaunch
 import roslaunch.parent
 from roslaunch.pmon import ProcessListener
 
+from drone_mesh.console import DEFAULT_PORT
+from drone_mesh.drone.geodesy import Origin
 from drone_mesh.errors import MeshError
 from drone_mesh.ros.graph.bounded_master import ANSWER_TIMEOUT_S, bounded_master
 from drone_mesh.ros.graph.names import check_namespace
+from drone_mesh.web import LOOPBACK
+from drone_mesh.web.listening import listen, port_of
 
 EXIT_FAILED = 1
-NAMESPACE = "namespace:="
 
 
 class WatchedLaunch(roslaunch.parent.ROSLaunchParent, ProcessListener):
@@ -48,13 +52,22 @@ def _end(_number: int, _frame: object) -> None:
     os.kill(os.getpid(), signal.SIGINT)
 
 
+def _check(given: Mapping[str, str]) -> None:
+    """Raises MeshError about arguments with which nodes could not start."""
+    if "namespace" in given:
+        check_namespace(given["namespace"])
+    if given.get("origin"):
+        Origin.parse(given["origin"])
+    port = port_of(given.get("console_port", DEFAULT_PORT))
+    if given.get("console", "").lower() in ("true", "1") or given.get("demo"):
+        listen(LOOPBACK, port).close()
+
+
 def main() -> None:
     """Launch, and exit with 1 if a required node failed."""
     try:
         bounded_master("roslaunch", ANSWER_TIMEOUT_S)
-        for word in sys.argv:
-            if word.startswith(NAMESPACE):
-                check_namespace(word[len(NAMESPACE) :])
+        _check(dict(word.split(":=", 1) for word in sys.argv if ":=" in word))
     except MeshError as error:
         sys.exit(f"roslaunch: {error}")
     signal.signal(signal.SIGUSR1, _end)  # from command_line.end_launch

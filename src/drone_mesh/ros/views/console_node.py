@@ -11,7 +11,6 @@ from pathlib import Path
 
 import rospy
 
-from drone_mesh.arguments import is_whole
 from drone_mesh.console import DEFAULT_PORT
 from drone_mesh.console.controls import MeshControls, RecordingControls
 from drone_mesh.console.dots import make_dots
@@ -38,7 +37,7 @@ from drone_mesh.ros.views.state_source import OLD_STATE_S
 from drone_mesh.secret_file import read_secret
 from drone_mesh.stopping import StopRequest, ends_as
 from drone_mesh.web import LOOPBACK
-from drone_mesh.web.listening import MAX_PORT
+from drone_mesh.web.listening import port_of
 
 CHECK_PERIOD_S = 1.0  # wall time between two checks of the master
 REPAIR_DEMO = "repair"
@@ -145,7 +144,7 @@ def main() -> None:
 def _run() -> int:
     show_library_logs_on_rosout()
     address = str(rospy.get_param("~address", LOOPBACK))
-    port = _port(rospy.get_param("~port", DEFAULT_PORT))
+    port = port_of(rospy.get_param("~port", DEFAULT_PORT))
     token = _token(address)
     demo = str(rospy.get_param("~demo", ""))
     if demo not in ("", REPAIR_DEMO):
@@ -204,9 +203,3 @@ def _token(address: str) -> PageToken:
     with naming_argument("token_file:=", path):
         token = read_secret(Path(path), "token") if path else ""
     return PageToken.needed(address, token, path)
-
-
-def _port(value: object) -> int:
-    if not (is_whole(str(value)) and 0 <= int(str(value)) <= MAX_PORT):
-        raise ConfigurationError(f"invalid port {value!r}: must be a whole number 0..{MAX_PORT}")
-    return int(str(value))
