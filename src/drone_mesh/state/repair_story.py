@@ -25,6 +25,10 @@ _BIDS = {
         "The nearest flies, because it is there soonest",
     ),
 }  # fmt: skip
+_ON_ITS_WAY = (
+    " It was on the route of {} to the gateway, and is not missed before a heartbeat of theirs "
+    "stays without an answer"
+)
 _NO_BIDS = "", "", "bids most", ""
 _ELECTION = (RepairState.ASKING, RepairState.NEGOTIATING, RepairState.WATCHING)
 
@@ -48,6 +52,7 @@ class RepairStory:
         self.steps: list[StoryStep] = []
         self._key: tuple[object, ...] | None = None  # of the step that lasts
         self._before: dict[int, NodeStatus] = {}
+        self._had_gateway: set[int] = set()
         self._lost: set[int] = set()  # since all were last connected
         self._lost_at_s = math.inf
         self._fell_silent: dict[int, float] = {}  # node -> when it was switched off
@@ -77,6 +82,9 @@ class RepairStory:
             self._describe_loss(by_state[RepairState.LOST], mesh)
         elif self._lost and all(node.connected for node in routers if node.id in self._lost):
             self._describe_end(mesh)
+        elif unnoticed := [n.id for n in by_state[RepairState.AT_REST] if self._has_lost(n)]:
+            self._describe_silence(unnoticed, mesh.stamp_s)
+        self._had_gateway.update(node.id for node in routers if node.connected)
         self._before = nodes
 
     @property
@@ -89,8 +97,21 @@ class RepairStory:
         for node_id in off:
             self._fell_silent[node_id] = now_s
             behind = [n.id for n in self._before.values() if node_id in list(n.route)[1:-1]]
-            way = f" It was on the route of {and_(behind)} to the gateway." if behind else ""
+            way = _ON_ITS_WAY.format(and_(behind)) if behind else ""
             self.add(f"{self._name(node_id)} is switched off.{way}", now_s)
+
+    def _has_lost(self, node: NodeStatus) -> bool:
+        return node.id in self._had_gateway and not node.connected
+
+    def _describe_silence(self, ids: Sequence[int], now_s: float) -> None:
+        """Describe nodes whose loss of the gateway no check of theirs has found yet."""
+        begins = _each(ids, "It begins", "Each begins")
+        text = (
+            f"{and_(ids)} {_each(ids, 'has', 'have')} no gateway. {begins} to wait at its periodic "
+            "check (every 10 s by default), so that what is lost only for a moment sets nothing in "
+            "motion"
+        )
+        self._last(("silence",), text, now_s)
 
     def _describe_loss(self, waiting: Sequence[NodeStatus], mesh: MeshStatus) -> None:
         """Describe nodes that wait for another route to a gateway."""

@@ -32,6 +32,7 @@ def sentences():
 def test_the_drone_that_flies_first_shows_each_phase_of_its_repair(sentences):
     assert sentences[2] == [
         "",
+        "has no gateway; its periodic check begins the wait for one",
         "waits for a gateway",
         "negotiating, bids 12.0 m for the place of 1",
         "flies to the place of 1",
@@ -43,6 +44,7 @@ def test_the_drone_that_flies_first_shows_each_phase_of_its_repair(sentences):
 def test_the_one_behind_it_shows_why_it_does_not_fly_and_then_flies_as_well(sentences):
     assert sentences[3] == [
         "",
+        "has no gateway; its periodic check begins the wait for one",
         "waits for a gateway",
         "negotiating, does not bid: the place of 2 is occupied by 2",
         "does not fly: 2 flies instead",

@@ -19,7 +19,7 @@ from drone_mesh.communication.repair.heights import above_ground, at_whole_metre
 from drone_mesh.communication.repair.interfaces import IRepairStrategy
 from drone_mesh.communication.repair.repair_flight import ASK_AGAIN_S, ASK_SEALED_S, RepairFlight
 from drone_mesh.communication.repair.spots import PITCH, Landing, own_spot, spot_beside_rivals
-from drone_mesh.communication.repair.status import NOTHING_TO_REPAIR, RepairStatus
+from drone_mesh.communication.repair.status import NO_CHECK_YET, NOTHING_TO_REPAIR, RepairStatus
 from drone_mesh.communication.repair.taken_places import TakenPlaces
 from drone_mesh.communication.wire.messages import GatewayPlace, MovementNegotiationMessage
 from drone_mesh.communication.wire.packet_types import MessageType
@@ -169,9 +169,10 @@ class ConnectionRepair(RepairActions):
                 goal=flight.goal,
                 landed=flight.on_ground,
             )
-        at_rest = state is RepairState.AT_REST and not strategy.reason
-        if self.connected or state is RepairState.FLYING or at_rest:
+        if self.connected or state is RepairState.FLYING:
             return NOTHING_TO_REPAIR
+        if state is RepairState.AT_REST and not strategy.reason:
+            return NO_CHECK_YET if self._parts.antenna.on() else NOTHING_TO_REPAIR
         bids = state in (RepairState.NEGOTIATING, RepairState.WATCHING)
         return RepairStatus(
             state,

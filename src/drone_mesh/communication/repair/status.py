@@ -28,6 +28,7 @@ class RepairStatus(NamedTuple):
     silent: bool = False  # all its neighbours, two or more, fell silent together
     landed: bool = False  # the flight ends: it checks whether another drone is there
     jammed: bool = False  # it hears nobody, and measures power in its channel
+    unchecked: bool = False  # it has no gateway, and no check of its own has found that yet
 
     def in_words(self, now_s: float) -> str:
         """One short sentence about the node; empty if nothing is to be repaired."""
@@ -41,6 +42,8 @@ class RepairStatus(NamedTuple):
             return f"waits for {self.winner} to take off"
         if self.state is RepairState.FLYING:
             return self._flies()
+        if self.unchecked:
+            return "has no gateway; its periodic check begins the wait for one"
         return self._does_not_fly()
 
     def _waits(self, now_s: float) -> str:
@@ -71,3 +74,4 @@ class RepairStatus(NamedTuple):
 
 
 NOTHING_TO_REPAIR = RepairStatus()
+NO_CHECK_YET = RepairStatus(unchecked=True)

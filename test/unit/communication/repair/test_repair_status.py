@@ -6,7 +6,7 @@ import pytest
 from rig import Rig
 
 from drone_mesh.communication.control.router_states import RepairState
-from drone_mesh.communication.repair.status import NOTHING_TO_REPAIR, RepairStatus
+from drone_mesh.communication.repair.status import NO_CHECK_YET, NOTHING_TO_REPAIR, RepairStatus
 from drone_mesh.drone.location import Location
 
 OCCUPIED = "the place of 2 is occupied by 3"
@@ -16,6 +16,7 @@ OCCUPIED = "the place of 2 is occupied by 3"
     ("status", "words"),
     [
         (NOTHING_TO_REPAIR, ""),
+        (NO_CHECK_YET, "has no gateway; its periodic check begins the wait for one"),
         (RepairStatus(RepairState.AT_REST, OCCUPIED), f"does not fly: {OCCUPIED}"),
         (RepairStatus(RepairState.LOST, emergency_s=111.2), "waits 12 s for a gateway"),
         (RepairStatus(RepairState.LOST, emergency_s=99.0), "waits for a gateway"),
@@ -70,6 +71,13 @@ def test_a_gateway_has_nothing_to_repair():
 def test_a_router_that_is_connected_has_nothing_to_repair():
     rig = Rig()
     rig.connect_to_gateway()
+    assert rig.mesh.get_repair_status() == NOTHING_TO_REPAIR
+
+
+def test_before_a_check_finds_the_loss_a_router_says_that_it_waits_for_that_check():
+    rig = Rig()
+    assert rig.mesh.get_repair_status() == NO_CHECK_YET
+    rig.antenna.powered = False
     assert rig.mesh.get_repair_status() == NOTHING_TO_REPAIR
 
 
