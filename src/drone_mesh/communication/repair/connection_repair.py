@@ -172,7 +172,7 @@ class ConnectionRepair(RepairActions):
         if self.connected or state is RepairState.FLYING:
             return NOTHING_TO_REPAIR
         if state is RepairState.AT_REST and not strategy.reason:
-            return NO_CHECK_YET if self._parts.antenna.on() else NOTHING_TO_REPAIR
+            return NO_CHECK_YET if self._antenna.on() else NOTHING_TO_REPAIR
         bids = state in (RepairState.NEGOTIATING, RepairState.WATCHING)
         return RepairStatus(
             state,
