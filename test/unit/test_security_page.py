@@ -10,6 +10,7 @@ import pytest
 from proofs import attacks, claims, damage
 
 from drone_mesh.communication.beacon import proofs, trickle
+from drone_mesh.communication.control import control_plane
 from drone_mesh.communication.data import packets as data
 from drone_mesh.communication.events import complaints
 from drone_mesh.communication.heartbeats import detours, node_search, relay_check
@@ -88,7 +89,7 @@ SENTENCES = [
     f"| one in {detours.AVOIDED_S:g} s |",
     f"after {node_search.FIRST_PAUSE_S:g}, {2 * node_search.FIRST_PAUSE_S:g}, "
     f"{4 * node_search.FIRST_PAUSE_S:g} s and so on up to {node_search.LONGEST_PAUSE_S:g} s; "
-    f"on a shared channel one in {node_search.SEARCH_EVERY_S:g} s. Each",
+    f"on a shared channel one in {control_plane.SEARCH_AGAIN_S:g} s. Each",
     f"bytes 0..{seal.SEAL_AT - 1}, under the key of the pair. Packets with forward {BROADCAST}",
     f"byte {TO_AT} counts as {BROADCAST}",
     f"random number of {seal._EPOCH_BITS} bits that a node draws at each start",
