@@ -21,7 +21,7 @@ from drone_mesh.lab.sequence import SequenceRun, run_sequence
 from drone_mesh.lab.streams import Streams
 from drone_mesh.lab.worker import execute
 
-SEQUENCES, AT_ONCE = 300, 10
+SEQUENCES, AT_ONCE = 100, 10
 LARGEST = 14  # drones: a second for ten sequences; the suite runs meshes of up to 60
 SUITE = Path(__file__).resolve().parents[3] / "experiments" / "sequences.yaml"
 
