@@ -10,9 +10,8 @@ from proofs.quiet import CASES, LAYOUTS, RADIOS, TECHNIQUES, Run, runs, warnings
 
 from drone_mesh.formations.layouts import GRID_CASE
 
-A_DRONE = (
-    13  # the layouts 1 to 17 move one drone each; `scripts/proofs quiet` flies all, four times
-)
+# The layouts 1 to 17 move one drone each; `scripts/proofs quiet` flies all layouts, four times.
+A_DRONE = 13
 LARGE = [case for case in CASES if len(LAYOUTS.orders(case)) > 1]
 
 
