@@ -4,7 +4,9 @@
 from __future__ import annotations
 
 import json
+import os
 import re
+import signal
 import subprocess
 import tempfile
 import threading
@@ -23,9 +25,13 @@ from rostest_support import (
     WALL_LIMIT_S,
     LogWatch,
     kill_and_wait_for_respawn,
+    pid_of,
     program,
     wait_for,
 )
+
+from drone_mesh.console.memory import pack, unpack
+from drone_mesh.state.alarms import AlarmBook
 
 HOST = "127.0.0.1:18181"
 TOKEN = "a-token-for-this-test"
@@ -41,6 +47,9 @@ class Page:
         self.layouts: list = []
         self.packets: list[dict] = []
         self.answers: dict[int, dict] = {}
+        self.events: list[dict] = []
+        self.alarms: list[dict] = []
+        self.samples: list[dict] = []
         self._socket = websockets.sync.client.connect(
             f"ws://{HOST}/ws", origin=f"http://{HOST}", proxy=None, max_size=None
         )
@@ -62,6 +71,11 @@ class Page:
             self.answers[message["number"]] = message
         elif message["type"] == "frame":
             self.clock = message["clock"]
+            if message["full"]:
+                self.events, self.samples = [], []
+            self.events += message.get("events", [])
+            self.samples += message.get("samples", [])
+            self.alarms = message.get("alarms", self.alarms)
             for node, fields in message.get("nodes", {}).items():
                 self.nodes.setdefault(node, {}).update(fields)
 
@@ -244,6 +258,53 @@ class MeshConsoleTest(unittest.TestCase):
         self.assertNotEqual(console.returncode, 0)
         self.assertIn("give token_file", console.stderr)
         self.assertNotIn(TOKEN, console.stderr)
+
+    def test_8_events_alarms_charts_and_orders_outlive_the_console(self) -> None:
+        page = open_page()
+        wait_for("two connected routers", WALL_LIMIT_S, page.all_connected)
+        self.assertTrue(page.order(do="speed", paused=False, factor=10)["done"])
+        far = page.order(do="formation", name="far", places=[[2, 77, 0, 0]])
+        self.assertTrue(far["done"], far["text"])
+        self.assertIn("drone 2 would have no route there", far["text"])
+
+        def alarms(of: list[dict]) -> list[tuple]:
+            return [(a["text"], a["nodes"], a["since"]) for a in of if 2 in a["nodes"]]
+
+        wait_for("an alarm about 2", WALL_LIMIT_S, lambda: alarms(page.alarms))
+        self.assertTrue(page.order(do="speed", paused=True, factor=0)["done"])
+        wait_for("paused", WALL_LIMIT_S, lambda: page.clock["paused"])
+
+        def is_saved() -> bool:
+            saved = unpack(rospy.get_param("/drone_mesh/console_memory", "")).saved
+            book = AlarmBook()
+            book.restore(saved["alarms"])
+            return saved["events"] == page.events and alarms(book.groups()) == alarms(page.alarms)
+
+        wait_for("all of it to be saved", WALL_LIMIT_S, is_saved)
+        kill_and_wait_for_respawn("/mesh_console")
+        again = open_page()
+        wait_for("the alarms", WALL_LIMIT_S, lambda: alarms(again.alarms) == alarms(page.alarms))
+        self.assertEqual(again.events[: len(page.events)], page.events)
+        self.assertEqual(again.samples[0], page.samples[0])
+        self.assertEqual(again.nodes["2"]["order"], page.nodes["2"]["order"])
+        self.assertIn("to x 77.00 m", again.nodes["2"]["order"])
+        self.assertEqual(again.clock["layouts"], page.clock["layouts"])
+        self.assertIn("far: ", again.clock["layouts"][-1])
+
+    def test_9_what_an_earlier_run_has_left_is_not_shown(self) -> None:
+        parameter = "/drone_mesh/console_memory"
+        wait_for("something saved", WALL_LIMIT_S, lambda: rospy.has_param(parameter))
+        memory = unpack(rospy.get_param(parameter))
+        self.assertTrue(memory.saved["events"])
+        pid = pid_of("/mesh_console")
+        assert pid is not None
+        os.kill(pid, signal.SIGKILL)
+        rospy.set_param(parameter, pack(memory._replace(run="another")))  # before its respawn
+        wait_for("the respawn", WALL_LIMIT_S, lambda: pid_of("/mesh_console") not in (None, pid))
+        page = open_page()
+        self.assertTrue(page.clock["paused"])  # by the test before: there is nothing new to show
+        self.assertEqual((page.events, page.alarms, page.samples), ([], [], []))
+        self.assertTrue(page.order(do="speed", paused=False, factor=5)["done"])
 
 
 if __name__ == "__main__":

@@ -46,6 +46,7 @@ OTHERS = {  # modules that parse no file of a user, and what it is instead
     "lab/show": "its own memory",
     "lab/worker": "its own memory",
     "nrf24/emulator/measured": "a file of this package",
+    "console/memory": "its own parameter",
     "ros/services/standing_layouts": "its own parameter",
     "users/local_client": "a local socket",
     "users/local_socket": "a local socket",

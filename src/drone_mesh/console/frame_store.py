@@ -193,6 +193,36 @@ class FrameStore:
         self._samples.extend((self.version, sample) for sample in samples[-SAMPLES_KEPT:])
         self._sampled_at_s = float("-inf")
 
+    @property
+    def noted_at(self) -> int:
+        """The version in which the latest event came or the alarms changed."""
+        return max(self._complete["alarms"][0], self._events[-1][0] if self._events else 0)
+
+    def saved(self) -> dict[str, Any]:
+        """What cannot be seen in the next state, as plain values that `restore` reads."""
+        return {
+            "events": [event for _version, event in self._events],
+            "samples": [list(astuple(sample)) for _version, sample in self._samples],
+            "alarms": self._alarms.saved(),
+            "orders": self._orders.saved(),
+        }
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Go on with what a console before this one saved in the same run.
+
+        Raises KeyError, TypeError or ValueError if it is no such thing.
+        """
+        events = [_restored_event(event) for event in saved["events"]]
+        samples = [MeshSample(*sample) for sample in saved["samples"]]
+        self._alarms.restore(saved["alarms"])
+        self._orders.restore(saved["orders"])
+        self._next_version()
+        self._run_began_at = self.version  # pages begin anew: these come before what they have
+        before = [(self.version, event) for event in events]
+        self._events = deque([*before, *self._events], maxlen=EVENTS_KEPT)
+        self._samples.extend((self.version, sample) for sample in samples)
+        self._replace("alarms", self._alarms.groups())
+
     def set_story(self, story: Mapping[str, Any]) -> None:
         """Set the story of a demonstration for the pages; empty: none."""
         if story != self._complete["story"][1]:
@@ -323,6 +353,16 @@ def _fields(node: NodeStatus, trouble: Trouble | None) -> dict[str, Any]:
         "data": data_in_words(node),
         "trouble": trouble.text if trouble else "",
         "severity": int(trouble.severity) if trouble else 0,
+    }
+
+
+def _restored_event(event: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        "t": float(event["t"]),
+        "node": int(event["node"]),
+        "kind": str(event["kind"]),
+        "peers": list(map(int, event["peers"])),
+        "detail": str(event["detail"]),
     }
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any, Iterable
+from typing import Any, Iterable, Mapping
 
 from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.drone.roles import Role
@@ -110,6 +110,24 @@ class AlarmBook:
             )
         ]
 
+    def saved(self) -> dict[str, Any]:
+        """All of it, as plain values that `restore` reads."""
+        return {
+            "alarms": [
+                [node, text, alarm.since_s, _json_time(alarm.until_s), alarm.acknowledged]
+                for (node, text), alarm in self._alarms.items()
+            ],
+            "was_connected": sorted(self._was_connected),
+        }
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Go on with what `saved` returned."""
+        for node, text, since_s, until_s, acknowledged in saved["alarms"]:
+            until_s = math.inf if until_s is None else float(until_s)
+            alarm = Alarm(int(node), str(text), float(since_s), until_s, bool(acknowledged))
+            self._alarms[alarm.node, alarm.text] = alarm
+        self._was_connected.update(map(int, saved["was_connected"]))
+
     def forget(self) -> None:
         """A new run has begun."""
         self._alarms.clear()
@@ -140,6 +158,10 @@ class AlarmBook:
         if is_lost and node.id in self._was_connected:
             found.append("lost the gateway")
         return found
+
+
+def _json_time(time_s: float) -> float | None:
+    return time_s if math.isfinite(time_s) else None
 
 
 def _of_order(text: str) -> bool:

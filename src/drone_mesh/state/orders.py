@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass
-from typing import Iterable
+from typing import Any, Iterable
 
 from drone_mesh.communication.events.observer import MeshEventKind, explanation
 from drone_mesh.communication.order_record import OrderState
@@ -194,6 +194,21 @@ class OrderWatch:
         """What the drone did after the state of its latest order changed; empty: nothing."""
         latest = None if node.id in self._expected else self._latest.get(node.id)
         return "" if latest is None else latest.since(node)
+
+    def saved(self) -> list[list[Any]]:
+        """The latest orders, as plain values that `restore` reads."""
+        return [
+            [drone, o.gateway, o.number, list(o.goal), o.state.name, o.reason, list(o.deeds)]
+            for drone, o in self._latest.items()
+        ]
+
+    def restore(self, saved: Iterable[Iterable[Any]]) -> None:
+        """Go on with what `saved` returned."""
+        for drone, gateway, number, goal, state, reason, deeds in saved:
+            place = Location(*map(float, goal))
+            self._latest[int(drone)] = FollowedOrder(
+                int(gateway), int(number), place, OrderState[state], str(reason), tuple(deeds)
+            )
 
     def forget(self) -> None:
         """Forget all orders: a new run has begun."""

@@ -6,7 +6,7 @@ import json
 import math
 from dataclasses import replace
 
-from drone_mesh.console.frame_store import EVENTS_PER_FRAME, FrameStore
+from drone_mesh.console.frame_store import EVENTS_KEPT, EVENTS_PER_FRAME, FrameStore
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
 from drone_mesh.state.links import JUST_LOST_S
@@ -274,3 +274,60 @@ def test_a_node_on_a_shared_channel_says_what_it_does_there():
     channels = {node: fields["channel"] for node, fields in frame(store, 0)["nodes"].items()}
     words = "1.2 % airtime, 1.25 tries per packet, 2 waiting, 1 given up"
     assert channels == {"1": words, "2": ""}
+
+
+def eventful_store() -> FrameStore:
+    store = FrameStore()
+    store.update_mesh(mesh(), wall_s=0.0)
+    store.update_mesh(mesh(40.0, connected=False), wall_s=2.0)
+    sent = EventRecord(30.0, 0, "order sent", (1,), order=7, place=A)
+    given_up = EventRecord(41.0, 0, "order given up", (1,), "it flew elsewhere", 7, A)
+    store.add_events([sent, given_up])
+    store.acknowledge("lost the gateway")
+    return store
+
+
+def test_a_console_goes_on_with_what_another_one_of_the_same_run_has_saved():
+    before = eventful_store()
+    saved = json.loads(json.dumps(before.saved()))
+    store = FrameStore()
+    store.add_events([EventRecord(50.0, 1, "landed")])  # before the first state
+    known = store.version
+    store.restore(saved)
+    store.update_mesh(mesh(51.0, connected=False), wall_s=0.0)
+    first = frame(store, known)
+    assert first["full"]
+    assert [event["kind"] for event in first["events"]] == [
+        "order sent",
+        "order given up",
+        "landed",
+    ]
+    assert first["alarms"] == frame(before, 0)["alarms"]
+    assert [alarm["since"] for alarm in first["alarms"]] == [41.0, 40.0]
+    assert [sample["stamp_s"] for sample in first["samples"]] == [1.0, 40.0, 51.0]
+    assert first["nodes"]["1"]["order"].startswith("order 7 to x 2.00 m, y 3.00 m, z 0 m: given up")
+    store.update_mesh(mesh(60.0), wall_s=2.0)  # an acknowledged alarm that is over goes
+    assert [alarm["since"] for alarm in frame(store, 0)["alarms"]] == [41.0]
+
+
+def test_what_a_console_goes_on_with_is_bounded():
+    before = FrameStore()
+    before.add_events([EventRecord(float(n), 1, "landed") for n in range(EVENTS_KEPT + 9)])
+    store = FrameStore()
+    store.add_events([EventRecord(2000.0, 1, "landed")])
+    store.restore(before.saved())
+    times = [event["t"] for event in store.saved()["events"]]
+    assert (len(times), times[0], times[-1]) == (EVENTS_KEPT, 10.0, 2000.0)
+
+
+def test_an_event_or_an_alarm_is_worth_saving_and_a_state_is_not():
+    store = FrameStore()
+    store.update_mesh(mesh(), wall_s=0.0)
+    noted_at = store.noted_at
+    store.update_mesh(mesh(1.2, hops=2), wall_s=0.2)
+    assert store.noted_at == noted_at
+    store.add_events([EventRecord(1.3, 1, "landed")])
+    landed_at = store.noted_at
+    assert landed_at > noted_at
+    store.update_mesh(mesh(1.4, connected=False), wall_s=0.4)
+    assert store.noted_at > landed_at

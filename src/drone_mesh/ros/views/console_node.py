@@ -31,7 +31,9 @@ from drone_mesh.ros.graph.conversions import event_record, mesh_status
 from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
 from drone_mesh.ros.graph.master_watch import MasterWatch
 from drone_mesh.ros.graph.parameters import earth_origin, manager_layouts
+from drone_mesh.ros.graph.run import Run, run_of
 from drone_mesh.ros.views.console_controls import RosControls
+from drone_mesh.ros.views.console_memory import ConsoleMemory
 from drone_mesh.ros.views.recording import Recording
 from drone_mesh.ros.views.state_source import OLD_STATE_S
 from drone_mesh.secret_file import read_secret
@@ -55,10 +57,19 @@ class MeshFeed:
     `_latest` passes from the subscriber's thread to the loop; a loop that lags behind skips states.
     """
 
-    def __init__(self, store: FrameStore, server: ConsoleServer, runner: ConsoleRunner) -> None:
+    def __init__(
+        self,
+        store: FrameStore,
+        server: ConsoleServer,
+        runner: ConsoleRunner,
+        memory: ConsoleMemory | None,
+    ) -> None:
+        """`memory`: None for a recording."""
         self._store = store
         self._server = server
         self._runner = runner
+        self._memory = memory
+        self._run: Run | None = None  # of the latest state
         self._latest: MeshState | None = None
         self._heard_s = float("-inf")
         self._packets: rospy.Subscriber | None = None
@@ -76,6 +87,9 @@ class MeshFeed:
             if is_silent:
                 self._report("no data from the simulation")
             self._watch_packets()
+            if self._memory is not None:
+                self._memory.save()
+                self._runner.in_loop(self._memory.collect)
 
     def _watch_packets(self) -> None:
         """Subscribe while a page draws packets; the simulator samples only with a subscriber."""
@@ -100,6 +114,9 @@ class MeshFeed:
     def _take_latest(self) -> None:
         message, self._latest = self._latest, None
         if message is not None:
+            before, self._run = self._run, run_of(message)
+            if self._memory is not None and before != self._run:
+                self._memory.recall(self._run)
             self._store.update_mesh(mesh_status(message), time.monotonic())
 
     def _on_event(self, message: MeshEvent) -> None:
@@ -184,7 +201,8 @@ def _run() -> int:
         if reading is not None:
             reading.start()
         MasterWatch().start()
-        MeshFeed(store, server, runner).watch(stop)
+        memory = ConsoleMemory(store) if whole is None else None
+        MeshFeed(store, server, runner, memory).watch(stop)
     finally:
         if reading is not None:
             reading.stop()
