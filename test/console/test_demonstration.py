@@ -42,6 +42,8 @@ def test_the_button_shows_a_repair_from_the_loss_to_the_reconnection(start_conso
     page.page.click("#confirm >> text=Show it")
     wait_for_sentence(page, "12 other drones could provide another route")
     wait_for_sentence(page, "Router 2 is switched off. It was on the route of 3, 4 and 5")
+    chain, story = (page.page.locator(part).bounding_box() for part in ("#map", "#story-card"))
+    assert story["x"] > chain["x"] + chain["width"], "the story takes height from the map"
     scale = page.page.get_attribute("#map-note", "data-scale")
     page.wait_for("a countdown", lambda: page.page.evaluate("window.countedDown"), 30.0)
     wait_for_sentence(page, r"3 bids 18.0 m, 4 bids 15.5 m, 5 bids 15.3 m")

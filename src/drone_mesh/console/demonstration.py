@@ -40,7 +40,9 @@ _PLACES = ((0.0, 4 / 9), (0.0, 12 / 9), (0.0, 18 / 9), (4 / 9, 15 / 9), (-3 / 9,
 _CHAIN = 2  # routers; the last of them is switched off
 _TURNS = ((1, 0), (-1, 0), (0, 1), (0, -1))  # cosine and sine: ways in which the chain may point
 _FREE_M = 1.5  # between its places and the drones that only watch
-_READY_WITHIN_S = 300.0  # simulated, as all that follows: a fleet may have to repair itself first
+# Simulated, as all that follows: before, nodes are off that are about to start.
+_STARTED_S = 5.0
+_READY_WITHIN_S = 300.0  # a fleet may have to repair itself first
 _SETTLE_S = 25.0  # two default check periods: each node has asked for its next hop's position
 _REPAIR_WITHIN_S = 240.0
 # Simulated seconds per second: waiting is sped up, and brief events are slowed down.
@@ -132,6 +134,8 @@ class RepairDemonstration:
 
     def _play(self) -> Script:
         mesh = yield []
+        while mesh.stamp_s < _STARTED_S:
+            mesh = yield []
         self.plan = plan = Casting.choose(mesh)
         chain, group = plan.cast[:_CHAIN], plan.cast[_CHAIN:]
         lost = chain[-1]

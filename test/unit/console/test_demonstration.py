@@ -117,6 +117,15 @@ def test_afterwards_speed_power_and_places_are_as_before():
     assert fleet.places() == before
 
 
+def test_nodes_that_are_off_because_the_fleet_is_only_starting_are_not_left_off():
+    fleet, demonstration = Fleet(routers=5), RepairDemonstration()
+    mesh = fleet.state()
+    dark = replace(mesh, stamp_s=0.1, nodes=[replace(node, on=False) for node in mesh.nodes])
+    assert demonstration.advance(dark) == []
+    fleet.watch(demonstration)
+    assert (texts(demonstration)[-1], fleet.is_off) == (DONE, set())
+
+
 def test_it_begins_with_drones_that_stand_anywhere():
     fleet, demonstration = Fleet(), RepairDemonstration()
     fleet.fly_layout(0)
