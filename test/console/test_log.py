@@ -60,3 +60,8 @@ def test_orders_to_several_drones_are_orders(log):
     rows = log((1.0, 0, "order sent", [4]), (1.5, 0, "order sent", [5]))
     assert rows[0].startswith("1.0 to 1.5 s 0 sent orders to 4, 5")
     assert log((1.0, 0, "order sent", [4])) == ["1.0 s 0 sent an order to 4"]
+
+
+def test_a_flight_back_to_its_own_place_is_a_return(log):
+    assert log((1.0, 2, "flight decided", [2])) == ["1.0 s 2 returns to where it was"]
+    assert log((1.0, 3, "flight decided", [2]))[0].startswith("1.0 s 3 flies to the place of 2")

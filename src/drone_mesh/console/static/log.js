@@ -24,6 +24,7 @@ const SENTENCES = {
   "negotiation started": ["", "NODE negotiates|negotiate who flies"],
   "negotiation ended": ["", "NODE learned that PEERS flies"],
   "flight decided": ["flight", "NODE flies|fly to the place of PEERS, to repair the mesh"],
+  return: ["flight", "NODE returns to where it was"],
   "flight ordered": ["flight", "NODE flies|fly, ordered by PEERS"],
   landed: ["flight", "NODE landed"],
   crashed: ["bad", "NODE crashed"],
@@ -114,7 +115,8 @@ export class EventLog {
 
   #write(said) {
     const { kind, ofPeers, others, events, row } = said;
-    const [tone, sentence] = SENTENCES[kind] ?? ["", `NODE ${kind} PEERS`];
+    const returns = kind === "flight decided" && String(others) === String(events[0].id);
+    const [tone, sentence] = SENTENCES[returns ? "return" : kind] ?? ["", `NODE ${kind} PEERS`];
     const ids = sorted(events.map(({ id }) => id));
     const [nodes, peers] = ofPeers ? [others, ids] : [ids, sorted(others)];
     const text = document.createElement("span");
