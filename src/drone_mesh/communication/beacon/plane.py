@@ -58,6 +58,7 @@ class BeaconPlane(IControlPlane):
             node.range_m,
             node.neighbours.place_of,
             medium.shared,
+            node.deadlines,
             node.seals.may_be_gateway,
         )
         self._step_m = MOVED * node.range_m
@@ -223,7 +224,7 @@ class BeaconPlane(IControlPlane):
             self._proofs.connected()
 
     def _set_time(self) -> None:
-        self._routes.now_s = now_s = self._deadlines.now_s
+        now_s = self._deadlines.now_s
         self._routes.motion = motion = self._motion.at(now_s)
         if motion is not None and self._own.mislead(motion):
             self._motion.has_turned(now_s)
@@ -360,7 +361,6 @@ class BeaconPlane(IControlPlane):
 
     def _learn(self, creator: int, from_: int, kind: int, payload: bytes) -> bool:
         routes = self._routes
-        routes.now_s = self._deadlines.now_s
         routes.alive(from_)
         if creator != from_:
             routes.led_to(creator, from_)
@@ -368,7 +368,6 @@ class BeaconPlane(IControlPlane):
 
     def own_came_back(self, from_: int) -> None:
         """Note that `from_` is alive; the courier sends the packet another way."""
-        self._routes.now_s = self._deadlines.now_s
         self._routes.alive(from_)
 
     def says_connected(self, kind: int, payload: bytes) -> bool:
@@ -387,7 +386,6 @@ class BeaconPlane(IControlPlane):
 
     def _failed(self, node: int) -> None:
         """A neighbour did not take a packet: do without it until it is heard again."""
-        self._routes.now_s = self._deadlines.now_s
         if self._routes.failed(node):
             self._gone(node, self._neighbours.is_deaf(node))
         if node == self._routes.parent:
@@ -397,7 +395,6 @@ class BeaconPlane(IControlPlane):
     def _took(self, node: int) -> None:
         """A neighbour acknowledged a packet."""
         routes = self._routes
-        routes.now_s = self._deadlines.now_s
         was_proved = routes.is_proved
         routes.took(node)
         self._neighbours.hears(node)

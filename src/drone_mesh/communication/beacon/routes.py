@@ -22,6 +22,7 @@ from drone_mesh.communication.beacon.packets import (
 from drone_mesh.communication.control.delivery import IRoutes
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.neighbours.neighbour_table import HeardPlace
+from drone_mesh.communication.timing.deadlines import Deadlines
 from drone_mesh.drone.location import Location
 
 _WAY_UP = itemgetter(
@@ -67,6 +68,7 @@ class BeaconRoutes(IRoutes):
         range_m: float,
         place_of: Callable[[int], HeardPlace | None],
         shared: bool,
+        clock: Deadlines,
         may_be_gateway: Callable[[int], bool] = lambda _node: True,
     ) -> None:
         """`place_of`: where a node was seen last; `shared`: whether the channel is.
@@ -90,7 +92,6 @@ class BeaconRoutes(IRoutes):
         self.proved_s = -math.inf  # when the parent, at that time, last proved that it hears
         self.motion: Motion | None = None  # this node's own
         self.gateway_place: Location | None = None  # what the latest beacon with one said
-        self.now_s = 0.0
         # By neighbour and gateway: the newest number, and when it came. A number counts only for
         # the neighbour that sent it, so a false one makes no other neighbour look old.
         self._numbers: dict[tuple[int, int], tuple[int, float]] = {}
@@ -100,7 +101,13 @@ class BeaconRoutes(IRoutes):
         self._hints: dict[int, tuple[int, float]] = {}  # by node: a neighbour that led to it, when
         self._place_of = place_of
         self._shared = shared
+        self.clock = clock
         self._losses = Losses(range_m)
+
+    @property
+    def now_s(self) -> float:
+        """The time of the component's latest call."""
+        return self.clock.now_s
 
     # What it learns ----------------------------------------------------------------------------
 
@@ -111,12 +118,12 @@ class BeaconRoutes(IRoutes):
         if neighbour is None:
             neighbour = Neighbour(node, beacon)
             self.neighbours[node] = neighbour
-        neighbour.heard(beacon, self.motion, self.now_s)
+        neighbour.heard(beacon, self.motion, self.clock.now_s)
         if beacon.shows_that_it_hears(self._node_id, as_child=node == self.parent):
             self._proved(neighbour)
         if self.motion is not None and neighbour.motion is not None:  # maybe of an earlier beacon
             neighbour.loss = self._losses.heard(
-                node, beacon.interval_s, self.motion.place, neighbour.motion.place, self.now_s
+                node, beacon.interval_s, self.motion.place, neighbour.motion.place, self.clock.now_s
             )
         if beacon.gateway not in (NO_ROUTE, self._node_id):
             self._take_number(node, beacon)
@@ -126,7 +133,7 @@ class BeaconRoutes(IRoutes):
 
     def _take_number(self, node: int, beacon: Beacon) -> None:
         """Note whether a neighbour stands on a newer beacon of the gateway than before."""
-        now_s, gateway, number = self.now_s, beacon.gateway, beacon.number
+        now_s, gateway, number = self.clock.now_s, beacon.gateway, beacon.number
         newest, newest_s = self._newest.get(gateway, (number - 1, -math.inf))
         ahead = newer(number, newest)
         known = self._numbers.get((node, gateway))
@@ -145,7 +152,7 @@ class BeaconRoutes(IRoutes):
     def _take_internet(self, beacon: Beacon) -> None:
         """Note what the parent says of a gateway's internet; others speak for their own way."""
         if beacon.offline:
-            self._offline[beacon.gateway] = beacon.number, self.now_s
+            self._offline[beacon.gateway] = beacon.number, self.clock.now_s
         elif not self._is_offline(beacon):
             self._offline.pop(beacon.gateway, None)
 
@@ -155,7 +162,8 @@ class BeaconRoutes(IRoutes):
         if known is None or beacon.offline:
             return beacon.offline
         number, at_s = known
-        return newer(beacon.number, number) <= 0 and self.now_s - at_s <= STALE * self._slowest_s()
+        is_recent = self.clock.now_s - at_s <= STALE * self._slowest_s()
+        return newer(beacon.number, number) <= 0 and is_recent
 
     def is_news(self, node: int, beacon: Beacon) -> bool:
         """Whether a neighbour's beacon may change this node's way up or what it announces."""
@@ -175,24 +183,24 @@ class BeaconRoutes(IRoutes):
         """A sign of life of a node: a packet of it, or an acknowledgement."""
         neighbour = self.neighbours.get(node)
         if neighbour is not None:
-            neighbour.alive(self.now_s)
+            neighbour.alive(self.clock.now_s)
 
     def took(self, node: int) -> None:
         """A neighbour acknowledged a packet of this node."""
         neighbour = self.neighbours.get(node)
         if neighbour is not None:
-            neighbour.alive(self.now_s)
+            neighbour.alive(self.clock.now_s)
             self._proved(neighbour)
 
     def _proved(self, neighbour: Neighbour) -> None:
-        neighbour.proved(self.now_s)
+        neighbour.proved(self.clock.now_s)
         if neighbour.node == self.parent:
-            self.proved_s = self.now_s
+            self.proved_s = self.clock.now_s
 
     @property
     def is_proved(self) -> bool:
         """Whether the way up works in both directions, or ends here."""
-        return self.is_root or self.now_s - self.proved_s <= PROVEN_S
+        return self.is_root or self.clock.now_s - self.proved_s <= PROVEN_S
 
     @property
     def shown(self) -> tuple[int, int, bool]:
@@ -206,7 +214,7 @@ class BeaconRoutes(IRoutes):
 
         Returns whether it is now known to be deaf to this node.
         """
-        neighbour, now_s = self.neighbours.get(node), self.now_s
+        neighbour, now_s = self.neighbours.get(node), self.clock.now_s
         if neighbour is None:
             return False
         was_deaf = neighbour.deaf
@@ -225,7 +233,7 @@ class BeaconRoutes(IRoutes):
 
     def led_to(self, node: int, neighbour: int) -> None:
         """A packet of `node` came through this neighbour."""
-        self._hints[node] = neighbour, self.now_s
+        self._hints[node] = neighbour, self.clock.now_s
         known = self.neighbours.get(neighbour)
         if known is not None and known.vain:
             known.vain.clear()
@@ -243,9 +251,9 @@ class BeaconRoutes(IRoutes):
 
     def expired(self) -> list[int]:
         """Forget neighbours that were silent for too long, and return them."""
-        if self.now_s <= self.first_end_s():
+        if self.clock.now_s <= self.first_end_s():
             return []
-        old = [n.node for n in self.neighbours.values() if self.now_s > n.until_s]
+        old = [n.node for n in self.neighbours.values() if self.clock.now_s > n.until_s]
         for node in old:
             del self.neighbours[node]
         return old
@@ -328,12 +336,12 @@ class BeaconRoutes(IRoutes):
         if beacon.parent == me or me in beacon.ancestors or not neighbour.usable:
             return False
         _number, at_s = self._numbers.get((neighbour.node, beacon.gateway), (0, -math.inf))
-        is_fresh = self.now_s - at_s <= STALE * beacon.interval_s  # then it is not stale
+        is_fresh = self.clock.now_s - at_s <= STALE * beacon.interval_s  # then it is not stale
         return is_fresh or not self._is_stale(neighbour.node, beacon.gateway)
 
     def _is_stale(self, node: int, gateway: int) -> bool:
         _number, at_s = self._numbers.get((node, gateway), (0, -math.inf))
-        return self.now_s - at_s > STALE * self._slowest_s()
+        return self.clock.now_s - at_s > STALE * self._slowest_s()
 
     def _slowest_s(self) -> float:
         return max((n.beacon.interval_s for n in self._all()), default=0.0)
@@ -369,7 +377,7 @@ class BeaconRoutes(IRoutes):
         own, other, loss = self.motion, neighbour.motion, neighbour.loss
         if own is None or other is None or neighbour.apart_m > WRONG * self._range_m:
             return loss
-        reach_m, age_s = REACH * self._range_m, self.now_s - neighbour.reported_s
+        reach_m, age_s = REACH * self._range_m, self.clock.now_s - neighbour.reported_s
         if own.apart_m(0.0, other, age_s) > reach_m:
             return max(loss, GONE)
         soon_s = neighbour.beacon.interval_s
@@ -407,7 +415,7 @@ class BeaconRoutes(IRoutes):
             yield Way(node, direct.alive_s)
         yield from self._next_to(node)
         hint, at_s = self._hints.get(node, (NO_ROUTE, -math.inf))
-        if hint in self.neighbours and self.now_s - at_s < HINT_S:
+        if hint in self.neighbours and self.clock.now_s - at_s < HINT_S:
             yield Way(hint, at_s)
         for _rank, way in sorted(self._announcements(node)):
             yield way
@@ -423,7 +431,7 @@ class BeaconRoutes(IRoutes):
         shown = []
         for neighbour in self._all():
             at_s = neighbour.near_s.get(node, -math.inf)
-            age_s = self.now_s - at_s
+            age_s = self.clock.now_s - at_s
             if age_s < NEAR * neighbour.beacon.interval_s and neighbour.usable:
                 shown.append((age_s + self.risk(neighbour), Way(neighbour.node, at_s)))
         return [way for _rank, way in sorted(shown)]
@@ -434,7 +442,7 @@ class BeaconRoutes(IRoutes):
             at_s = neighbour.announced_s.get(node)
             if at_s is not None:
                 is_child = neighbour.beacon.parent == self._node_id
-                age_s = self.now_s - at_s + self.risk(neighbour)
+                age_s = self.clock.now_s - at_s + self.risk(neighbour)
                 listed_s = neighbour.listed_s.get(node, at_s)
                 yield (not is_child, age_s), Way(neighbour.node, listed_s)
             elif node == neighbour.beacon.parent or node in neighbour.beacon.ancestors:
@@ -450,7 +458,7 @@ class BeaconRoutes(IRoutes):
     def _nearer(self, node: int) -> list[Way]:
         """The neighbours that are nearer to the last known place of `node`, the nearest first."""
         seen = self._place_of(node)
-        if seen is None or self.motion is None or self.now_s - seen.heard_s > SEEN_S:
+        if seen is None or self.motion is None or self.clock.now_s - seen.heard_s > SEEN_S:
             return []
         goal = seen.place
         own_m = self.motion.place.distance_m(goal)

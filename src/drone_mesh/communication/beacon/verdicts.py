@@ -34,7 +34,7 @@ class Verdicts:
     def verdict_on(self, transit: Transit) -> int:
         """The next hop of a packet, HOLD or DROP."""
         routes = self._routes
-        routes.now_s = now_s = self._deadlines.now_s
+        now_s = self._deadlines.now_s
         is_up = transit.addressee == routes.gateway
         ways = routes.next_hops(transit.addressee, transit.came_from)
         asks = _asks(transit)

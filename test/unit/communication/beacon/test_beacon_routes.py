@@ -16,6 +16,7 @@ from drone_mesh.communication.beacon.packets import (
     Motion,
 )
 from drone_mesh.communication.beacon.routes import BeaconRoutes
+from drone_mesh.communication.timing.deadlines import Deadlines
 from drone_mesh.drone.location import Location
 
 STILL = (0.0, 0.0, 0.0)
@@ -23,12 +24,12 @@ STILL = (0.0, 0.0, 0.0)
 
 @pytest.fixture
 def routes():
-    return BeaconRoutes(9, False, 10.0, lambda _node: None, shared=False)
+    return BeaconRoutes(9, False, 10.0, lambda _node: None, shared=False, clock=Deadlines())
 
 
 @pytest.fixture
 def shared_routes():
-    return BeaconRoutes(9, False, 10.0, lambda _node: None, shared=True)
+    return BeaconRoutes(9, False, 10.0, lambda _node: None, shared=True, clock=Deadlines())
 
 
 def beacon(
@@ -79,7 +80,7 @@ def test_a_new_neighbour_two_numbers_back_is_a_route_and_one_three_back_is_none(
 
 def test_a_number_that_is_far_ahead_makes_no_other_neighbour_look_old(routes):
     for second in range(8):
-        routes.now_s = float(second)
+        routes.clock.now_s = float(second)
         routes.heard(1, beacon(number=second, hops=0, parent=255))
         routes.heard(2, beacon(number=second + 10, hops=1))
         routes.choose()
@@ -88,7 +89,7 @@ def test_a_number_that_is_far_ahead_makes_no_other_neighbour_look_old(routes):
 
 def test_a_neighbour_whose_number_stays_the_same_for_five_intervals_leads_nowhere(routes):
     for second in range(8):
-        routes.now_s = float(second)
+        routes.clock.now_s = float(second)
         routes.heard(1, beacon(number=3, hops=1))
         routes.heard(2, beacon(number=second, hops=4))
         routes.choose()
@@ -97,11 +98,11 @@ def test_a_neighbour_whose_number_stays_the_same_for_five_intervals_leads_nowher
 
 def test_a_gateway_without_a_new_number_for_five_intervals_is_lost(routes):
     routes.heard(1, beacon())
-    routes.now_s = 4.9
+    routes.clock.now_s = 4.9
     routes.heard(1, beacon())
     routes.choose()
     assert routes.parent == 1
-    routes.now_s = 5.1
+    routes.clock.now_s = 5.1
     routes.heard(1, beacon())
     routes.choose()
     assert routes.parent == 255
@@ -112,14 +113,14 @@ def test_on_a_shared_channel_a_neighbour_may_fail_once_until_it_is_heard_again(s
     routes.heard(1, beacon())
     routes.heard(2, beacon(hops=2, parent=3))
     routes.choose()
-    routes.now_s = 0.5
+    routes.clock.now_s = 0.5
     routes.failed(1)
     assert ways(routes, 0) == [1, 2]
     routes.heard(1, beacon())
-    routes.now_s = 0.6
+    routes.clock.now_s = 0.6
     routes.failed(1)
     assert ways(routes, 0) == [1, 2]
-    routes.now_s = 0.7
+    routes.clock.now_s = 0.7
     routes.failed(1)
     assert ways(routes, 0) == [2]
 
@@ -129,7 +130,7 @@ def test_on_a_shared_channel_a_neighbour_whose_beacon_is_late_may_not_fail(share
     routes.heard(1, beacon())
     routes.heard(2, beacon(hops=2, parent=3))
     routes.choose()
-    routes.now_s = 1.3
+    routes.clock.now_s = 1.3
     routes.failed(1)
     assert ways(routes, 0) == [2]
 
@@ -138,11 +139,11 @@ def test_a_failed_hop_is_replaced_at_once_and_back_when_it_is_heard_again(routes
     routes.heard(1, beacon())
     routes.heard(2, beacon(hops=2, parent=3))
     routes.choose()
-    routes.now_s = 0.1
+    routes.clock.now_s = 0.1
     routes.failed(1)
     assert routes.choose()
     assert routes.parent == 2
-    routes.now_s = 0.2
+    routes.clock.now_s = 0.2
     routes.heard(1, beacon())
     routes.choose()
     assert routes.parent == 1
@@ -172,17 +173,17 @@ def test_a_neighbour_heard_from_out_of_reach_errs_and_is_judged_without_places(r
 
 def test_a_neighbour_silent_for_two_and_a_half_intervals_is_forgotten(routes):
     routes.heard(1, beacon())
-    routes.now_s = 2.4
+    routes.clock.now_s = 2.4
     assert routes.expired() == []
-    routes.now_s = 2.6
+    routes.clock.now_s = 2.6
     assert routes.expired() == [1]
 
 
 def test_a_sign_of_life_is_as_good_as_a_beacon(routes):
     routes.heard(1, beacon())
-    routes.now_s = 2.0
+    routes.clock.now_s = 2.0
     routes.alive(1)
-    routes.now_s = 4.0
+    routes.clock.now_s = 4.0
     assert routes.expired() == []
 
 
@@ -196,16 +197,16 @@ def test_a_neighbour_that_lists_nobody_leads_to_nobody_unless_its_beacon_had_no_
 
 def test_a_packet_down_follows_the_child_that_announced_the_node_last(routes):
     routes.heard(1, beacon(hops=3, parent=9, below=Below(20, (20,))))
-    routes.now_s = 0.5
+    routes.clock.now_s = 0.5
     routes.heard(2, beacon(hops=3, parent=9, below=Below(20, (20,))))
     assert ways(routes, 20) == [2, 1]
 
 
 def test_a_node_that_came_back_to_an_earlier_relay_is_looked_for_there(routes):
     routes.heard(1, beacon(hops=3, parent=9, below=Below(20, (20,))))
-    routes.now_s = 0.5
+    routes.clock.now_s = 0.5
     routes.heard(2, beacon(hops=3, parent=9, below=Below(20, (20,))))
-    routes.now_s = 1.0
+    routes.clock.now_s = 1.0
     routes.heard(1, beacon(hops=3, parent=9, below=Below(20, (), (20,))))
     assert ways(routes, 20) == [1, 2]
 
@@ -214,7 +215,7 @@ def test_a_neighbour_that_hears_a_node_leads_to_it_until_that_is_two_intervals_o
     routes.heard(1, beacon(hops=3, parent=9, below=Below(50, (50,))))
     routes.heard(2, beacon(hops=4, parent=7, near=(50,)))
     assert ways(routes, 50) == [2, 1]
-    routes.now_s = 2.1
+    routes.clock.now_s = 2.1
     routes.heard(2, beacon(hops=4, parent=7))
     assert ways(routes, 50) == [1]
 
@@ -239,19 +240,19 @@ def test_a_node_is_looked_for_where_it_was_seen():
     class Heard:
         place, heard_s = seen[50]
 
-    routes = BeaconRoutes(9, True, 10.0, lambda _node: Heard, shared=False)
+    routes = BeaconRoutes(9, True, 10.0, lambda _node: Heard, shared=False, clock=Deadlines())
     routes.motion = Motion(Location(0.0, 0.0, 0.0), STILL)
     routes.heard(1, beacon(hops=1, x=5.0, parent=9))
     routes.heard(2, beacon(hops=1, x=-5.0, parent=9))
     assert ways(routes, 50) == [1]
-    routes.now_s = 11.0
+    routes.clock.now_s = 11.0
     assert ways(routes, 50) == []
 
 
 def test_a_way_over_a_link_that_loses_most_beacons_costs_more_than_a_hop(routes):
     routes.motion = Motion(Location(0.0, 0.0, 0.0), STILL)
     for interval in range(30):
-        routes.now_s = float(interval)
+        routes.clock.now_s = float(interval)
         routes.heard(2, beacon(hops=2, parent=3, number=interval, x=5.0))
         if interval % 4 == 0:
             routes.heard(1, beacon(hops=1, number=interval, x=9.0))
@@ -311,7 +312,7 @@ def test_other_threads_may_ask_for_ways_while_beacons_come_in(routes):
     asking.start()
     try:
         for step in range(4000):
-            routes.now_s = step / 10
+            routes.clock.now_s = step / 10
             routes.heard(step % 37 + 1, beacon(hops=1 + step % 3, number=step % 256))
             routes.expired()
             routes.choose()

@@ -13,13 +13,16 @@ from drone_mesh.communication.beacon.packets import (
     Below,
 )
 from drone_mesh.communication.beacon.routes import BeaconRoutes
+from drone_mesh.communication.timing.deadlines import Deadlines
 
 
 class Node:
     """Node 9, as far as it hears the beacons of others."""
 
     def __init__(self) -> None:
-        self.routes = BeaconRoutes(9, False, 10.0, lambda _node: None, shared=False)
+        self.routes = BeaconRoutes(
+            9, False, 10.0, lambda _node: None, shared=False, clock=Deadlines()
+        )
         self.below = NodesBelow(9, self.routes)
 
     def hears(self, neighbour: int, beacon: Beacon) -> None:
@@ -46,9 +49,9 @@ def test_a_node_that_its_child_lists_no_longer_is_soon_not_below(node):
     node.hears(1, beacon(hops=3, parent=9, below=Below(30, (20, 30))))
     node.below.ids()
     node.hears(1, beacon(hops=3, parent=9, below=Below(30, (30,))))
-    node.routes.now_s = 0.9
+    node.routes.clock.now_s = 0.9
     assert node.below.ids() == {1, 20, 30}
-    node.routes.now_s = 1.1
+    node.routes.clock.now_s = 1.1
     assert 20 not in node.below.ids()
 
 

@@ -24,14 +24,16 @@ class Sender:
 
     def __init__(self):
         self.deadlines = Deadlines()
-        self.routes = BeaconRoutes(GATEWAY, True, 10.0, lambda _node: None, shared=False)
+        self.routes = BeaconRoutes(
+            GATEWAY, True, 10.0, lambda _node: None, shared=False, clock=self.deadlines
+        )
         searches = Searches(GATEWAY, self.routes, lambda *_packet: None, 0.002)
         self.verdicts = Verdicts(self.routes, searches, self.deadlines)
         self.claim()
 
     def claim(self):
         for node, ago_s in ((RELAY, 0.1), (LIAR, 0.0)):
-            self.routes.now_s = self.deadlines.now_s - ago_s
+            self.routes.clock.now_s = self.deadlines.now_s - ago_s
             near = Beacon(GATEWAY, 1, 1, GATEWAY, NO_ANCESTORS, 2.0, near=DRONES)
             self.routes.heard(node, near)
 
@@ -54,7 +56,7 @@ def test_an_order_without_an_answer_goes_another_way_the_next_time(came_from):
 def test_a_drone_that_was_heard_since_its_last_order_is_ordered_the_same_way():
     sender = Sender()
     assert sender.next_hop() == LIAR
-    sender.routes.now_s += 1.0
+    sender.routes.clock.now_s += 1.0
     sender.routes.led_to(DRONE, RELAY)
     assert sender.next_hop(after_s=5.0) == LIAR
 

@@ -10,24 +10,27 @@ from rig import AlwaysHalf
 from drone_mesh.communication.beacon.packets import NO_ANCESTORS, Beacon
 from drone_mesh.communication.beacon.parent_watch import ParentWatch
 from drone_mesh.communication.beacon.routes import BeaconRoutes
+from drone_mesh.communication.timing.deadlines import Deadlines
 
 HOP_S = 0.01  # AlwaysHalf: node 9 waits for four hops more for each of its neighbours
 
 
 class Node:
     def __init__(self, rng):
-        self.routes = BeaconRoutes(9, False, 10.0, lambda _node: None, shared=False)
+        self.routes = BeaconRoutes(
+            9, False, 10.0, lambda _node: None, shared=False, clock=Deadlines()
+        )
         self.watch = ParentWatch(self.routes, HOP_S, rng)
 
     def hear_parent(self, now_s=0.0, interval_s=1.0, near=(9,)):
-        self.routes.now_s = now_s
+        self.routes.clock.now_s = now_s
         self.routes.heard(1, Beacon(0, 5, 1, 0, NO_ANCESTORS, interval_s, near=near))
         self.routes.choose()
         return self.routes.neighbours[1]
 
     def asks(self, parent, *seconds):
         asked = []
-        for self.routes.now_s in seconds:
+        for self.routes.clock.now_s in seconds:
             asked += [self.routes.now_s] * self.watch.is_due(parent)
         return asked
 

@@ -29,7 +29,9 @@ class Node:
 
     def __init__(self, is_gateway=False, has_key=True):
         self.antenna, self.proved = RecordingAntenna(), set()
-        self.routes = BeaconRoutes(9, is_gateway, 10.0, lambda _node: None, shared=False)
+        self.routes = BeaconRoutes(
+            9, is_gateway, 10.0, lambda _node: None, shared=False, clock=Deadlines()
+        )
         courier = Courier(
             9, self.antenna, Deadlines(), 1, lambda transit: DROP if transit.sent_s else 1,
             *3 * [lambda *_: None], lambda payload: payload,
@@ -49,7 +51,7 @@ class Node:
         self.proofs.connected()
 
     def sent(self, now_s):
-        self.routes.now_s = now_s
+        self.routes.clock.now_s = now_s
         self.antenna.taken.clear()
         self.proofs.on_time()
         return self.antenna.taken
@@ -95,13 +97,13 @@ def test_without_a_way_up_nothing_is_sent_until_there_is_one(node):
 def test_a_gateway_that_moves_is_asked_once_in_ten_seconds_at_a_random_moment(node):
     node.proofs.due_s = math.inf
     node.proofs.ask_soon()
-    node.routes.now_s = 1.0
+    node.routes.clock.now_s = 1.0
     node.proofs.ask_soon()
     assert node.sent(2.5) == [ASKS]
-    node.routes.now_s = 12.4
+    node.routes.clock.now_s = 12.4
     node.proofs.ask_soon()
     assert node.proofs.next_s == math.inf
-    node.routes.now_s = 12.5
+    node.routes.clock.now_s = 12.5
     node.proofs.ask_soon()
     assert node.proofs.next_s == 15.0
 

@@ -6,6 +6,7 @@ import pytest
 
 from drone_mesh.communication.beacon.routes import BeaconRoutes
 from drone_mesh.communication.beacon.search import Searches
+from drone_mesh.communication.timing.deadlines import Deadlines
 
 HOP_S = 0.0025
 FOR_21 = b"\x15\x07\x00\x02"  # node 21, number 7, two hops left
@@ -13,7 +14,7 @@ FOR_21 = b"\x15\x07\x00\x02"  # node 21, number 7, two hops left
 
 @pytest.fixture
 def routes():
-    return BeaconRoutes(1, False, 9.0, lambda node: None, shared=True)
+    return BeaconRoutes(1, False, 9.0, lambda node: None, shared=True, clock=Deadlines())
 
 
 @pytest.fixture
@@ -31,7 +32,7 @@ def test_a_node_searches_for_one_after_the_other(routes, searches, sent):
     searches.search(22, 2)
     assert sent == [(1, b"\x15\x01\x00\x02")]
 
-    routes.now_s = 400 * HOP_S
+    routes.clock.now_s = 400 * HOP_S
     searches.search(22, 2)
     assert sent[1:] == [(1, b"\x16\x02\x00\x02")]
 
@@ -41,7 +42,7 @@ def test_a_node_repeats_the_search_of_another_and_waits_before_its_own(routes, s
     searches.search(22, 2)
     assert sent == [(3, b"\x15\x07\x00\x01")]
 
-    routes.now_s = 400 * HOP_S
+    routes.clock.now_s = 400 * HOP_S
     searches.search(22, 2)
     assert sent[1:] == [(1, b"\x16\x01\x00\x02")]
 
@@ -51,7 +52,7 @@ def test_on_a_fast_medium_the_same_node_is_searched_again_after_six_tenths_of_a_
 ):
     searches = Searches(1, routes, lambda *_: sent.append(routes.now_s), 1e-5)
     for step in range(14):
-        routes.now_s = step / 8
+        routes.clock.now_s = step / 8
         searches.search(21, 2)
     assert sent == [0.0, 0.625, 1.25]
 
@@ -59,7 +60,7 @@ def test_on_a_fast_medium_the_same_node_is_searched_again_after_six_tenths_of_a_
 def test_after_five_searches_in_vain_it_pauses_for_ten_seconds(routes, searches, sent):
     searched_s = []
     for second in range(40):
-        routes.now_s = 2.0 * second
+        routes.clock.now_s = 2.0 * second
         searches.search(21, 2)
         if len(sent) > len(searched_s):
             searched_s.append(routes.now_s)
@@ -71,14 +72,14 @@ def test_a_search_that_comes_again_is_repeated_once_within_five_seconds(
     routes, searches, sent, after_s, repeated
 ):
     searches.heard(3, 3, FOR_21)
-    routes.now_s = after_s
+    routes.clock.now_s = after_s
     searches.heard(3, 4, FOR_21)
     assert len(sent) == repeated
 
 
 def test_searches_that_found_the_node_do_not_count(routes, searches, sent):
     for second in range(0, 30, 3):
-        routes.now_s = float(second)
+        routes.clock.now_s = float(second)
         searches.search(21, 2)
         searches.found(21)
     assert len(sent) == 10

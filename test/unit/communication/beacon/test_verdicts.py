@@ -19,12 +19,14 @@ UP = "05 01 00 09 00"
 class Node:
     def __init__(self):
         self.deadlines, self.searches = Deadlines(), []
-        self.routes = BeaconRoutes(9, False, 10.0, lambda _node: None, shared=False)
+        self.routes = BeaconRoutes(
+            9, False, 10.0, lambda _node: None, shared=False, clock=self.deadlines
+        )
         searches = Searches(9, self.routes, lambda _k, _c, body: self.searches.append(body), 1e-5)
         self.verdicts = Verdicts(self.routes, searches, self.deadlines)
 
     def hear(self, neighbour, now_s=0.0, below=(), hops=3, parent=8):
-        self.routes.now_s, listed = now_s, Below(0, below)
+        self.deadlines.now_s, listed = now_s, Below(0, below)
         self.routes.heard(neighbour, Beacon(0, 5, hops, parent, NO_ANCESTORS, 1.0, below=listed))
 
     def verdict(self, transit, now_s=0.0):
@@ -92,7 +94,7 @@ def test_a_neighbour_that_did_not_take_the_packet_gets_it_again_after_a_sign_of_
     node.hear(2, below=(50,))
     own.failed_s[2] = 0.1
     assert node.verdict(own, 0.1) == HOLD
-    node.routes.now_s = 0.2
+    node.routes.clock.now_s = 0.2
     node.routes.alive(2)
     assert node.verdict(own, 0.2) == 2
 
