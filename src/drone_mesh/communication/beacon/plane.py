@@ -232,7 +232,7 @@ class BeaconPlane(IControlPlane):
             self._trickle.hurry(now_s)
 
     def _plan(self) -> None:
-        """Schedule the next call of `on_time`."""
+        """Schedule the next call of `on_due`."""
         due_s = self._trickle.due_s
         routes = self._routes
         due_s = min(due_s, routes.first_end_s() + 1e-3)
