@@ -134,9 +134,10 @@ build() {
   # catkin writes this into the first lines of scripts, which cannot name a path with a space.
   local python="$venv/bin/python"
   [[ $python != *[[:space:]]* ]] || python=/usr/bin/python3 # finds .venv with scripts/env.bash
+  # Debian 13's catkin asks for the second name.
   [ -e "$root/build/Makefile" ] ||
     build_step configuring cmake -S "$root" -B "$root/build" \
-      -DPYTHON_EXECUTABLE="$python" -DCMAKE_INSTALL_PREFIX="$root/build/install"
+      -DPYTHON_EXECUTABLE="$python" -DPython_EXECUTABLE="$python" -DCMAKE_INSTALL_PREFIX="$root/build/install"
   build_step building cmake --build "$root/build" -j "$(nproc)"
 }
 
