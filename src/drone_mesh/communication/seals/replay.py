@@ -59,8 +59,13 @@ class AgedWindow(ReplayWindow):
             self.turn(now_s)
         return value <= self._before
 
-    def restart(self, highest: int) -> None:
-        """`highest` and all values below it count as used, and none above it."""
+    def restart(self, highest: int, now_s: float) -> None:
+        """`highest` and all values below it count as used, and none above it.
+
+        Values that had not been seen before are not old: they were overtaken by what proved this.
+        """
+        if now_s >= self.turn_s:
+            self.turn(now_s)
         self.highest, self._seen = highest, _MASK
         self._mark, self._before = min(self._mark, highest), min(self._before, highest)
 

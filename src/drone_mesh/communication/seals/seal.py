@@ -75,9 +75,10 @@ class _Peer:
 
         A few broadcasts may have overtaken the answer; one that was further ahead was not its own.
         """
-        self.window.restart(max(count, self.window.highest))
+        self.window.restart(max(count, self.window.highest), now_s)
         ahead = self.window_to_all.highest - count
-        self.window_to_all.restart(count + ahead if 0 < ahead <= OVERTAKING else count)
+        highest = count + ahead if 0 < ahead <= OVERTAKING else count
+        self.window_to_all.restart(highest, now_s)
         self.heard_s = now_s
 
 

@@ -5,7 +5,7 @@ from random import Random
 import pytest
 from seal_rig import FRESH_S, KEY, OTHER_KEY, introduce, node, packet
 
-from drone_mesh.communication.seals.seal import HopSeal, _epoch_state
+from drone_mesh.communication.seals.seal import HopSeal, NotOpened, _epoch_state
 
 HEARTBEAT = packet("05 05 04 01 01 01 00 00")  # of node 5 for node 1
 PRESENT = packet("05 05 03 fe fe 01 01")
@@ -199,6 +199,15 @@ def test_one_answer_ends_what_a_broadcast_claimed(link, ahead):
     assert receiver.open(forged, 3.0) is not None  # the forger can always make another one
     introduce(receiver, sender, 5, 9.0)
     assert receiver.open(sender.seal(PRESENT), 9.0) is not None
+
+
+def test_what_an_answer_overtook_after_a_long_silence_is_late_and_not_replayed(link):
+    receiver, sender = link
+    sealed = sender.seal(PRESENT)
+    overtaken = sealed[:3] + b"\x01" + sealed[4:]
+    receiver.answered(sender.answer(receiver.challenge(5, 65.0), 65.1), 65.2)
+    assert receiver.open(overtaken, 65.3) is None
+    assert receiver.why_not(overtaken, 65.3) is NotOpened.LATE
 
 
 def test_a_known_neighbour_is_challenged_less_and_less_while_its_answers_show_no_reason(link):
