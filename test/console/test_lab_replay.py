@@ -99,7 +99,7 @@ def test_dragging_shows_the_mesh_as_it_was_at_that_moment(replay: Page) -> None:
 
 
 def test_play_pause_and_step(replay: Page) -> None:
-    bar = replay.locator("#timeline")
+    bar = replay.get_by_role("group", name="Playback")
     if bar.get_by_role("button", name="pause").count():
         bar.get_by_role("button", name="pause").click()
     drag_to(replay, 0.5)

@@ -64,6 +64,7 @@ def test_each_program_in_nodes_is_installed() -> None:
 
 def test_each_folder_that_ros_reads_is_installed() -> None:
     cmake = (ROOT / "CMakeLists.txt").read_text(encoding="utf-8")
+    cmake = cmake.replace("${PROJECT_NAME}", "drone_mesh")
     (folders,) = re.findall(r"^install\(DIRECTORY ([\w/ ]+)$", cmake, flags=re.MULTILINE)
     read_by_ros = {"config", "launch", "meshes", "rviz"} & {path.name for path in ROOT.iterdir()}
     assert {Path(folder).name for folder in folders.split()} >= read_by_ros

@@ -92,7 +92,6 @@ def test_on_a_shared_channel_within_five_seconds(key, technique):
         (25, "shared", "beacon"),
         (100, "disc", "child_table_tree"),
         (100, "disc", "beacon"),
-        (100, "shared", "child_table_tree"),
     ],
 )
 def test_also_between_more_nodes(nodes, radio, technique):

@@ -72,7 +72,7 @@ def test_an_order_that_comes_before_the_introduction_is_repeated_and_flown(monke
     network = line(1, spacing=6.0)
     network.run_for(60.0)
     frame = network.nodes[1].component._frame
-    frame._of.clear()  # the PRESENT of the gateway was lost
+    frame._digests.clear()  # the PRESENT of the gateway was lost
     assert network.order(1, 1.0, 1.0)
     network.run_for(1.0)
     assert network.nodes[1].drone.path is None

@@ -5,13 +5,16 @@ A REQUESTLOCATION, which its addressee answers with a LOCATION.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from drone_mesh.communication.control.delivery import IDelivery
 from drone_mesh.communication.control.pilot import Pilot
 from drone_mesh.communication.interfaces import BROADCAST, IWirelessCommunication
 from drone_mesh.communication.timing.deadlines import Deadlines
 from drone_mesh.communication.wire import messages
+from drone_mesh.drone.location import Location
+
+SAME_PLACE_M = 1.0  # a drone holds its place to within that
 
 
 @dataclass(eq=False)
@@ -23,6 +26,7 @@ class PlaceRequests:
     _antenna: IWirelessCommunication
     _delivery: IDelivery
     _deadlines: Deadlines
+    _told: Location | None = field(default=None, init=False)  # to all
 
     def ask(self, node: int) -> None:
         """Ask `node` for its place, along the route to it."""
@@ -33,13 +37,18 @@ class PlaceRequests:
         self._antenna.broadcast_message(self._request(BROADCAST, may_fly_on))
 
     def tell_all(self) -> None:
-        """Tell every node in range where this one is or flies to: it may fall silent soon."""
+        """Tell every node in range where this one is or flies to: it may fall silent soon.
+
+        Each place once: on a busy channel routers connect anew all the time.
+        """
         goal = self._pilot.goal
         place = goal or self._pilot.location()
-        if place is not None:
-            is_goal, now_s = goal is not None, self._deadlines.now_s
-            packet = messages.own_location(place, is_goal, now_s, self._node_id, BROADCAST)
-            self._antenna.broadcast_message(packet)
+        if place is None or (self._told and self._told.distance_m(place) < SAME_PLACE_M):
+            return
+        self._told = place
+        is_goal, now_s = goal is not None, self._deadlines.now_s
+        packet = messages.own_location(place, is_goal, now_s, self._node_id, BROADCAST)
+        self._antenna.broadcast_message(packet)
 
     def _request(self, to: int, may_fly_on: bool = False) -> bytes:
         """A request with the place of this node: its destination, if it flies."""

@@ -194,7 +194,7 @@ def test_an_answer_after_the_connection_was_lost_is_a_new_connection():
     rig.wait(0.7)
     rig.forget()
     rig.hear("00 02 04 01 01 01 00 01")
-    assert rig.broadcasts() == [packet("01 01 03 fe fe 02 01"), OWN_PLACE]
+    assert rig.broadcasts() == [packet("01 01 03 fe fe 02 01")]  # its place is known since then
     assert rig.sent(REQUEST) == [
         packet("01 01 02 02 00" + FROM_0),
         packet("01 01 02 02 02" + FROM_0),
