@@ -32,6 +32,7 @@ TAKE_OFF_WITHIN_S = 5.0  # docs/repair.md, "Negotiation": then the winner is pas
 ROUNDS_WITHOUT_FLIER = 2  # docs/repair.md, "Negotiation": then the second choice counts
 LATER_ROUNDS = 1.0 / 3.0  # of the patience: a step back takes about 5 s
 HOME_FAILED_ROUNDS = 20  # then another drone tries; its radio may hear the gateway
+OCCUPIED_FOR_S = 300.0  # after the last report: the route to who stood there may be a memory, too
 HOME_AGAIN_S = 60.0  # docs/repair.md, "Negotiation": between flights of a group to a gateway
 
 IN_A_ROUND = (RepairState.ASKING, RepairState.NEGOTIATING, RepairState.WATCHING)
@@ -181,7 +182,11 @@ class GroupRepair(LoneRepair):
         for node, view in mesh.reachable().items():
             if node == step.owner and view.age_s <= mesh.now_s - self._asked_s:
                 return node
-            if view.place is not None and view.place.distance_m(step.place) < radius_m:
+            if (
+                view.place is not None
+                and view.age_s < OCCUPIED_FOR_S
+                and view.place.distance_m(step.place) < radius_m
+            ):
                 return node
         return NO_ROUTE
 

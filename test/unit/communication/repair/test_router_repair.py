@@ -1021,6 +1021,18 @@ def test_a_place_on_which_a_neighbour_stands_is_occupied():
     assert rig.repair_in_words() == "negotiating, does not bid: the place of 2 is occupied by 3"
 
 
+@pytest.mark.parametrize(("age", "score"), [("22 01", -1.0), ("36 01", 8.0)])  # 290 s, 310 s
+def test_a_far_node_that_stood_at_a_place_minutes_ago_does_not_occupy_it(age, score):
+    """The route to it may be as old; a drone that flies there asks who is there."""
+    rig = group_rig(3, 4)
+    rig.wait_until(EMERGENCY_S - 1.0)
+    rig.routing.other_can_communicate_with_node(3, 6)
+    rig.hear(f"03 03 45 01 01 {age} 06 00 00 04 41")  # 6 was at latitude 8.25; 2's place is at 8
+    rig.wait_until(EMERGENCY_S)
+    rig.hear(place(3, 30.0), place(4, 30.0))
+    assert own_bid(3, score) in rig.sent(BID)
+
+
 def test_each_step_of_an_election_is_described():
     rig = group_rig(3, 4)
     rig.wait_until(EMERGENCY_S - 3.5)
