@@ -220,7 +220,8 @@ class FrameStore:
         self._run_began_at = self.version  # pages begin anew: these come before what they have
         before = [(self.version, event) for event in events]
         self._events = deque([*before, *self._events], maxlen=EVENTS_KEPT)
-        self._samples.extend((self.version, sample) for sample in samples)
+        earlier = [(self.version, sample) for sample in samples]
+        self._samples = deque([*earlier, *self._samples], maxlen=SAMPLES_KEPT)
         self._replace("alarms", self._alarms.groups())
 
     def set_story(self, story: Mapping[str, Any]) -> None:

@@ -23,7 +23,7 @@ Places = Dict[int, Place]  # by node
 
 FAST = 5.0  # simulated seconds per second
 ORDER_AGAIN_S = 5.0  # simulated, as all that follows: a drone that had no route may have one then
-_WITHIN_S = 300.0  # wall time: a minute
+_WITHIN_S = 300.0  # at the speed FAST a minute of wall time
 _HOLD_S = 120.0  # for whoever needs a route: twice the time in which the mesh repairs itself
 _LAST_FLIGHTS_S = 100.0  # what is left of _WITHIN_S for the drones that only watched
 _SHOWN_WITHIN_S = 10.0  # the last orders, in the state of the mesh

@@ -124,7 +124,8 @@ class AlarmBook:
         """Go on with what `saved` returned."""
         for node, text, since_s, until_s, acknowledged in saved["alarms"]:
             until_s = math.inf if until_s is None else float(until_s)
-            alarm = Alarm(int(node), str(text), float(since_s), until_s, bool(acknowledged))
+            node = None if node is None else int(node)
+            alarm = Alarm(node, str(text), float(since_s), until_s, bool(acknowledged))
             self._alarms[alarm.node, alarm.text] = alarm
         self._was_connected.update(map(int, saved["was_connected"]))
 

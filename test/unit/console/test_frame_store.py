@@ -315,7 +315,10 @@ def test_what_a_console_goes_on_with_is_bounded():
     before.add_events([EventRecord(float(n), 1, "landed") for n in range(EVENTS_KEPT + 9)])
     store = FrameStore()
     store.add_events([EventRecord(2000.0, 1, "landed")])
+    store.update_mesh(mesh(2000.0), wall_s=0.0)
+    before.update_mesh(mesh(9.0), wall_s=0.0)
     store.restore(before.saved())
+    assert [sample["stamp_s"] for sample in frame(store, 0)["samples"]] == [9.0, 2000.0]
     times = [event["t"] for event in store.saved()["events"]]
     assert (len(times), times[0], times[-1]) == (EVENTS_KEPT, 10.0, 2000.0)
 

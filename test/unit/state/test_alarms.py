@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 from drone_mesh.drone.location import Location
 from drone_mesh.state.alarms import AlarmBook
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
@@ -90,6 +92,14 @@ def test_a_jammer_is_an_alarm_of_the_whole_mesh_and_the_first_one():
     ]
     book.update(state(3.0, well(1), well(2)))
     assert ("the radio channel is jammed", [], True, False) in said(book)
+
+
+def test_alarms_of_nodes_and_of_the_whole_mesh_go_on_after_a_restart_of_the_console():
+    before, book = AlarmBook(), AlarmBook()
+    before.update(state(1.0, NodeStatus(1, jammed=True), NodeStatus(2, crashed=True)))
+    assert len(said(before)) == 2
+    book.restore(json.loads(json.dumps(before.saved())))
+    assert said(book) == said(before)
 
 
 def test_a_failed_order_is_an_alarm_until_a_later_order_is_accepted():

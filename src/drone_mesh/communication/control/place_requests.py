@@ -14,7 +14,7 @@ from drone_mesh.communication.timing.deadlines import Deadlines
 from drone_mesh.communication.wire import messages
 from drone_mesh.drone.location import Location
 
-SAME_PLACE_M = 1.0  # a drone holds its place to within that
+SAME_PLACE_M = 0.09  # so much the spots of other drones allow for (TakenPlaces)
 
 
 @dataclass(eq=False)
@@ -46,7 +46,14 @@ class PlaceRequests:
         if place is None or (self._told and self._told.distance_m(place) < SAME_PLACE_M):
             return
         self._told = place
-        is_goal, now_s = goal is not None, self._deadlines.now_s
+        self._broadcast(place, is_goal=goal is not None)
+
+    def announce(self, goal: Location) -> None:
+        """Tell every node in range where this drone flies, or is about to fly."""
+        self._broadcast(goal, is_goal=True)
+
+    def _broadcast(self, place: Location, is_goal: bool) -> None:
+        now_s = self._deadlines.now_s
         packet = messages.own_location(place, is_goal, now_s, self._node_id, BROADCAST)
         self._antenna.broadcast_message(packet)
 

@@ -13,7 +13,7 @@ from drone_mesh.communication.control.pilot import Pilot
 from drone_mesh.communication.control.place_requests import PlaceRequests
 from drone_mesh.communication.control.router_states import RepairState, RouterEvent, RouterStates
 from drone_mesh.communication.events.observer import MeshEventKind, Reporter
-from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE, IWirelessCommunication
+from drone_mesh.communication.interfaces import NO_ROUTE, IWirelessCommunication
 from drone_mesh.communication.neighbours.known_places import KnownPlaces
 from drone_mesh.communication.neighbours.neighbour_table import Neighbours
 from drone_mesh.communication.repair.heights import may_be_flown_to
@@ -25,7 +25,6 @@ from drone_mesh.communication.wire.messages import (
     GatewayPlace,
     MovementNegotiationMessage,
     addressed,
-    own_location,
 )
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
@@ -223,8 +222,7 @@ class RepairActions(abc.ABC):
 
     def announce_place(self, place: Location) -> None:
         """Send the place to which this drone flies to all nodes in range."""
-        packet = own_location(place, True, self.now_s, self.node_id, BROADCAST)
-        self._antenna.broadcast_message(packet)
+        self._requests.announce(place)
 
     def present(self) -> None:
         """Introduce this node to all nodes in range."""

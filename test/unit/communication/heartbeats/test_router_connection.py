@@ -13,7 +13,7 @@ from drone_mesh.communication.timing.medium import Medium
 from drone_mesh.communication.timing.mesh_timing import MeshTiming
 from drone_mesh.drone.location import Location
 
-HEARTBEAT, PRESENT, REQUEST, MISSING = 4, 3, 2, 5
+LOCATION, HEARTBEAT, PRESENT, REQUEST, MISSING = 1, 4, 3, 2, 5
 ANSWER = "00 00 04 01 01 01 00 00"  # of gateway 0, a neighbour
 INTRODUCTION_1_HOP = "01 01 03 fe fe 01 01"
 OWN_PLACE = packet("01 01 01 fe fe")  # (0, 0, 0), no goal, at 0 s
@@ -74,6 +74,19 @@ def test_becoming_connected_introduces_the_node_at_once():
     rig.hear(ANSWER)
     assert rig.broadcasts() == [packet(INTRODUCTION_1_HOP), OWN_PLACE]
     assert "CONNECTED" in rig.kinds()
+
+
+@pytest.mark.parametrize(("moved_m", "tells"), [(0.0, False), (0.05, False), (0.2, True)])
+def test_a_router_that_connects_again_tells_its_place_only_if_it_is_another(moved_m, tells):
+    """The spots of other drones allow for 0.09 m; farther off they might be too near."""
+    rig = Rig()
+    rig.hear(ANSWER)
+    rig.mesh.control.send_heartbeat(0)
+    rig.wait(0.7)
+    rig.engine.place = Location(moved_m, 0.0, 0.0)
+    rig.forget()
+    rig.hear(ANSWER)
+    assert (len([sent for sent in rig.broadcasts() if sent[2] == LOCATION]) == 1) is tells
 
 
 def test_a_router_that_connects_tells_all_in_range_where_it_stands():
