@@ -397,15 +397,17 @@ class BeaconRoutes(IRoutes):
                 yield Way(neighbour, -heard)
             return
         seen: set[int] = set()
-        doubtful: list[Way] = []
+        doubtful: list[tuple[int, Way]] = []
         for way in self._ways_down(node, came_from):
             if way.neighbour not in seen:
                 seen.add(way.neighbour)
-                if way.neighbour != node and self.neighbours[way.neighbour].swallows:
-                    doubtful.append(way)
+                known = self.neighbours.get(way.neighbour)  # None: forgotten in another thread
+                if known is not None and known.swallows and way.neighbour != node:
+                    doubtful.append((len(known.vain), way))
                 else:
                     yield way
-        yield from sorted(doubtful, key=lambda way: len(self.neighbours[way.neighbour].vain))
+        for _vain, way in sorted(doubtful, key=itemgetter(0)):
+            yield way
 
     def _ways_down(self, node: int, came_from: int) -> Iterator[Way]:
         """The same for a node that is no gateway, and some of them more than once."""
