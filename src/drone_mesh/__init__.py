@@ -10,7 +10,7 @@ from drone_mesh.communication.repair.interfaces import IRepairStrategy
 from drone_mesh.communication.repair.strategies.thesis import Thesis
 from drone_mesh.communication.routing.child_table_tree import ChildTableTree
 from drone_mesh.communication.routing.interfaces import IRoutingTechnique
-from drone_mesh.communication.timing.mesh_timing import MeshTiming
+from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.communication.wire.messages import type_of
 from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.drone.fleet import plan_fleet

@@ -9,7 +9,7 @@ import statistics
 from typing import AbstractSet, NamedTuple, Sequence
 
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.node.named_techniques import DEFAULT_ROUTING
+from drone_mesh.communication.node.node_configuration import DEFAULT_ROUTING
 from drone_mesh.communication.seals.keys import Keys, MeshKey
 from drone_mesh.communication.wire.messages import present
 from drone_mesh.drone.location import Location

@@ -13,13 +13,12 @@ from drone_mesh.communication.beacon import proofs, trickle
 from drone_mesh.communication.control import control_plane
 from drone_mesh.communication.data import packets as data
 from drone_mesh.communication.events import complaints
-from drone_mesh.communication.heartbeats import detours, node_search, relay_check
+from drone_mesh.communication.heartbeats import detours, node_search
 from drone_mesh.communication.interfaces import BROADCAST, MAX_NODE_ID, PAYLOAD_BYTES
 from drone_mesh.communication.repair import bid_credit
 from drone_mesh.communication.seals import end_to_end, keys, message_seal, replay, seal
 from drone_mesh.communication.seals import sealed_antenna as antenna
-from drone_mesh.communication.timing import limits
-from drone_mesh.communication.timing.mesh_timing import MeshTiming
+from drone_mesh.communication.timing import LIMIT_PERIOD_S, REPEATS, STRANGERS, MeshTiming
 from drone_mesh.communication.wire.messages import TO_AT
 from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.internet import guarded_app
@@ -55,8 +54,8 @@ SENTENCES = [
     f"Its last {WORDS[end_to_end.NONCES]} nonces are valid",
     f"(one of the {WORDS[end_to_end.EXPIRED]} before the last {WORDS[end_to_end.NONCES]})",
     f"in the {message_seal.ACK_TAG_BYTES} bytes that are left",
-    f"every {WORDS[int(relay_check.ASK_PERIODS)]} check periods",
-    f"(at least {WORDS[relay_check.LEAST_UNANSWERED]}) bring no answer",
+    f"every {WORDS[int(detours.ASK_PERIODS)]} check periods",
+    f"(at least {WORDS[detours.LEAST_UNANSWERED]}) bring no answer",
     f"that next hop for {'ten' if detours.SWALLOWER_AVOIDED_S == 600 else '?'} minutes",
     f"brings no answer for {'a minute' if detours.AVOIDED_S == 60 else '?'}",
     f"one stranger next to the gateway of {damage.NODES} nodes, {damage.SPACING_M:g} m apart",
@@ -83,9 +82,8 @@ SENTENCES = [
     f"again after {proofs.AGAIN_S:g} to {2 * proofs.AGAIN_S:g} s until the gateway",
     f"every {proofs.PERIOD_S * (1 - trickle.JITTER):g} to {proofs.PERIOD_S:g} s. After a restart",
     f"more than {damage.LURED_M:g} m from their place, or more than {damage.OFF_ORDER_M:g} m from",
-    f"| {limits.STRANGERS} losses in {limits.LIMIT_PERIOD_S:g} s; until the "
-    f"{limits.LIMIT_PERIOD_S:g} s are over",
-    f"| {limits.REPEATS} announcements in {limits.LIMIT_PERIOD_S:g} s;",
+    f"| {STRANGERS} losses in {LIMIT_PERIOD_S:g} s; until the {LIMIT_PERIOD_S:g} s are over",
+    f"| {REPEATS} announcements in {LIMIT_PERIOD_S:g} s;",
     f"| one in {detours.AVOIDED_S:g} s |",
     f"after {node_search.FIRST_PAUSE_S:g}, {2 * node_search.FIRST_PAUSE_S:g}, "
     f"{4 * node_search.FIRST_PAUSE_S:g} s and so on up to {node_search.LONGEST_PAUSE_S:g} s; "

@@ -22,7 +22,7 @@ from drone_mesh.communication.interfaces import (
     IMeshNetwork,
     IWirelessCommunication,
 )
-from drone_mesh.communication.timing.medium import ChannelUse, Medium
+from drone_mesh.communication.timing import ChannelUse, Medium
 from drone_mesh.communication.wire.messages import (
     is_answered,
     is_jittered,

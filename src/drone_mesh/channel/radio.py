@@ -6,7 +6,7 @@ from typing import Callable, NamedTuple, Protocol, Sequence
 
 from drone_mesh.channel.medium_access import MediumAccess
 from drone_mesh.channel.statistics import RadioStatistics
-from drone_mesh.communication.timing.medium import Medium
+from drone_mesh.communication.timing import Medium
 
 
 class Received(Protocol):

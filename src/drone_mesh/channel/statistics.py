@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Mapping, NamedTuple
 
-from drone_mesh.communication.timing.medium import ChannelUse
+from drone_mesh.communication.timing import ChannelUse
 
 _LEARNING = 0.1  # weight of the latest packet in the quality of a link
 

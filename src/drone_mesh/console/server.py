@@ -29,7 +29,7 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from drone_mesh.communication.timing.throttle import Throttle
+from drone_mesh.communication.timing import Throttle
 from drone_mesh.communication.wire.packet_types import PacketKind
 from drone_mesh.console.controls import MeshControls, OrderRefused
 from drone_mesh.console.dots import Dot

@@ -16,12 +16,11 @@ from drone_mesh.communication.events.observer import MeshEvent
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.node.assembly import Security, assemble_node
 from drone_mesh.communication.node.gateway import MeshnetworkGateway
-from drone_mesh.communication.node.named_techniques import DEFAULT_ROUTING
-from drone_mesh.communication.node.node_configuration import NodeConfiguration
+from drone_mesh.communication.node.node_configuration import DEFAULT_ROUTING, NodeConfiguration
 from drone_mesh.communication.repair.interfaces import IRepairStrategy
 from drone_mesh.communication.repair.options import DEFAULT_REPAIR, RANGE_M, RepairOptions
 from drone_mesh.communication.seals.keys import Keys
-from drone_mesh.communication.timing.mesh_timing import MeshTiming
+from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.fleet import (
     DEFAULT_GRIDSIZE,
     DEFAULT_ROUTERS,

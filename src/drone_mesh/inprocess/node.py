@@ -9,7 +9,7 @@ from typing import Callable
 
 from drone_mesh.communication.interfaces import IGatewayCommands, IInternetConnection, IMeshNetwork
 from drone_mesh.communication.node.component import MeshnetworkComponent
-from drone_mesh.communication.timing.deadlines import Deadlines
+from drone_mesh.communication.timing import Deadlines
 from drone_mesh.drone.location import Location
 from drone_mesh.inprocess.drone import InProcessDrone
 from drone_mesh.inprocess.interfaces import IInProcessAir

@@ -10,7 +10,7 @@ from drone_mesh.channel.packet_queue import ALL_NODES, OutgoingPacket
 from drone_mesh.channel.statistics import ChannelMeter, RadioStatistics
 from drone_mesh.channel.trains import place_in_train
 from drone_mesh.communication.interfaces import MAX_NODE_ID, IMeshDebugInfo, IMeshNetwork
-from drone_mesh.communication.timing.medium import ChannelUse, Medium
+from drone_mesh.communication.timing import ChannelUse, Medium
 from drone_mesh.communication.wire.messages import (
     is_answered,
     is_jittered,

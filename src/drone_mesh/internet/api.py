@@ -14,9 +14,14 @@ from pydantic import BaseModel, BeforeValidator, Discriminator, Field, Tag
 from starlette.exceptions import HTTPException
 from typing_extensions import Annotated
 
-from drone_mesh.communication.interfaces import MAX_NODE_ID, NO_ROUTE, IGatewayCommands, KnownNode
-from drone_mesh.communication.order_record import OrderRecord
-from drone_mesh.communication.timing.throttle import Throttle
+from drone_mesh.communication.interfaces import (
+    MAX_NODE_ID,
+    NO_ROUTE,
+    IGatewayCommands,
+    KnownNode,
+    OrderRecord,
+)
+from drone_mesh.communication.timing import Throttle
 from drone_mesh.drone.geodesy import EarthPlace, Origin
 from drone_mesh.drone.goal import MAX_COORDINATE_M, MAX_HEIGHT_M
 from drone_mesh.drone.location import Location

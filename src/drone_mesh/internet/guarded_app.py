@@ -19,7 +19,7 @@ from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp
 from typing_extensions import Annotated
 
-from drone_mesh.communication.timing.throttle import Throttle
+from drone_mesh.communication.timing import Throttle
 from drone_mesh.errors import GoalRefused, PlaceTaken
 from drone_mesh.internet.asking import AnswerLate, NotCarriedOut
 from drone_mesh.internet.http_settings import HttpSettings

@@ -11,8 +11,7 @@ from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 from typing_extensions import Annotated
 
-from drone_mesh.communication.interfaces import IGatewayCommands
-from drone_mesh.communication.order_record import OrderRecord, OrderState
+from drone_mesh.communication.interfaces import IGatewayCommands, OrderRecord, OrderState
 from drone_mesh.communication.orders.book import HIGHEST_NUMBER
 from drone_mesh.internet.asking import GatewayDesk
 from drone_mesh.internet.guarded_app import UNDONE, Refusal

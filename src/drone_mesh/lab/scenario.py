@@ -9,9 +9,9 @@ from typing_extensions import Annotated, Literal
 from drone_mesh.air.box import CUT_DB
 from drone_mesh.air.obstacle_file import BoxRow
 from drone_mesh.air.obstacles import Obstacles
-from drone_mesh.communication.node.named_techniques import DEFAULT_ROUTING
+from drone_mesh.communication.node.node_configuration import DEFAULT_ROUTING
 from drone_mesh.communication.repair.options import DEFAULT_REPAIR, RANGE_M, RepairOptions
-from drone_mesh.communication.timing.mesh_timing import MeshTiming
+from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.fleet import MAX_DRONES
 from drone_mesh.drone.flight_path import SPEED_M_S
 from drone_mesh.drone.goal import MAX_HEIGHT_M

@@ -6,7 +6,7 @@ from typing import Any
 
 from drone_mesh.communication.repair.options import RepairOptions
 from drone_mesh.communication.seals.keys import Keys, MeshKey
-from drone_mesh.communication.timing.mesh_timing import MeshTiming
+from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.positions import PositionErrors
 from drone_mesh.lab.impairments import OneWay

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from drone_mesh.channel.access_rules import AccessRules
 from drone_mesh.communication.interfaces import BROADCAST, MAX_NODE_ID, PAYLOAD_BYTES
-from drone_mesh.communication.timing.medium import Medium
+from drone_mesh.communication.timing import Medium
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.nrf24.airtime import NS_PER_S, SETTLING_NS, frame_bits
 from drone_mesh.nrf24.registers import (

@@ -8,7 +8,7 @@ from typing import Any
 
 from drone_mesh.communication.interfaces import NO_ROUTE, KnownNode
 from drone_mesh.communication.node.gateway import MeshnetworkGateway
-from drone_mesh.communication.reports.node_reports import ReportedNode
+from drone_mesh.communication.reports import ReportedNode
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location

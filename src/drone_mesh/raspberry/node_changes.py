@@ -8,7 +8,7 @@ from typing import Sequence
 
 from drone_mesh.communication.events.observer import MeshEvent, MeshEventKind, MeshObserver
 from drone_mesh.communication.interfaces import NO_ROUTE, KnownNode
-from drone_mesh.communication.reports.node_reports import ReportedNode
+from drone_mesh.communication.reports import ReportedNode
 
 LOST_AFTER_CHECKS = 3  # a route that is missing for a moment is not an event
 

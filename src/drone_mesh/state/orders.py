@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any, Iterable
 
 from drone_mesh.communication.events.observer import MeshEventKind, explanation
-from drone_mesh.communication.order_record import OrderState
+from drone_mesh.communication.interfaces import OrderState
 from drone_mesh.communication.orders.book import EVENT_OF
 from drone_mesh.communication.orders.intake import ARRIVED_WITHIN_M
 from drone_mesh.drone.flight_path import CLIMB_ENDS_AT, SPEED_M_S

@@ -12,7 +12,7 @@ from drone_mesh.channel.antenna import PacketAntenna
 from drone_mesh.channel.medium_access import MediumAccess
 from drone_mesh.channel.radio import Try
 from drone_mesh.channel.statistics import RadioStatistics
-from drone_mesh.communication.timing.medium import Medium
+from drone_mesh.communication.timing import Medium
 from drone_mesh.inprocess.clock import TaskClock
 from drone_mesh.inprocess.interfaces import IInProcessAir, IInProcessAntenna
 

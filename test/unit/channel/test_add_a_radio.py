@@ -9,8 +9,7 @@ import pytest
 from slow_radio import HOP_S, SlowAir
 
 from drone_mesh.communication.events.observer import MeshEventKind
-from drone_mesh.communication.timing.medium import UNDISTURBED, Medium
-from drone_mesh.communication.timing.mesh_timing import MeshTiming
+from drone_mesh.communication.timing import UNDISTURBED, Medium, MeshTiming
 from drone_mesh.inprocess import Network
 from drone_mesh.nrf24.settings import DataRate, RadioSettings
 

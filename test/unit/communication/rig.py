@@ -11,7 +11,7 @@ from drone_mesh.communication.interfaces import IInternetConnection, IWirelessCo
 from drone_mesh.communication.node.gateway import MeshnetworkGateway
 from drone_mesh.communication.node.router import MeshnetworkRouter
 from drone_mesh.communication.routing.child_table_tree import ChildTableTree
-from drone_mesh.communication.timing.medium import UNDISTURBED
+from drone_mesh.communication.timing import UNDISTURBED
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location

@@ -17,7 +17,7 @@ from drone_mesh.communication.beacon.packets import (
 from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE
 from drone_mesh.communication.seals.keys import MeshKey
-from drone_mesh.communication.timing.deadlines import Due
+from drone_mesh.communication.timing import Due
 from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.drone.location import Location

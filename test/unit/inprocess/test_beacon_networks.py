@@ -12,7 +12,7 @@ from drone_mesh.communication.beacon.packets import Beacon
 from drone_mesh.communication.data.ticket import TicketState
 from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.communication.seals.keys import MeshKey
-from drone_mesh.communication.timing.mesh_timing import MeshTiming
+from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.drone.location import Location
 from drone_mesh.inprocess import Network

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from drone_mesh.communication.node.named_techniques import ROUTING_TECHNIQUES
+from drone_mesh.communication.node.node_configuration import ROUTING_TECHNIQUES
 from drone_mesh.communication.seals.keys import MeshKey
 from drone_mesh.inprocess import Network
 

@@ -9,7 +9,7 @@ import random
 import pytest
 import scenarios
 
-from drone_mesh.communication.node.named_techniques import ROUTING_TECHNIQUES
+from drone_mesh.communication.node.node_configuration import ROUTING_TECHNIQUES
 from drone_mesh.communication.seals.keys import MeshKey
 from drone_mesh.communication.wire.messages import is_data
 from drone_mesh.inprocess import Network

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 from scenarios import events, fleet, flown, run_until
 
-from drone_mesh.communication.order_record import OrderState
+from drone_mesh.communication.interfaces import OrderState
 from drone_mesh.communication.seals.keys import MeshKey
-from drone_mesh.communication.timing.mesh_timing import MeshTiming
+from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.inprocess import Network
 
 CHECK_PERIOD_S = 10.0

@@ -7,8 +7,8 @@ import logging
 import pytest
 from scenarios import line
 
-from drone_mesh.communication.neighbours.common_frame import CommonFrame
-from drone_mesh.communication.order_record import OrderState
+from drone_mesh.communication.control.places import CommonFrame
+from drone_mesh.communication.interfaces import OrderState
 from drone_mesh.communication.wire.messages import IntroduceMessage, frame_digest, with_frame_digest
 from drone_mesh.communication.wire.packet_types import TYPES_WITH_PLACES
 from drone_mesh.inprocess.drone import InProcessDrone

@@ -6,9 +6,9 @@ import pytest
 
 from drone_mesh.air.box import Box
 from drone_mesh.air.obstacles import Obstacles
-from drone_mesh.communication.order_record import OrderState
+from drone_mesh.communication.interfaces import OrderState
 from drone_mesh.communication.seals.keys import KEY_BYTES, MeshKey
-from drone_mesh.communication.timing.mesh_timing import MeshTiming
+from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.inprocess import Network
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from drone_mesh.communication.data.ticket import TicketState
 from drone_mesh.communication.events.observer import MeshEventKind
-from drone_mesh.communication.node.named_techniques import ROUTING_TECHNIQUES
+from drone_mesh.communication.node.node_configuration import ROUTING_TECHNIQUES
 from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.inprocess import Network
 from drone_mesh.nrf24.emulator.links import IdealDisc, ScriptedLoss

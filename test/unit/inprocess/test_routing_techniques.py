@@ -7,7 +7,7 @@ import random
 import pytest
 import scenarios
 
-from drone_mesh.communication.node.named_techniques import ROUTING_TECHNIQUES
+from drone_mesh.communication.node.node_configuration import ROUTING_TECHNIQUES
 from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.bounds import SHORTEST_PATH
 

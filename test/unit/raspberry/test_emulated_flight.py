@@ -17,7 +17,7 @@ from mavlink_vehicle.modes import Mode
 from mavlink_vehicle.vehicle import MavlinkVehicle
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from drone_mesh.communication.timing.mesh_timing import MeshTiming
+from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location

@@ -7,7 +7,7 @@ import json
 import pytest
 
 from drone_mesh.communication.events.observer import MeshEvent, MeshEventKind
-from drone_mesh.communication.timing.mesh_timing import MeshTiming
+from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.console.real_mesh import events_of, real_mesh
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.location import Location

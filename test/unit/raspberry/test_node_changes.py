@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from drone_mesh.communication.timing.mesh_timing import MeshTiming
+from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.inprocess import Network
 from drone_mesh.raspberry.node_changes import NodeChanges
 

@@ -10,7 +10,7 @@ from drone_mesh.communication.node.node_configuration import NodeConfiguration
 from drone_mesh.communication.repair.options import LostPlace, RepairOptions
 from drone_mesh.communication.seals.key_file import write_key_file
 from drone_mesh.communication.seals.keys import MeshKey
-from drone_mesh.communication.timing.mesh_timing import MeshTiming
+from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone import Location
 from drone_mesh.drone.engines import FlightOptions
 from drone_mesh.drone.geodesy import Origin

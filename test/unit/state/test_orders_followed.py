@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 
-from drone_mesh.communication.order_record import OrderState
+from drone_mesh.communication.interfaces import OrderState
 from drone_mesh.drone.flight_path import FlightPath
 from drone_mesh.drone.location import Location
 from drone_mesh.state.model import EventRecord, NodeStatus

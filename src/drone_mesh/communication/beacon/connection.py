@@ -8,10 +8,10 @@ from drone_mesh.communication.beacon.own_motion import OwnMotion
 from drone_mesh.communication.beacon.packets import newer
 from drone_mesh.communication.beacon.routes import PROVEN_S, BeaconRoutes
 from drone_mesh.communication.control.control_plane import IControlHost
+from drone_mesh.communication.control.places import KnownPlaces
 from drone_mesh.communication.control.router_states import RepairState, RouterEvent, RouterStates
 from drone_mesh.communication.events.observer import MeshEventKind, Reporter, in_hops
 from drone_mesh.communication.interfaces import NO_ROUTE, IWirelessCommunication
-from drone_mesh.communication.neighbours.known_places import KnownPlaces
 
 CHECK_S = 1.0  # how often a router without a gateway considers its repair
 

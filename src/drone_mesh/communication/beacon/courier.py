@@ -12,7 +12,7 @@ from typing import Callable, Hashable
 
 from drone_mesh.communication.control.delivery import IDelivery
 from drone_mesh.communication.interfaces import NO_ROUTE, IWirelessCommunication
-from drone_mesh.communication.timing.deadlines import Deadlines
+from drone_mesh.communication.timing import Deadlines
 from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.messages import ROUTE_RECORD, ROUTE_RECORD_AT
 from drone_mesh.communication.wire.packet_types import MessageType

@@ -5,8 +5,8 @@ from __future__ import annotations
 from drone_mesh.communication.beacon.nodes_below import NodesBelow
 from drone_mesh.communication.beacon.packets import Beacon, Motion
 from drone_mesh.communication.beacon.routes import BeaconRoutes
+from drone_mesh.communication.control.places import CommonFrame
 from drone_mesh.communication.interfaces import NO_ROUTE, IMeshSeals
-from drone_mesh.communication.neighbours.common_frame import CommonFrame
 from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.drone.location import Location

@@ -23,11 +23,11 @@ from drone_mesh.communication.control.control_plane import (
     IControlTechnique,
 )
 from drone_mesh.communication.control.node_part import due, receives
-from drone_mesh.communication.control.place_requests import PlaceRequests
+from drone_mesh.communication.control.places import PlaceRequests
 from drone_mesh.communication.control.router_states import RouterEvent
 from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.communication.interfaces import BROADCAST, MAX_NODE_ID, NO_ROUTE
-from drone_mesh.communication.timing.deadlines import Due
+from drone_mesh.communication.timing import Due
 from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.drone.location import Location

@@ -13,10 +13,9 @@ import random
 from drone_mesh.communication.beacon.courier import Courier
 from drone_mesh.communication.beacon.routes import BeaconRoutes
 from drone_mesh.communication.beacon.trickle import JITTER
-from drone_mesh.communication.control.place_requests import PlaceRequests
+from drone_mesh.communication.control.places import KnownPlaces, PlaceRequests
 from drone_mesh.communication.events.complaints import Complaints
 from drone_mesh.communication.interfaces import NO_ROUTE, IMeshSeals
-from drone_mesh.communication.neighbours.known_places import KnownPlaces
 from drone_mesh.communication.wire import messages
 
 ASKS_S = 10.0  # at most so often for the place of a gateway that moves

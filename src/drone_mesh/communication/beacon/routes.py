@@ -21,8 +21,8 @@ from drone_mesh.communication.beacon.packets import (
 )
 from drone_mesh.communication.control.delivery import IRoutes
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.neighbours.neighbour_table import HeardPlace
-from drone_mesh.communication.timing.deadlines import Deadlines
+from drone_mesh.communication.neighbours import HeardPlace
+from drone_mesh.communication.timing import Deadlines
 from drone_mesh.drone.location import Location
 
 _WAY_UP = itemgetter(

@@ -6,7 +6,7 @@ import math
 import random
 
 from drone_mesh.communication.beacon.packets import INTERVAL_S
-from drone_mesh.communication.timing.medium import Medium
+from drone_mesh.communication.timing import Medium
 
 HOPS_PER_BEACON = 400  # a beacon takes half a hop, and ten neighbours send as many
 LEAST_S = 0.5  # of an interval

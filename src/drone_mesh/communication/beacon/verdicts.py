@@ -10,7 +10,7 @@ from drone_mesh.communication.beacon.courier import DROP, HOLD, Transit
 from drone_mesh.communication.beacon.routes import BeaconRoutes, Way
 from drone_mesh.communication.beacon.search import HOPS_AROUND, MOST_HOPS, Searches
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.timing.deadlines import Deadlines, Due
+from drone_mesh.communication.timing import Deadlines, Due
 from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.packet_types import MessageType
 

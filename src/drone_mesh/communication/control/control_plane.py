@@ -16,18 +16,15 @@ import random
 from dataclasses import dataclass
 from typing import Callable, Sequence
 
-from drone_mesh.communication.control.claims import Claims
 from drone_mesh.communication.control.delivery import IDelivery, IRoutes, ITechnique
 from drone_mesh.communication.control.pilot import Pilot
+from drone_mesh.communication.control.places import Claims, CommonFrame, KnownPlaces
 from drone_mesh.communication.control.router_states import RouterEvent, RouterStates
 from drone_mesh.communication.events.complaints import Complaints
 from drone_mesh.communication.events.observer import Reporter
 from drone_mesh.communication.interfaces import IMeshSeals, IWirelessCommunication
-from drone_mesh.communication.neighbours.common_frame import CommonFrame
-from drone_mesh.communication.neighbours.known_places import KnownPlaces
-from drone_mesh.communication.neighbours.neighbour_table import Neighbours
-from drone_mesh.communication.timing.deadlines import Deadlines
-from drone_mesh.communication.timing.mesh_timing import MeshTiming
+from drone_mesh.communication.neighbours import Neighbours
+from drone_mesh.communication.timing import Deadlines, MeshTiming
 
 Learn = Callable[[int, int, int, bytes], bool]
 Forward = Callable[[bytes, int, int, int, int, float], None]

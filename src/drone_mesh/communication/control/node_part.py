@@ -10,7 +10,7 @@ from __future__ import annotations
 from types import FunctionType, MethodType
 from typing import Any, Callable, Sequence, TypeVar
 
-from drone_mesh.communication.timing.deadlines import Due
+from drone_mesh.communication.timing import Due
 
 Receiver = Callable[[bytes, int, int], None]
 """Handles a packet, given with its creator and the sender of this hop."""

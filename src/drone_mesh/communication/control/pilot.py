@@ -5,8 +5,12 @@ from __future__ import annotations
 import math
 
 from drone_mesh.communication.events.complaints import Complaints
-from drone_mesh.communication.timing.deadlines import Deadlines, Due
-from drone_mesh.communication.timing.mesh_timing import FLIGHT_POSITION_PERIOD_S, LANDED_WITHIN_M
+from drone_mesh.communication.timing import (
+    FLIGHT_POSITION_PERIOD_S,
+    LANDED_WITHIN_M,
+    Deadlines,
+    Due,
+)
 from drone_mesh.drone.flight_path import SPEED_M_S
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location

@@ -14,7 +14,7 @@ import math
 from typing import Callable, Iterable
 
 from drone_mesh.communication.data.inbox import Inbox
-from drone_mesh.communication.timing.medium import FAST_HOP_S, Medium
+from drone_mesh.communication.timing import FAST_HOP_S, Medium
 
 # At 250 kbit/s and per check period of patience: up to 1 s, a first timeout (RFC 6298).
 TURN_S = 0.4

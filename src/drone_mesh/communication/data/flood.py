@@ -9,7 +9,7 @@ from typing import NamedTuple
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.ticket import TO_ALL
 from drone_mesh.communication.interfaces import IWirelessCommunication
-from drone_mesh.communication.timing.deadlines import Deadlines
+from drone_mesh.communication.timing import Deadlines
 from drone_mesh.communication.wire import messages
 
 REMEMBERED_S = 5.0  # longer than a fragment takes through the mesh

@@ -10,7 +10,7 @@ from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.ordering import PortOrder
 from drone_mesh.communication.data.packets import COMPLETE, Ack, Poll
 from drone_mesh.communication.data.reassembly import Open, Reassembly, Whole
-from drone_mesh.communication.timing.medium import Medium
+from drone_mesh.communication.timing import Medium
 
 ACK_DELAY_S = 0.02  # complete messages are acknowledged after a pause of this time
 ACK_LATEST_S = 0.2  # or after this time without a pause

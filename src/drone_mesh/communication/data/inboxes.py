@@ -19,7 +19,7 @@ from drone_mesh.communication.interfaces import (
     IMeshSeals,
     IWirelessCommunication,
 )
-from drone_mesh.communication.timing.deadlines import Deadlines
+from drone_mesh.communication.timing import Deadlines
 
 TIDY_PERIOD_S = 5.0  # how often old fragments are dropped
 MOST_INBOXES = 2 * MAX_NODE_ID  # every other node, with its messages to this one and to all

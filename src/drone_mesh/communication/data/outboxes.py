@@ -25,7 +25,7 @@ from drone_mesh.communication.data.ticket import (
     destination_in_words,
 )
 from drone_mesh.communication.interfaces import NO_ROUTE, IMeshSeals, IWirelessCommunication
-from drone_mesh.communication.timing.deadlines import Deadlines
+from drone_mesh.communication.timing import Deadlines
 
 BURST = 8  # packets sent before others get their turn
 FOUND_WITHIN_S = 0.5  # a gateway's search passes through 100 nodes

@@ -23,7 +23,7 @@ from drone_mesh.communication.data.reassembly import Whole
 from drone_mesh.communication.data.ticket import TO_ALL, TO_GATEWAY, Ticket, TicketState
 from drone_mesh.communication.events.complaints import Complaints
 from drone_mesh.communication.interfaces import MAX_NODE_ID, IMeshSeals, IWirelessCommunication
-from drone_mesh.communication.timing.deadlines import Deadlines, Due
+from drone_mesh.communication.timing import Deadlines, Due
 from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.packet_types import DATA_TYPES
 from drone_mesh.errors import MessageRefused, PacketError, QueueFull

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 
-from drone_mesh.communication.timing.throttle import Throttle
+from drone_mesh.communication.timing import Throttle
 
 COMPLAINT_PERIOD_S = 30.0  # one line per reason and node in this time
 FOREIGN_FOR_S = 60.0  # a neighbour sends several packets in this time

@@ -6,7 +6,7 @@ import enum
 from typing import Callable, NamedTuple
 
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.timing.deadlines import Deadlines
+from drone_mesh.communication.timing import Deadlines
 from drone_mesh.drone.location import Location
 
 

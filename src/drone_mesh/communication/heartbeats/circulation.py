@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Hashable, Tuple
 
-from drone_mesh.communication.timing.mesh_timing import CIRCULATION_S
+from drone_mesh.communication.timing import CIRCULATION_S
 
 LEAST_LOOP = 3  # links: no node sends a packet straight back to where it came from
 

@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from drone_mesh.communication.control.place_requests import PlaceRequests
+from drone_mesh.communication.control.places import KnownPlaces, PlaceRequests
 from drone_mesh.communication.control.router_states import (
     ConnectionState,
     RouterEvent,
@@ -17,16 +17,13 @@ from drone_mesh.communication.control.router_states import (
 )
 from drone_mesh.communication.events.observer import MeshEventKind, Reporter, in_hops
 from drone_mesh.communication.heartbeats.delivery import Delivery
-from drone_mesh.communication.heartbeats.detours import AVOIDED_S, Detours
+from drone_mesh.communication.heartbeats.detours import AVOIDED_S, Detours, RelayCheck
 from drone_mesh.communication.heartbeats.introduction import Introduction
 from drone_mesh.communication.heartbeats.own_heartbeats import OwnHeartbeats
-from drone_mesh.communication.heartbeats.relay_check import RelayCheck
 from drone_mesh.communication.interfaces import MAX_NODE_ID, NO_ROUTE
-from drone_mesh.communication.neighbours.known_places import KnownPlaces
-from drone_mesh.communication.neighbours.neighbour_table import Neighbours
+from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.routing.interfaces import IRoutingTechnique
-from drone_mesh.communication.timing.deadlines import Deadlines, Due
-from drone_mesh.communication.timing.medium import Medium
+from drone_mesh.communication.timing import Deadlines, Due, Medium
 
 _HOPS_UNTIL_KNOWN = 10  # the number of hops for which to wait for the first answer
 RESIGNED_PERIODS = 2.5  # a gateway without internet that is silent for longer is lost

@@ -21,10 +21,9 @@ from drone_mesh.communication.interfaces import (
     IMeshSeals,
     IWirelessCommunication,
 )
-from drone_mesh.communication.neighbours.neighbour_table import Neighbours
+from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.routing.interfaces import IRoutingTechnique
-from drone_mesh.communication.timing.deadlines import Deadlines
-from drone_mesh.communication.timing.limits import REPEATS, RateLimit, Strangers
+from drone_mesh.communication.timing import REPEATS, Deadlines, RateLimit, Strangers
 from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.messages import CREATOR_AT, FORWARD_AT, TO_AT
 

@@ -1,11 +1,20 @@
-"""Detours: which neighbours a router avoids on its way to the gateway, and for how long."""
+"""Which neighbours a router avoids on its way to the gateway: silent ones, and those that swallow.
+
+docs/security.md, "A relay that swallows". A captured relay can forward heartbeats, so that the
+nodes behind it stay connected, and drop all other packets. With a key, only the gateway itself can
+answer a request for its place. If it answers heartbeats but repeatedly does not answer this
+request, a node on the route swallows packets.
+"""
 
 from __future__ import annotations
 
+import logging
 import math
 
+from drone_mesh.communication.control.places import PlaceRequests
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.neighbours.neighbour_table import Neighbours
+from drone_mesh.communication.neighbours import Neighbours
+from drone_mesh.communication.timing import Deadlines
 
 AVOIDED_S = 60.0  # for a neighbour through which no answer came
 SWALLOWER_AVOIDED_S = 600.0  # for a neighbour that seems to swallow packets
@@ -47,3 +56,125 @@ class Detours:
         hops_of = self._neighbours.hops_of
         nodes = [node for node in self._neighbours.ids() if not self.avoids(node, now_s)]
         return [(hops_of(node), node) for node in nodes if node != but and hops_of(node) < NO_ROUTE]
+
+
+ASK_PERIODS = 3.0  # in check periods: one packet and its answer in half a minute
+WAIT_PERIODS = 0.9  # in check periods: a question that is younger may be answered yet
+LEAST_UNANSWERED = 2  # for a next hop chosen because another one swallowed packets
+
+_log = logging.getLogger(__name__)
+
+
+class Swallowing:
+    """Counts unanswered questions to one gateway."""
+
+    def __init__(self, check_period_s: float) -> None:
+        self._ask_period_s = ASK_PERIODS * check_period_s
+        self._wait_s = WAIT_PERIODS * check_period_s
+        self._answers = False  # whether this gateway knows its place and answers at all
+        self._unanswered = 0
+        self._asked_s = -math.inf
+
+    def must_ask(self, now_s: float) -> bool:
+        """Whether to ask the gateway in this check: sooner after a question without answer.
+
+        Checks follow each other faster while the surroundings change.
+        """
+        wait_s = self._wait_s if self._unanswered else self._ask_period_s
+        return now_s - self._asked_s >= wait_s
+
+    def wants_heartbeat(self, hops: int) -> bool:
+        """Whether to show the gateway the way back before the next question.
+
+        It may have answered the latest one along a way that no longer leads here.
+        """
+        return self._unanswered > 0 and not self.noticed(hops)
+
+    def is_over(self, now_s: float, heartbeat_s: float) -> bool:
+        """Whether the time for an answer is over and the gateway has answered a heartbeat since."""
+        return now_s - self._asked_s >= self._wait_s and heartbeat_s >= self._asked_s
+
+    def asked(self, now_s: float) -> None:
+        """The gateway was asked for its place."""
+        self._asked_s = now_s
+        self._unanswered += 1
+
+    def answered(self) -> None:
+        """The gateway answered a request for its place."""
+        self._answers = True
+        self._unanswered = 0
+
+    def noticed(self, hops: int) -> bool:
+        """Whether packets are swallowed on the route, which is `hops` long.
+
+        Nodes with fewer hops come to this conclusion sooner. So the node next to the relay is the
+        first to change its next hop, and the nodes behind it need not change theirs.
+        """
+        return self._answers and self._unanswered >= max(LEAST_UNANSWERED, hops)
+
+    def another_next_hop(self, hops: int) -> None:
+        """The next hop has changed: suspect it after fewer unanswered requests than usual."""
+        self._unanswered = max(0, hops - LEAST_UNANSWERED)
+
+    def give_up(self) -> None:
+        """Stop suspecting: there is another gateway, or it is silent through every next hop."""
+        self._answers = False
+        self._unanswered = 0
+
+
+class RelayCheck:
+    """The checks of one router. If packets are swallowed, it finds a detour for heartbeats."""
+
+    def __init__(
+        self,
+        node_id: int,
+        is_needed: bool,
+        check_period_s: float,
+        deadlines: Deadlines,
+        requests: PlaceRequests,
+        detours: Detours,
+    ) -> None:
+        """`is_needed`: the mesh has a key, and its technique takes shortcuts."""
+        self._node_id = node_id
+        self._is_needed = is_needed
+        self._deadlines = deadlines
+        self._requests = requests
+        self._detours = detours
+        self.swallowing = Swallowing(check_period_s)
+        self._detour = NO_ROUTE
+
+    def run(self, gateway: int, next_hop: int, hops: int, heartbeat_s: float) -> bool:
+        """Check the route to `gateway`; returns whether the gateway was asked for its place.
+
+        `heartbeat_s`: when it last answered a heartbeat. If it answers only those, later ones go
+        through another neighbour.
+        """
+        now_s = self._deadlines.now_s
+        if not self._is_needed or next_hop in (gateway, NO_ROUTE):
+            return False
+        if self.swallowing.noticed(hops) and self.swallowing.is_over(now_s, heartbeat_s):
+            self._detours.avoid(next_hop, now_s + SWALLOWER_AVOIDED_S)
+            _log.warning(
+                "node %d: node %d carries heartbeats to gateway %d, but no other packets",
+                self._node_id,
+                next_hop,
+                gateway,
+            )
+        if self._detours.avoids(next_hop, now_s):  # just now, or the route has returned to it
+            self._detour = self._detours.nearest(next_hop, hops, now_s)
+            if self._detour == NO_ROUTE:
+                self.swallowing.give_up()
+                self._detours.avoid_none()
+            else:
+                self.swallowing.another_next_hop(hops)
+            return False
+        if not self.swallowing.must_ask(now_s):
+            return False
+        self.swallowing.asked(now_s)
+        self._requests.ask(gateway)
+        return True
+
+    def take_detour(self) -> int:
+        """The neighbour to send the next heartbeat through, for one heartbeat; NO_ROUTE: none."""
+        detour, self._detour = self._detour, NO_ROUTE
+        return detour

@@ -10,9 +10,7 @@ from drone_mesh.communication.heartbeats.circulation import CirculationGuard, ca
 from drone_mesh.communication.heartbeats.delivery import Delivery
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.routing.interfaces import IRoutingTechnique
-from drone_mesh.communication.timing.limits import RateLimit
-from drone_mesh.communication.timing.medium import Medium
-from drone_mesh.communication.timing.mesh_timing import CIRCULATION_S
+from drone_mesh.communication.timing import CIRCULATION_S, Medium, RateLimit
 from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.packet_types import MessageType
 

@@ -7,10 +7,10 @@ import random
 from typing import Protocol
 
 from drone_mesh.communication.control.node_part import due
+from drone_mesh.communication.control.places import CommonFrame
 from drone_mesh.communication.interfaces import IMeshSeals, IWirelessCommunication
-from drone_mesh.communication.neighbours.common_frame import CommonFrame
 from drone_mesh.communication.routing.interfaces import IRoutingTechnique
-from drone_mesh.communication.timing.deadlines import Deadlines, Due
+from drone_mesh.communication.timing import Deadlines, Due
 from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.packet_types import MessageType
 

@@ -16,7 +16,7 @@ from drone_mesh.communication.control.control_plane import NUMBERS_PER_S, SEARCH
 from drone_mesh.communication.control.node_part import receives
 from drone_mesh.communication.events.complaints import Complaints
 from drone_mesh.communication.interfaces import BROADCAST, IWirelessCommunication
-from drone_mesh.communication.timing.deadlines import Deadlines
+from drone_mesh.communication.timing import Deadlines
 from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.packet_types import MessageType
 

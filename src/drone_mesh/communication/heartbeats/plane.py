@@ -15,8 +15,7 @@ from drone_mesh.communication.heartbeats.own_heartbeats import OwnHeartbeats
 from drone_mesh.communication.heartbeats.queued_delivery import QueuedDelivery
 from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE
 from drone_mesh.communication.routing.interfaces import IRoutingEssentials, IRoutingTechnique
-from drone_mesh.communication.timing.deadlines import Due
-from drone_mesh.communication.timing.medium import Medium
+from drone_mesh.communication.timing import Due, Medium
 from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.packet_types import ABOUT, Handler, MessageType
 from drone_mesh.drone.location import Location

@@ -6,7 +6,7 @@ from typing import Sequence
 
 from drone_mesh.communication.control.control_plane import ControlledNode
 from drone_mesh.communication.control.node_part import due, receives
-from drone_mesh.communication.control.place_requests import PlaceRequests
+from drone_mesh.communication.control.places import PlaceRequests
 from drone_mesh.communication.control.router_states import (
     ConnectionState,
     RepairState,
@@ -17,7 +17,7 @@ from drone_mesh.communication.heartbeats.connection import GatewayConnection
 from drone_mesh.communication.heartbeats.plane import HeartbeatPlane
 from drone_mesh.communication.interfaces import MAX_NODE_ID, NO_ROUTE
 from drone_mesh.communication.routing.interfaces import IRoutingTechnique
-from drone_mesh.communication.timing.deadlines import Due
+from drone_mesh.communication.timing import Due
 from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.packet_types import MessageType
 

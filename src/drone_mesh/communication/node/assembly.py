@@ -14,8 +14,10 @@ from drone_mesh.communication.interfaces import (
 )
 from drone_mesh.communication.node.component import MeshnetworkComponent, NodeSettings
 from drone_mesh.communication.node.gateway import MeshnetworkGateway
-from drone_mesh.communication.node.named_techniques import create_routing_technique
-from drone_mesh.communication.node.node_configuration import NodeConfiguration
+from drone_mesh.communication.node.node_configuration import (
+    NodeConfiguration,
+    create_routing_technique,
+)
 from drone_mesh.communication.node.router import MeshnetworkRouter
 from drone_mesh.communication.repair.named_strategies import create_repair_strategy
 from drone_mesh.communication.seals.keys import Keys

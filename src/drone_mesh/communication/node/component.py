@@ -12,7 +12,6 @@ import random
 import struct
 from typing import TypedDict
 
-from drone_mesh.communication.control.claims import Claims
 from drone_mesh.communication.control.control_plane import (
     ControlledNode,
     IControlHost,
@@ -22,6 +21,7 @@ from drone_mesh.communication.control.control_plane import (
 from drone_mesh.communication.control.delivery import ITechnique
 from drone_mesh.communication.control.node_part import due, receivers, receives, timers
 from drone_mesh.communication.control.pilot import Pilot
+from drone_mesh.communication.control.places import Claims, CommonFrame, KnownPlaces
 from drone_mesh.communication.control.router_states import RouterStates
 from drone_mesh.communication.data.transport import Transport
 from drone_mesh.communication.events.complaints import Complaints
@@ -42,20 +42,16 @@ from drone_mesh.communication.interfaces import (
     IMeshSeals,
     IWirelessCommunication,
 )
-from drone_mesh.communication.neighbours.common_frame import CommonFrame
-from drone_mesh.communication.neighbours.known_places import KnownPlaces
-from drone_mesh.communication.neighbours.neighbour_table import Neighbours
-from drone_mesh.communication.neighbours.seen_motion import SeenMotion
+from drone_mesh.communication.neighbours import Neighbours, SeenMotion
 from drone_mesh.communication.node.flights import Flights
 from drone_mesh.communication.node.own_id import OwnId
 from drone_mesh.communication.node.snapshots import NodeSnapshots
 from drone_mesh.communication.node.whereabouts import Whereabouts
 from drone_mesh.communication.orders.intake import OrderIntake
 from drone_mesh.communication.repair.options import RepairOptions
-from drone_mesh.communication.reports.node_reports import NodeReporter
+from drone_mesh.communication.reports import NodeReporter
 from drone_mesh.communication.routing.interfaces import IRoutingTechnique
-from drone_mesh.communication.timing.deadlines import Deadlines, Due
-from drone_mesh.communication.timing.mesh_timing import MeshTiming
+from drone_mesh.communication.timing import Deadlines, Due, MeshTiming
 from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.packet_types import (
     ABOUT,

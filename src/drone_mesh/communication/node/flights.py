@@ -11,10 +11,10 @@ from drone_mesh.communication.control.pilot import Pilot
 from drone_mesh.communication.control.router_states import RepairState, RouterStates
 from drone_mesh.communication.events.observer import MeshEventKind, Reporter
 from drone_mesh.communication.interfaces import IWirelessCommunication
-from drone_mesh.communication.neighbours.neighbour_table import Neighbours
+from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.orders.intake import OrderIntake
 from drone_mesh.communication.repair.connection_repair import ConnectionRepair
-from drone_mesh.communication.timing.deadlines import Deadlines, Due
+from drone_mesh.communication.timing import Deadlines, Due
 
 GOAL_AGAIN_S = 0.15  # broadcasts are not acknowledged, and it is soon out of reach
 SHORT_FLIGHT = 0.25  # of the range: the discs before and after share 84 % of their area

@@ -15,14 +15,14 @@ from drone_mesh.communication.interfaces import (
     IInternetConnection,
     IWirelessCommunication,
     KnownNode,
+    OrderRecord,
 )
 from drone_mesh.communication.node.component import MeshnetworkComponent, NodeSettings
 from drone_mesh.communication.node.flights import Flights
 from drone_mesh.communication.node.whereabouts import Whereabouts
-from drone_mesh.communication.order_record import OrderRecord
 from drone_mesh.communication.orders.book import OrderBook
 from drone_mesh.communication.orders.final_places import FinalPlaces
-from drone_mesh.communication.reports.node_reports import ReportBook, ReportedNode
+from drone_mesh.communication.reports import ReportBook, ReportedNode
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location

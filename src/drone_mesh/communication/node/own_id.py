@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import random
 
-from drone_mesh.communication.timing.limits import RateLimit
+from drone_mesh.communication.timing import RateLimit
 
 SHARED_FOR_S = 60.0  # for so long after the last packet of the other, both say so
 OFF_S = 30.0  # the antenna of a node that gives way is off for 1 to 2 times this

@@ -9,7 +9,7 @@ import random
 from typing import TYPE_CHECKING
 
 from drone_mesh.communication.control.delivery import ITechnique
-from drone_mesh.communication.control.place_requests import PlaceRequests
+from drone_mesh.communication.control.places import PlaceRequests
 from drone_mesh.communication.control.router_states import RouterStates
 from drone_mesh.communication.interfaces import IWirelessCommunication
 from drone_mesh.communication.node.component import MeshnetworkComponent, NodeSettings

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from drone_mesh.communication.control.control_plane import IControlPlane
+from drone_mesh.communication.control.places import KnownPlaces
 from drone_mesh.communication.interfaces import (
     NO_ROUTE,
     IMeshDebugInfo,
     IWirelessCommunication,
 )
-from drone_mesh.communication.neighbours.known_places import KnownPlaces
-from drone_mesh.communication.neighbours.neighbour_table import Neighbours
+from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.node.own_id import OwnId
 from drone_mesh.communication.repair.status import NOTHING_TO_REPAIR, RepairStatus
-from drone_mesh.communication.timing.deadlines import Deadlines
-from drone_mesh.communication.timing.medium import ChannelUse
+from drone_mesh.communication.timing import ChannelUse, Deadlines
 
 
 class NodeSnapshots(IMeshDebugInfo):

@@ -5,19 +5,18 @@ docs/repair.md, "Places to step back to" and "Places of silent drones".
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
-from drone_mesh.communication.control.claims import Claims
 from drone_mesh.communication.control.control_plane import IControlPlane
 from drone_mesh.communication.control.node_part import receives
 from drone_mesh.communication.control.pilot import Pilot
+from drone_mesh.communication.control.places import Claims, CommonFrame, KnownPlaces
 from drone_mesh.communication.interfaces import BROADCAST
-from drone_mesh.communication.neighbours.common_frame import CommonFrame
-from drone_mesh.communication.neighbours.known_places import KnownPlaces
-from drone_mesh.communication.neighbours.neighbour_table import Neighbours
-from drone_mesh.communication.node.last_place import LastPlace
+from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.repair.connection_repair import ConnectionRepair
-from drone_mesh.communication.timing.deadlines import Deadlines
+from drone_mesh.communication.timing import Deadlines
 from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.messages import GatewayPlace
 from drone_mesh.communication.wire.packet_types import MessageType
@@ -188,3 +187,28 @@ class RouterWhereabouts(Whereabouts):
         if self._claims.may_be_at(gateway.place, gateway=True, says_so=False):
             seen_s = self._deadlines.now_s - gateway.age_s
             self._places.hear_of_gateway(gateway.place, seen_s, self._control.connected)
+
+
+_BODY = MessageType.LAST_PLACE.about.layout
+_OLDEST_AGE_S = 2**16 - 1
+
+
+class LastPlace(NamedTuple):
+    """Where a node was last heard."""
+
+    node: int
+    place: Location
+    age_s: float
+
+    def packet(self, creator: int, to: int) -> bytes:
+        """The 32 bytes, from `creator` for `to`."""
+        latitude, longitude, height = self.place
+        age = max(0, min(_OLDEST_AGE_S, math.ceil(self.age_s)))
+        body = _BODY.pack(age, self.node, latitude, longitude, round(height))
+        return messages.packet(MessageType.LAST_PLACE, creator, creator, to, to, body)
+
+    @classmethod
+    def from_payload(cls, payload: bytes) -> LastPlace:
+        """Decode."""
+        age, node, *place = _BODY.unpack_from(payload, messages.HEADER_BYTES)
+        return cls(node, Location(*place), float(age))

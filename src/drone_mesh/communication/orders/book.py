@@ -17,10 +17,9 @@ from drone_mesh.communication.control.control_plane import (
 from drone_mesh.communication.control.node_part import due, receives
 from drone_mesh.communication.events.complaints import Complaints
 from drone_mesh.communication.events.observer import MeshEventKind, Reporter, explanation
-from drone_mesh.communication.order_record import OrderRecord, OrderState
+from drone_mesh.communication.interfaces import OrderRecord, OrderState
 from drone_mesh.communication.orders.messages import OrderOutcome, OrderQuery, OrderReply
-from drone_mesh.communication.timing.deadlines import Deadlines, Due
-from drone_mesh.communication.timing.medium import Medium
+from drone_mesh.communication.timing import Deadlines, Due, Medium
 from drone_mesh.communication.wire.messages import GoToLocationMessage, with_order_number
 from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.communication.wire.text_parts import TextAssembly

@@ -11,11 +11,10 @@ from typing import Iterable, NamedTuple
 
 from drone_mesh.communication.control.control_plane import IControlPlane
 from drone_mesh.communication.control.pilot import Pilot
-from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.neighbours.neighbour_table import Neighbours
-from drone_mesh.communication.order_record import OrderRecord, OrderState
-from drone_mesh.communication.reports.node_reports import ReportedNode
-from drone_mesh.communication.timing.deadlines import Deadlines
+from drone_mesh.communication.interfaces import NO_ROUTE, OrderRecord, OrderState
+from drone_mesh.communication.neighbours import Neighbours
+from drone_mesh.communication.reports import ReportedNode
+from drone_mesh.communication.timing import Deadlines
 from drone_mesh.drone.goal import ROUNDING_M
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import PlaceTaken

@@ -17,8 +17,7 @@ from drone_mesh.communication.events.complaints import Complaints
 from drone_mesh.communication.events.observer import MeshEventKind, Reporter
 from drone_mesh.communication.orders.book import OrderBook
 from drone_mesh.communication.orders.messages import OrderOutcome, OrderQuery, reply_packets
-from drone_mesh.communication.timing.deadlines import Deadlines, Due
-from drone_mesh.communication.timing.medium import Medium
+from drone_mesh.communication.timing import Deadlines, Due, Medium
 from drone_mesh.communication.wire.messages import GoToLocationMessage, order_number
 from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.drone.goal import check_goal

@@ -10,17 +10,15 @@ from typing import Mapping, NamedTuple
 
 from drone_mesh.communication.control.control_plane import IControlPlane
 from drone_mesh.communication.control.pilot import Pilot
-from drone_mesh.communication.control.place_requests import PlaceRequests
+from drone_mesh.communication.control.places import KnownPlaces, PlaceRequests
 from drone_mesh.communication.control.router_states import RepairState, RouterEvent, RouterStates
 from drone_mesh.communication.events.observer import MeshEventKind, Reporter
 from drone_mesh.communication.interfaces import NO_ROUTE, IWirelessCommunication
-from drone_mesh.communication.neighbours.known_places import KnownPlaces
-from drone_mesh.communication.neighbours.neighbour_table import Neighbours
+from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.repair.heights import may_be_flown_to
 from drone_mesh.communication.repair.options import RepairOptions
 from drone_mesh.communication.repair.spots import NEAR, PITCH
-from drone_mesh.communication.timing.deadlines import Deadlines, Due
-from drone_mesh.communication.timing.mesh_timing import MeshTiming
+from drone_mesh.communication.timing import Deadlines, Due, MeshTiming
 from drone_mesh.communication.wire.messages import (
     GatewayPlace,
     MovementNegotiationMessage,

@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import Callable
 
 from drone_mesh.communication.control.pilot import Pilot
-from drone_mesh.communication.control.place_requests import PlaceRequests
-from drone_mesh.communication.neighbours.neighbour_table import Neighbours
+from drone_mesh.communication.control.places import PlaceRequests
+from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.repair.actions import Step
 from drone_mesh.communication.repair.heights import above_ground, at_whole_metres
 from drone_mesh.communication.repair.options import RepairOptions
 from drone_mesh.communication.repair.spots import Landing
 from drone_mesh.communication.repair.taken_places import TakenPlaces
-from drone_mesh.communication.timing.mesh_timing import LANDED_WITHIN_M
+from drone_mesh.communication.timing import LANDED_WITHIN_M
 from drone_mesh.drone.location import Location
 
 ASK_AGAIN_S = 0.3  # an answer takes some milliseconds

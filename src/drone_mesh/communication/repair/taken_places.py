@@ -8,12 +8,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Sequence
 
-from drone_mesh.communication.neighbours.known_places import KnownPlaces
-from drone_mesh.communication.neighbours.neighbour_table import Neighbours
+from drone_mesh.communication.control.places import KnownPlaces
+from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.repair.heights import above_ground
 from drone_mesh.communication.repair.options import LostPlace, RepairOptions
 from drone_mesh.communication.repair.spots import Landing, free_spot
-from drone_mesh.communication.timing.deadlines import Deadlines
+from drone_mesh.communication.timing import Deadlines
 from drone_mesh.drone.location import Location
 
 ROUNDING_M = 0.09  # a place in a beacon has tenths of a metre, on three axes

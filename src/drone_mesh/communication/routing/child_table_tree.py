@@ -1,4 +1,4 @@
-"""ChildTableTree: each neighbour and the nodes behind it (docs/protocol.md, "ChildTableTree")."""
+"""Trees: each neighbour and the nodes behind it (docs/protocol.md, "ChildTableTree")."""
 
 from __future__ import annotations
 
@@ -150,3 +150,12 @@ class ChildTableTree(IRoutingTechnique):
             self._next_hops[node] = min(holders)
         else:
             self._next_hops.pop(node, None)
+
+
+class SteadyTree(ChildTableTree):
+    """Keeps a known route until it fails; ChildTableTree follows the latest heartbeat."""
+
+    def proven_path_to_node(self, other: int, node: int) -> None:
+        """`node` was just reached through `other`: a new route only if there was none."""
+        if self.get_direction_to_node(node) == NO_ROUTE:
+            self.other_can_communicate_with_node(other, node)

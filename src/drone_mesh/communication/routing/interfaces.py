@@ -11,7 +11,7 @@ from typing import ClassVar, Sequence
 
 from drone_mesh.communication.control.delivery import IRoutes, ITechnique
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.timing.medium import UNDISTURBED, Medium
+from drone_mesh.communication.timing import UNDISTURBED, Medium
 from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.drone.location import Location
 

@@ -22,7 +22,7 @@ from typing import NamedTuple
 from drone_mesh.communication.interfaces import BROADCAST, PAYLOAD_BYTES
 from drone_mesh.communication.seals.keys import Keys
 from drone_mesh.communication.seals.replay import AgedWindow
-from drone_mesh.communication.timing.limits import RateLimit
+from drone_mesh.communication.timing import RateLimit
 from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.messages import FORWARD_AT, FROM_AT, TO_AT
 from drone_mesh.communication.wire.packet_types import MessageType

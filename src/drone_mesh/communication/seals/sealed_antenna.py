@@ -29,8 +29,7 @@ from drone_mesh.communication.seals.end_to_end import (
 from drone_mesh.communication.seals.keys import Keys
 from drone_mesh.communication.seals.message_seal import MessageSeal
 from drone_mesh.communication.seals.seal import SEAL_AT, SEAL_BYTES, HopSeal, NotOpened
-from drone_mesh.communication.timing.medium import ChannelUse, Medium
-from drone_mesh.communication.timing.mesh_timing import MeshTiming
+from drone_mesh.communication.timing import ChannelUse, Medium, MeshTiming
 from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.messages import CREATOR_AT, FORWARD_AT, TO_AT, TYPE_AT
 from drone_mesh.communication.wire.packet_types import MessageType

@@ -5,7 +5,7 @@ docs/wire.md, "Packets".
 Each class encodes and decodes its own bytes. The offsets of the header, and of the bodies that
 every node handles, are defined here alone. A body that belongs to one service is defined beside
 that service, also once: `beacon/packets.py`, `data/packets.py`, `orders/messages.py`,
-`reports/node_report.py` and the routing techniques. The constructor arguments are those of the
+`reports.py` and the routing techniques. The constructor arguments are those of the
 original encoder, in its order: creator, from, to, forward, then the body. Any byte value can be
 encoded and decoded; the receiving component decides whether an id is valid (docs/wire.md, "Bad
 input").

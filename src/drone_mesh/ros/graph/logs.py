@@ -6,7 +6,7 @@ import logging
 import threading
 import time
 
-from drone_mesh.communication.timing.throttle import Throttle
+from drone_mesh.communication.timing import Throttle
 
 COMPLAINT_PERIOD_S = 10.0  # one line per reason in this (wall) time
 

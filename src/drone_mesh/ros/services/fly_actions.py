@@ -12,7 +12,7 @@ from typing import Callable
 import actionlib
 import rospy
 
-from drone_mesh.communication.order_record import OrderState
+from drone_mesh.communication.interfaces import OrderState
 from drone_mesh.drone.location import Location
 from drone_mesh.msg import (
     FlyAction,

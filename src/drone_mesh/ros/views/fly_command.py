@@ -10,8 +10,7 @@ import sys
 import rospy
 
 from drone_mesh.arguments import decimal, whole
-from drone_mesh.communication.interfaces import MAX_NODE_ID
-from drone_mesh.communication.order_record import OrderState
+from drone_mesh.communication.interfaces import MAX_NODE_ID, OrderState
 from drone_mesh.drone.goal import MAX_COORDINATE_M, MAX_HEIGHT_M
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import MeshError

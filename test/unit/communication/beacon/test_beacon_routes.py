@@ -16,7 +16,7 @@ from drone_mesh.communication.beacon.packets import (
     Motion,
 )
 from drone_mesh.communication.beacon.routes import BeaconRoutes
-from drone_mesh.communication.timing.deadlines import Deadlines
+from drone_mesh.communication.timing import Deadlines
 from drone_mesh.drone.location import Location
 
 STILL = (0.0, 0.0, 0.0)

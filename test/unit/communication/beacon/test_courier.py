@@ -6,8 +6,7 @@ import pytest
 from rig import RecordingAntenna, packet
 
 from drone_mesh.communication.beacon.courier import DROP, HOLD, Courier, QueuedCourier
-from drone_mesh.communication.timing.deadlines import Deadlines
-from drone_mesh.communication.timing.medium import Medium
+from drone_mesh.communication.timing import Deadlines, Medium
 
 FROM_5_THROUGH_2 = "05 02 00 01 09 07"
 

@@ -13,7 +13,7 @@ from drone_mesh.communication.beacon.packets import (
     Below,
 )
 from drone_mesh.communication.beacon.routes import BeaconRoutes
-from drone_mesh.communication.timing.deadlines import Deadlines
+from drone_mesh.communication.timing import Deadlines
 
 
 class Node:

@@ -10,7 +10,7 @@ from drone_mesh.communication.beacon.routes import BeaconRoutes
 from drone_mesh.communication.beacon.search import Searches
 from drone_mesh.communication.beacon.verdicts import SUSPECTED_S, Verdicts
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.timing.deadlines import Deadlines
+from drone_mesh.communication.timing import Deadlines
 from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.packet_types import MessageType
 

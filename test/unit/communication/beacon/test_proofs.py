@@ -12,10 +12,9 @@ from drone_mesh.communication.beacon.courier import DROP, Courier
 from drone_mesh.communication.beacon.packets import NO_ANCESTORS, Beacon
 from drone_mesh.communication.beacon.proofs import Proofs
 from drone_mesh.communication.beacon.routes import BeaconRoutes
-from drone_mesh.communication.control.place_requests import PlaceRequests
+from drone_mesh.communication.control.places import KnownPlaces, PlaceRequests
 from drone_mesh.communication.events.complaints import Complaints
-from drone_mesh.communication.neighbours.known_places import KnownPlaces
-from drone_mesh.communication.timing.deadlines import Deadlines
+from drone_mesh.communication.timing import Deadlines
 from drone_mesh.drone.location import Location
 
 TO_GATEWAY = packet("09 09 04 01 00 01 00")

@@ -6,7 +6,7 @@ import pytest
 
 from drone_mesh.communication.beacon.routes import BeaconRoutes
 from drone_mesh.communication.beacon.search import Searches
-from drone_mesh.communication.timing.deadlines import Deadlines
+from drone_mesh.communication.timing import Deadlines
 
 HOP_S = 0.0025
 FOR_21 = b"\x15\x07\x00\x02"  # node 21, number 7, two hops left

@@ -10,7 +10,7 @@ from drone_mesh.communication.beacon.packets import NO_ANCESTORS, Beacon, Below
 from drone_mesh.communication.beacon.routes import BeaconRoutes
 from drone_mesh.communication.beacon.search import Searches
 from drone_mesh.communication.beacon.verdicts import Verdicts
-from drone_mesh.communication.timing.deadlines import Deadlines, Due
+from drone_mesh.communication.timing import Deadlines, Due
 
 OWN, FROM_5_THROUGH_1 = "09 09 00 00 32", "05 01 00 09 32"  # for node 50
 UP = "05 01 00 09 00"

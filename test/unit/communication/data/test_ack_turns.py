@@ -10,7 +10,7 @@ from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.ack_turns import TURN_S, AckTurns
 from drone_mesh.communication.data.inbox import ACK_DELAY_S, Inbox
 from drone_mesh.communication.data.packets import Head, Poll
-from drone_mesh.communication.timing.medium import FAST_HOP_S, UNDISTURBED, Medium
+from drone_mesh.communication.timing import FAST_HOP_S, UNDISTURBED, Medium
 
 ROOM = 27
 BUSY = 2.5

@@ -13,8 +13,7 @@ from drone_mesh.communication.data.ordering import PortOrder
 from drone_mesh.communication.data.outgoing import LIFETIME_S
 from drone_mesh.communication.data.packets import Head, Poll
 from drone_mesh.communication.data.reassembly import Whole
-from drone_mesh.communication.timing.deadlines import Deadlines
-from drone_mesh.communication.timing.medium import UNDISTURBED
+from drone_mesh.communication.timing import UNDISTURBED, Deadlines
 
 ROOM = 27
 OLD, NEW = 7, 8  # sessions of the sender

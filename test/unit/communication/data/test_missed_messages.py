@@ -9,7 +9,7 @@ from drone_mesh.communication.data.inbox import Inbox
 from drone_mesh.communication.data.outbox import Outbox
 from drone_mesh.communication.data.outgoing import OutgoingMessage
 from drone_mesh.communication.data.ticket import Ticket
-from drone_mesh.communication.timing.medium import UNDISTURBED
+from drone_mesh.communication.timing import UNDISTURBED
 
 ROOM = 27
 

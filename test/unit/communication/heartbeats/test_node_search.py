@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from rig import Rig, packet
 
-from drone_mesh.communication.timing.medium import UNDISTURBED, Medium
+from drone_mesh.communication.timing import UNDISTURBED, Medium
 
 ORDER, HEARTBEAT, SEARCH = 6, 4, 0x44
 SHARED = Medium(shared=True, answer_s=1.0)

@@ -9,8 +9,7 @@ from rig import FROM_0, Rig, packet
 
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.routing.techniques.etx_tree import EtxTree
-from drone_mesh.communication.timing.medium import Medium
-from drone_mesh.communication.timing.mesh_timing import MeshTiming
+from drone_mesh.communication.timing import Medium, MeshTiming
 from drone_mesh.drone.location import Location
 
 LOCATION, HEARTBEAT, PRESENT, REQUEST, MISSING = 1, 4, 3, 2, 5

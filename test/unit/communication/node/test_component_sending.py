@@ -10,7 +10,7 @@ from rig import AlwaysHalf, RecordingAntenna, Rig, RigEngine, packet
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.node.router import MeshnetworkRouter
 from drone_mesh.communication.routing.child_table_tree import ChildTableTree
-from drone_mesh.communication.timing.mesh_timing import MeshTiming
+from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.errors import ConfigurationError
 
 LOCATION_OF_ORIGIN = "01 01 01 05 05 00 00 00 00 00 00 00 00 00 00 00 00 00 00"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from rig import Rig, packet
 
-from drone_mesh.communication.order_record import OrderState
+from drone_mesh.communication.interfaces import OrderState
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused
 

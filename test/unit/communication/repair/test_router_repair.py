@@ -19,7 +19,7 @@ from drone_mesh.communication.repair.named_strategies import (
 from drone_mesh.communication.repair.options import LostPlace, RepairOptions
 from drone_mesh.communication.repair.spots import Landing, own_spot, spot_beside_rivals
 from drone_mesh.communication.repair.strategies.thesis import Thesis
-from drone_mesh.communication.timing.mesh_timing import MeshTiming
+from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.location import Location
 
 LOCATION, REQUEST, PRESENT, HEARTBEAT, MISSING, BID, LAST_PLACE = 1, 2, 3, 4, 5, 7, 69

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from drone_mesh.communication.neighbours.known_places import KnownPlaces
-from drone_mesh.communication.neighbours.neighbour_table import Neighbours
-from drone_mesh.communication.neighbours.seen_motion import SeenMotion
+from drone_mesh.communication.control.places import KnownPlaces
+from drone_mesh.communication.neighbours import Neighbours, SeenMotion
 from drone_mesh.communication.repair.options import RepairOptions
 from drone_mesh.communication.repair.taken_places import TakenPlaces
-from drone_mesh.communication.timing.deadlines import Deadlines
+from drone_mesh.communication.timing import Deadlines
 from drone_mesh.drone.location import Location
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from drone_mesh.communication.node.named_techniques import (
+from drone_mesh.communication.node.node_configuration import (
     ROUTING_TECHNIQUES,
     create_routing_technique,
 )

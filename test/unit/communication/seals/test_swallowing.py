@@ -9,11 +9,9 @@ from proofs.stranger import Hole
 from seal_rig import KEY, packet
 
 from drone_mesh.communication.data.ticket import TO_GATEWAY, TicketState
-from drone_mesh.communication.heartbeats.detours import Detours
-from drone_mesh.communication.heartbeats.relay_check import RelayCheck, Swallowing
+from drone_mesh.communication.heartbeats.detours import Detours, RelayCheck, Swallowing
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.timing.deadlines import Deadlines
-from drone_mesh.communication.timing.mesh_timing import MeshTiming
+from drone_mesh.communication.timing import Deadlines, MeshTiming
 from drone_mesh.inprocess import Network
 
 NOTICED_WITHIN_S = 120.0

@@ -9,7 +9,7 @@ from typing import Sequence
 
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.routing.child_table_tree import ChildTableTree
-from drone_mesh.communication.timing.mesh_timing import CIRCULATION_S
+from drone_mesh.communication.timing import CIRCULATION_S
 from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.packet_types import MessageType
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from rig import Rig, packet
 
-from drone_mesh.communication.reports.node_report import NodeReport
-from drone_mesh.communication.timing.mesh_timing import MeshTiming
+from drone_mesh.communication.reports import NodeReport
+from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError
 

@@ -1,4 +1,4 @@
-"""What a node spends on nodes that do not exist is limited (docs/security.md, "Limits")."""
+"""What is due how often, and limits on nodes that do not exist (docs/security.md, "Limits")."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import tracemalloc
 import pytest
 from rig import Rig
 
-from drone_mesh.communication.timing.limits import RateLimit, Strangers
+from drone_mesh.communication.timing import RateLimit, Strangers, Throttle
 
 
 def heartbeat(creator, to=1):
@@ -111,3 +111,21 @@ def test_memory_is_bounded_by_the_number_of_ids(gateway):
     finally:
         tracemalloc.stop()
     assert grown < 100_000
+
+
+def test_each_reason_is_due_once_a_period_and_always_counted():
+    throttle = Throttle(period_s=10.0)
+    assert [throttle.count("bad", now_s) for now_s in (0.0, 9.9, 10.0, 10.1)] == [
+        True,
+        False,
+        True,
+        False,
+    ]
+    assert throttle.count("worse", 10.1)
+    assert throttle.counts == {"bad": 4, "worse": 1}
+
+
+def test_a_clock_that_jumped_back_silences_nothing():
+    throttle = Throttle(period_s=10.0)
+    throttle.count("bad", 500.0)
+    assert throttle.count("bad", 1.0)
