@@ -25,7 +25,7 @@ def requirements(name: str) -> list[str]:
     return found
 
 
-EXTRAS = ("console", "http", "lab", "mqtt", "raspberry", "report", "simulation")
+EXTRAS = ("console", "http", "lab", "mqtt", "physics", "raspberry", "report", "simulation")
 
 setup(
     name="drone_mesh",

@@ -4,6 +4,7 @@
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 venv="$root/.venv"
+python=/usr/bin/python3
 javascript="$venv/javascript"
 noetic=/opt/ros/noetic/setup.bash
 simulation_requirements=(requirements/{console,http,mqtt,report,simulation}.txt)
@@ -31,7 +32,7 @@ else
     python3-rospy python3-rostest
   )
   screen_packages=(iproute2 libgl1 mosquitto tshark xvfb)
-  browsers=(chromium-headless-shell chromium)  # the first takes half of the processor time
+  browsers=(chromium-headless-shell)  # takes half of the processor time of the whole Chromium
   rviz_package=rviz
 fi
 
@@ -61,12 +62,18 @@ apt_install() {
     fail "apt-get could not install: ${missing[*]}"
 }
 
-# make_venv: with the system's Python, the one that can import ROS.
+# use_python PYTHON: for what needs no ROS, another interpreter with a virtual environment of its own.
+use_python() {
+  python=$(command -v "$1") || fail "no such Python: $1"
+  venv="$root/.venv-$("$python" -c 'import sys; print("%d.%d" % sys.version_info[:2])')" || exit
+}
+
+# make_venv: by default with the system's Python, the one that can import ROS.
 make_venv() {
   "$venv/bin/python" -m pip --version >/dev/null 2>&1 && return
-  /usr/bin/python3 -c 'import ensurepip, venv' 2>/dev/null || apt_install python3 python3-venv
-  say "making the virtual environment .venv"
-  /usr/bin/python3 -m venv --clear --system-site-packages "$venv" || fail "could not make .venv"
+  "$python" -c 'import ensurepip, venv' 2>/dev/null || apt_install python3 python3-venv
+  say "making the virtual environment ${venv##*/}"
+  "$python" -m venv --clear --system-site-packages "$venv" || fail "could not make $venv"
 }
 
 # pip_install [--no-deps] FILE...: installs requirement files whose content has changed.
@@ -76,7 +83,7 @@ pip_install() {
   for file in "$@"; do
     stamp="$venv/.installed-$(basename "$file")"
     cmp -s "$root/$file" "$stamp" && continue
-    say "installing Python packages into .venv: $file"
+    say "installing Python packages into ${venv##*/}: $file"
     "$venv/bin/python" -m pip install --disable-pip-version-check --no-input --prefer-binary \
       --progress-bar off "${options[@]}" -r "$root/$file" </dev/null ||
       fail "pip could not install $file"
@@ -84,7 +91,7 @@ pip_install() {
   done
 }
 
-# can_check_javascript: eslint needs Node.js 18; Debian 11 has 12.
+# can_check_javascript: eslint needs Node.js 18; Ubuntu 20.04 has 10.
 can_check_javascript() { node -e 'process.exit(parseInt(process.versions.node) < 18 ? 1 : 0)'; }
 
 # npm_install: the checks of the page's JavaScript, unless these very versions are installed.
@@ -150,21 +157,18 @@ alone() {
   ) 9>"$root/build/.lock" || exit
 }
 
-# compiler_for_pybullet: it has no wheel for Python 3.12 and newer. pip builds it once and keeps the
+# prepare_physics: pybullet has no wheel for Python 3.12 and newer. pip builds it once and keeps the
 # wheel in its cache, so that the next checkout has it at once.
-compiler_for_pybullet() {
-  "$venv/bin/python" - <<'PYTHON' && return
-import importlib.util, sys
-sys.exit(sys.version_info >= (3, 12) and importlib.util.find_spec("pybullet") is None)
-PYTHON
+prepare_physics() {
+  "$venv/bin/python" -c 'import importlib.util as i; exit(i.find_spec("pybullet") is None)' && return
   apt_install g++ python3-dev
   say "pip builds pybullet from its source, unless it has done so before: some four minutes on two cores"
+  pip_install requirements/physics.txt
 }
 
 prepare_simulation() {
   apt_install "${ros_packages[@]}"
   make_venv
-  compiler_for_pybullet
   pip_install "${simulation_requirements[@]}"
   build
 }
@@ -176,8 +180,8 @@ prepare_lab() {
 
 prepare_unit_tests() {
   make_venv
-  compiler_for_pybullet
   pip_install "${simulation_requirements[@]}" requirements/{lab,test}.txt
+  prepare_physics
   pip_install --no-deps requirements/test-bare.txt
 }
 
@@ -191,18 +195,9 @@ prepare_checks() {
 # What all tests need. pip comes after apt-get, whose Python packages it finds in the environment.
 prepare_tests() {
   apt_install "${ros_packages[@]}" "${screen_packages[@]}"
-  install_browser
+  [ ${#browsers[@]} -eq 0 ] || apt_install "${browsers[@]}"
   prepare_unit_tests
   map_library
-}
-
-# install_browser: the first of browsers that apt knows; Debian 11 does not have the first.
-install_browser() {
-  local package
-  for package in "${browsers[@]}"; do
-    apt-cache show "$package" >/dev/null 2>&1 && break
-  done
-  [ -z "$package" ] || apt_install "$package"
 }
 
 # What the checks and rostests need beside that.

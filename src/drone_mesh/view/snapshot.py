@@ -29,7 +29,6 @@ from drone_mesh.view.scene import (
 )
 from drone_mesh.view.sketch import OVERSAMPLING, Sketch
 
-DEFAULT_SIZE = (1280, 800)  # pixels
 LEGEND_WIDTH = 168  # pixels
 NARROWEST_WITH_LEGEND = 500  # pixels; narrower pictures have no legend
 DRONE_PIXELS = 36  # approximate width of a drone
@@ -44,7 +43,7 @@ MARGINS = Margins(left=64, top=56, right=24, bottom=56)  # pixels
 _LegendRow = Tuple[str, Colour, float]  # meaning and colour; height of the swatch, pixels
 
 
-def render(scene: Scene, path: str | Path, size: tuple[int, int] = DEFAULT_SIZE) -> None:
+def render(scene: Scene, path: str | Path, size: tuple[int, int]) -> None:
     """Write a PNG of `size` (width, height) pixels that shows all drones with their ids.
 
     Drones are enlarged where there is room. Raises OSError if `path` cannot be written.

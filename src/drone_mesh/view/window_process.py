@@ -16,6 +16,7 @@ from typing import Callable
 import drone_mesh
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.view.scene import Scene
+from drone_mesh.world.physics import require_pybullet
 
 POLL_PERIOD_S = 0.05  # wall; at most 20 scenes a second
 END_TIMEOUT_S = 3.0  # wall; between the end of the pipe and the end of the process
@@ -51,8 +52,9 @@ class WindowProcess:
     """
 
     def __init__(self, read_scene: Callable[[], Scene]) -> None:
-        """Raises ConfigurationError if there is no screen."""
+        """Raises ConfigurationError if there is no screen or no pybullet."""
         require_screen("gui")
+        require_pybullet("gui")
         self._read_scene = read_scene
         self._stopped = threading.Event()
         self._process: subprocess.Popen[bytes] | None = None

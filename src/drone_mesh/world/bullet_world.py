@@ -10,7 +10,7 @@ from drone_mesh.air.box import Box
 from drone_mesh.drone.flight_path import Vector
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.world.body import GRAVITY_M_S2
-from drone_mesh.world.interfaces import World
+from drone_mesh.world.interfaces import PhysicalWorld
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)  # unit quaternion, pybullet's order x y z w
 KINEMATIC = 0.0  # physics never moves a body of mass 0
@@ -51,7 +51,7 @@ def _box_shape(client: int, size: Vector) -> int:
     )
 
 
-class BulletWorld(World):
+class BulletWorld(PhysicalWorld):
     """A separate pybullet world; one process can have several.
 
     Nothing is drawn. The ground plane is at z = 0. Each pybullet call names this world's client.
@@ -79,7 +79,6 @@ class BulletWorld(World):
         pybullet.removeBody(box, physicsClientId=self.client)
 
     def add_body(self, size: Vector, centre: Vector, mass_kg: float) -> int:
-        """A box that physics moves; it stays upright, as a drone's controller would keep it."""
         body = _add(self.client, mass_kg, self._shape(size), centre)
         pybullet.changeDynamics(
             body,
@@ -93,13 +92,11 @@ class BulletWorld(World):
         return body
 
     def body_state(self, body: int) -> tuple[Vector, Vector]:
-        """Centre (m) and velocity (m/s) of a body, in the world frame."""
         position, _ = pybullet.getBasePositionAndOrientation(body, physicsClientId=self.client)
         velocity, _ = pybullet.getBaseVelocity(body, physicsClientId=self.client)
         return position, velocity
 
     def push(self, body: int, force: Vector, centre: Vector) -> None:
-        """Newtons, world frame, at the centre, during the next step."""
         pybullet.applyExternalForce(
             body, -1, force, centre, pybullet.WORLD_FRAME, physicsClientId=self.client
         )

@@ -11,8 +11,8 @@ from drone_mesh.drone.location import Location
 from drone_mesh.drone.route import Route
 from drone_mesh.errors import GoalRefused
 from drone_mesh.world.body import GRAVITY_M_S2, BodyLimits, controller_force, drag, learnt_trim
-from drone_mesh.world.bullet_world import BulletWorld
 from drone_mesh.world.engine import DroneEngine
+from drone_mesh.world.interfaces import PhysicalWorld
 
 ARRIVED_M = 0.15
 STANDS_M_S = 0.1
@@ -33,7 +33,7 @@ class DynamicEngine(DroneEngine):
 
     def __init__(
         self,
-        world: BulletWorld,
+        world: PhysicalWorld,
         box: int,
         centre: Vector,
         half_height_m: float,

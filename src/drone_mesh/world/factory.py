@@ -13,10 +13,9 @@ from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.roles import Role
 from drone_mesh.errors import ConfigurationError, FleetRefused, GoalRefused
 from drone_mesh.world.body import BodyLimits
-from drone_mesh.world.bullet_world import BulletWorld
 from drone_mesh.world.dynamic_engine import DynamicEngine
 from drone_mesh.world.engine import DroneEngine
-from drone_mesh.world.interfaces import World
+from drone_mesh.world.interfaces import PhysicalWorld, World
 
 HALF_WIDTH_M = 0.15  # from the centre of a drone's box to its corner, plus a margin
 
@@ -35,7 +34,7 @@ class VirtualDrone:
     ) -> None:
         """Create a drone on the ground at this place. World's thread.
 
-        With a `wind` (m/s) physics moves it, in a BulletWorld; without, it follows its path.
+        With a `wind` (m/s) physics moves it, if the world has physics; else it follows its path.
         `plan_flight` plans its flights.
         """
         self.node_id = place.node_id
@@ -43,7 +42,7 @@ class VirtualDrone:
         half_height_m = size_m[2] / 2
         centre = (place.longitude, place.latitude, half_height_m)
         self.engine: DroneEngine
-        if wind is not None and isinstance(world, BulletWorld):
+        if wind is not None and isinstance(world, PhysicalWorld):
             self.box = world.add_body(size_m, centre, BodyLimits().mass_kg)
             self.engine = DynamicEngine(
                 world, self.box, centre, half_height_m, wind, plan_flight=plan_flight

@@ -1,4 +1,4 @@
-"""World: the interface of BulletWorld, and of what moves in it."""
+"""World and PhysicalWorld: the interfaces of a world, and of what moves in it."""
 
 from __future__ import annotations
 
@@ -86,3 +86,19 @@ class World(abc.ABC):
 
     def __exit__(self, *_exc: object) -> None:
         self.close()
+
+
+class PhysicalWorld(World):
+    """A world with bodies that physics moves."""
+
+    @abc.abstractmethod
+    def add_body(self, size: Vector, centre: Vector, mass_kg: float) -> int:
+        """A box that physics moves; it stays upright, as a drone's controller would keep it."""
+
+    @abc.abstractmethod
+    def body_state(self, body: int) -> tuple[Vector, Vector]:
+        """Centre (m) and velocity (m/s) of a body, in the world frame."""
+
+    @abc.abstractmethod
+    def push(self, body: int, force: Vector, centre: Vector) -> None:
+        """Newtons, world frame, at the centre, during the next step."""

@@ -1,15 +1,15 @@
-"""BulletWorld: time, bodies, several worlds; and what it shares with StillWorld."""
+"""BulletWorld: time, bodies, several worlds; and what it shares with KinematicWorld."""
 
 from __future__ import annotations
 
 import pybullet
 import pytest
-from still_world import StillWorld
 
 from drone_mesh.drone.fleet import StartPlace
 from drone_mesh.drone.roles import Role
 from drone_mesh.world.bullet_world import BulletWorld
 from drone_mesh.world.factory import RouterDrone
+from drone_mesh.world.kinematic_world import KinematicWorld
 
 
 @pytest.fixture
@@ -18,7 +18,7 @@ def bullet():
         yield world
 
 
-@pytest.fixture(params=[BulletWorld, StillWorld])
+@pytest.fixture(params=[BulletWorld, KinematicWorld])
 def world(request):
     with request.param() as world:
         yield world

@@ -6,7 +6,6 @@ import math
 import threading
 
 import pytest
-from still_world import StillWorld
 
 from drone_mesh.drone.fleet import StartPlace
 from drone_mesh.drone.location import Location
@@ -14,11 +13,12 @@ from drone_mesh.drone.roles import Role
 from drone_mesh.errors import GoalRefused, MeshError
 from drone_mesh.world.engine import DroneState
 from drone_mesh.world.factory import RouterDrone
+from drone_mesh.world.kinematic_world import KinematicWorld
 
 
 @pytest.fixture
 def world():
-    return StillWorld()
+    return KinematicWorld()
 
 
 @pytest.fixture

@@ -6,7 +6,6 @@ import math
 
 import pybullet
 import pytest
-from still_world import StillWorld
 
 from drone_mesh.drone.fleet import plan_fleet
 from drone_mesh.drone.location import Location
@@ -14,11 +13,12 @@ from drone_mesh.drone.roles import Role
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.world.bullet_world import BulletWorld
 from drone_mesh.world.factory import DroneFactory, GatewayDrone, RouterDrone
+from drone_mesh.world.kinematic_world import KinematicWorld
 
 
 def make(**changes):
     parameters = {"gateways": 1, "routers": 17, "gridsize": 6, "spacing": 1.0}
-    return DroneFactory(StillWorld(), plan_fleet(**{**parameters, **changes}))
+    return DroneFactory(KinematicWorld(), plan_fleet(**{**parameters, **changes}))
 
 
 def test_ids_count_gateways_first_and_then_routers():

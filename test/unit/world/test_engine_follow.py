@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from still_world import StillWorld
-
 from drone_mesh.drone.fleet import StartPlace
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
 from drone_mesh.world.factory import RouterDrone
+from drone_mesh.world.kinematic_world import KinematicWorld
 
 
 def test_a_followed_drone_is_where_it_was_last_reported_and_its_listeners_are_notified() -> None:
-    world = StillWorld()
+    world = KinematicWorld()
     drone = RouterDrone(world, StartPlace(1, Role.ROUTER, 0.0, 0.0))
     states = []
     drone.engine.add_listener(states.append)

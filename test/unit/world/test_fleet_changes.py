@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import pytest
-from still_world import StillWorld
 
 from drone_mesh.air.box import Box
 from drone_mesh.air.obstacles import Obstacles
@@ -14,10 +13,11 @@ from drone_mesh.drone.roles import Role
 from drone_mesh.errors import FleetRefused
 from drone_mesh.world.bullet_world import BulletWorld
 from drone_mesh.world.factory import DroneFactory
+from drone_mesh.world.kinematic_world import KinematicWorld
 
 
 def factory(world=None, gateways=1, routers=3, **more):
-    return DroneFactory(world or StillWorld(), plan_fleet(gateways, routers, 6, 1.0), **more)
+    return DroneFactory(world or KinematicWorld(), plan_fleet(gateways, routers, 6, 1.0), **more)
 
 
 def ids(fleet):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pytest
-from still_world import StillWorld
 
 from drone_mesh.air.box import Box
 from drone_mesh.air.obstacles import Obstacles
@@ -14,6 +13,7 @@ from drone_mesh.errors import ConfigurationError, GoalRefused
 from drone_mesh.world.bullet_world import BulletWorld
 from drone_mesh.world.dynamic_engine import DynamicEngine
 from drone_mesh.world.factory import DroneFactory
+from drone_mesh.world.kinematic_world import KinematicWorld
 
 TOWER = Box((3.0, 0.0, 3.0), (1.0, 1.0, 6.0))  # between the two routers, higher than their climb
 
@@ -57,7 +57,7 @@ def test_a_flight_goes_round_a_tower(wind):
 
 
 def test_a_goal_in_or_against_a_box_is_refused_with_the_reason():
-    world = StillWorld()
+    world = KinematicWorld()
     drone, _ = fleet(world, TOWER)
     for x in (3.0, 3.6):
         with pytest.raises(GoalRefused, match=r"no path past the obstacles: x 3.* m, y 0 m, z 1 m"):
@@ -68,7 +68,7 @@ def test_a_goal_in_or_against_a_box_is_refused_with_the_reason():
 
 def test_a_drone_under_a_roof_refuses_to_climb_through_it():
     roof = Box((0.0, 0.0, 2.0), (2.0, 2.0, 0.2))
-    drone, other = fleet(StillWorld(), roof)
+    drone, other = fleet(KinematicWorld(), roof)
     with pytest.raises(GoalRefused, match="no path past the obstacles"):
         drone.engine.set_goal(3.0, 3.0, 0)
     other.engine.set_goal(3.0, 3.0, 0)
@@ -76,7 +76,7 @@ def test_a_drone_under_a_roof_refuses_to_climb_through_it():
 
 def test_a_drone_that_would_start_against_a_box_ends_the_start_with_one_line():
     with pytest.raises(ConfigurationError, match="drone 1 would start in or against a box, at x 6"):
-        fleet(StillWorld(), Box((6.6, 0.0, 1.0), (1.0, 1.0, 2.0)))
+        fleet(KinematicWorld(), Box((6.6, 0.0, 1.0), (1.0, 1.0, 2.0)))
 
 
 def test_a_body_that_flies_into_a_box_crashes_and_does_not_pass_through_it():

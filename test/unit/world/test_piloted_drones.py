@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import pytest
-from still_world import StillWorld
 
 from drone_mesh.drone.fleet import StartPlace
 from drone_mesh.drone.flight_path import FlightPath
@@ -15,6 +14,7 @@ from drone_mesh.world.body import BodyLimits
 from drone_mesh.world.bullet_world import BulletWorld
 from drone_mesh.world.dynamic_engine import DynamicEngine
 from drone_mesh.world.factory import RouterDrone
+from drone_mesh.world.kinematic_world import KinematicWorld
 
 SQUARE = [(4.0, 0.0, 2.0), (4.0, 4.0, 2.0), (0.0, 4.0, 2.0), (0.0, 0.0, 2.0)]
 
@@ -39,7 +39,7 @@ def run(world, seconds, engine=None):
 
 @pytest.fixture(params=["kinematic", "dynamic"])
 def world(request):
-    with StillWorld() if request.param == "kinematic" else BulletWorld() as world:
+    with KinematicWorld() if request.param == "kinematic" else BulletWorld() as world:
         yield world
 
 
@@ -91,7 +91,7 @@ def test_without_a_pilot_the_drone_stays(world):
 
 
 def test_a_kinematic_pilot_moves_the_drone_ten_times_a_second():
-    world = StillWorld()
+    world = KinematicWorld()
     engine = drone(world)
     states = []
     engine.add_listener(states.append)

@@ -12,8 +12,9 @@ from drone_mesh.ros.views.bag import raise_any
 from drone_mesh.ros.views.bag_file import BagDamaged
 from drone_mesh.ros.views.state_source import live_state, parse_with_bag, state_in_bag
 from drone_mesh.view.scene import scene_of
-from drone_mesh.view.snapshot import DEFAULT_SIZE, render
+from drone_mesh.world.physics import require_pybullet
 
+DEFAULT_SIZE = (1280, 800)  # pixels
 SMALLEST, LARGEST = 200, 8000  # pixels
 
 
@@ -58,6 +59,9 @@ def _size(text: str) -> tuple[int, int]:
 
 
 def _run(options: argparse.Namespace) -> int:
+    require_pybullet("snapshot")
+    from drone_mesh.view.snapshot import render
+
     damage: list[BagDamaged] = []
     if options.bag is None:
         join_graph("mesh_snapshot")

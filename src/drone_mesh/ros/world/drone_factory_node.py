@@ -33,8 +33,9 @@ from drone_mesh.state.model import EventRecord, MeshStatus
 from drone_mesh.state.observation import describe_obstacles
 from drone_mesh.view.scene import Scene, scene_of
 from drone_mesh.view.window_process import WindowProcess
-from drone_mesh.world.bullet_world import BulletWorld
 from drone_mesh.world.factory import DroneFactory
+from drone_mesh.world.interfaces import World
+from drone_mesh.world.physics import open_world
 
 MQTT_SENDER = {0: "with internet mqtt it sends the messages published on the broker"}
 
@@ -44,7 +45,7 @@ _log = logging.getLogger(__name__)
 class RosSimulation:
     """Built in `world` and run in the main thread, which steps the world."""
 
-    def __init__(self, parameters: FactoryParameters, world: BulletWorld) -> None:
+    def __init__(self, parameters: FactoryParameters, world: World) -> None:
         """Create the drones. Nothing runs yet."""
         self._parameters = parameters
         self._world = world
@@ -204,5 +205,6 @@ def main() -> None:
     start_node(main.__doc__, "DroneFactory", disable_signals=True)
     show_library_logs_on_rosout()
     parameters = or_exit(FactoryParameters.read)
-    with OrderlyStop() as stop, BulletWorld() as world:
+    dynamic = parameters.configuration.flight == "dynamic"
+    with OrderlyStop() as stop, or_exit(lambda: open_world(dynamic)) as world:
         RosSimulation(parameters, world).run(stop)

@@ -24,6 +24,7 @@ from drone_mesh.ros.graph.run import new_run
 from drone_mesh.ros.host.mesh_settings import MeshSettings
 from drone_mesh.view.window_process import require_screen
 from drone_mesh.world.factory import check_starts
+from drone_mesh.world.physics import require_pybullet
 
 
 @dataclass(frozen=True)
@@ -64,6 +65,7 @@ class FactoryParameters:
             raise ConfigurationError(f"missions: there is no drone {unknown[0]}")
         if configuration.gui:
             require_screen("gui")
+            require_pybullet("gui")
         # With a bad layout file the manager would be restarted for ever; this ends the launch.
         manager_layouts()
         hosts = str(rospy.get_param("~hosts", "") or 1)

@@ -1,4 +1,4 @@
-"""StillWorld: a world without physics, for tests."""
+"""KinematicWorld: a world without physics, where pybullet is not installed."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from drone_mesh.drone.flight_path import Vector
 from drone_mesh.world.interfaces import World
 
 
-class StillWorld(World):
-    """Time passes and drones fly as in BulletWorld; a body is only the position of its centre."""
+class KinematicWorld(World):
+    """Time passes and drones follow their paths as in BulletWorld; a body is only its centre."""
 
     def __init__(self) -> None:
         super().__init__()
