@@ -19,7 +19,6 @@ from drone_mesh.communication.events.observer import MeshEventKind, Reporter, in
 from drone_mesh.communication.heartbeats.delivery import Delivery
 from drone_mesh.communication.heartbeats.detours import AVOIDED_S, Detours, RelayCheck
 from drone_mesh.communication.heartbeats.introduction import Introduction
-from drone_mesh.communication.heartbeats.own_heartbeats import OwnHeartbeats
 from drone_mesh.communication.interfaces import MAX_NODE_ID, NO_ROUTE
 from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.routing.interfaces import IRoutingTechnique
@@ -49,7 +48,6 @@ class GatewayConnection:
     _states: RouterStates
     _technique: IRoutingTechnique
     _delivery: Delivery
-    _heartbeats: OwnHeartbeats
     _introduction: Introduction
     _requests: PlaceRequests
     _medium: Medium
@@ -85,6 +83,11 @@ class GatewayConnection:
         self._moved = False  # since the gateway was last asked for its place
         self._resigned_s = -math.inf  # when the preferred gateway said that it is none now
 
+    @property
+    def connected(self) -> bool:
+        """Whether the gateway answered the last heartbeat, or may still answer."""
+        return self._states.connected
+
     def next_hop(self) -> int:
         """The next hop to the preferred gateway, or NO_ROUTE."""
         if self.gateway == NO_ROUTE:
@@ -111,7 +114,7 @@ class GatewayConnection:
         self._heartbeat_sent_s = now_s
         if self._sent_over_detour(was_connected) or self._sent_over_shortcut(was_connected):
             return True
-        heartbeat = self._heartbeats.packet(gateway, gateway, was_connected, gateway)
+        heartbeat = self._introduction.heartbeat(gateway, gateway, was_connected, gateway)
         if self._delivery.send_own(heartbeat):
             return True
         if self._states.awaiting:  # otherwise the loss of the route has been noticed
@@ -135,7 +138,7 @@ class GatewayConnection:
         its_gateway = self._neighbours.gateway_of(to)
         if its_gateway == NO_ROUTE:
             its_gateway = self.gateway
-        heartbeat = self._heartbeats.packet(to, its_gateway, connected, self.gateway)
+        heartbeat = self._introduction.heartbeat(to, its_gateway, connected, self.gateway)
         if not self._delivery.send(heartbeat, to) or its_gateway != self.gateway:
             return False
         self._tried = to
@@ -146,7 +149,7 @@ class GatewayConnection:
         to = self._relay_check.take_detour()
         if to == NO_ROUTE:
             return False
-        heartbeat = self._heartbeats.packet(to, self.gateway, connected, self.gateway)
+        heartbeat = self._introduction.heartbeat(to, self.gateway, connected, self.gateway)
         if not self._delivery.send(heartbeat, to):
             return False
         self._tried = to
@@ -208,6 +211,10 @@ class GatewayConnection:
 
     def on_present(self, neighbour: int, hops: int, know_gateway: bool) -> bool:
         """A neighbour introduced itself. Returns whether to send it a heartbeat."""
+        if neighbour == self.gateway and hops != 0:
+            self.gateway_resigned()
+        if know_gateway and hops <= self.hops:
+            self._introduction.search_is_answered()
         connected = self._states.connected
         if know_gateway != connected:
             return connected or not (self._states.awaiting or self._asks_a_neighbour())

@@ -6,8 +6,7 @@ from typing import Hashable, Sequence
 
 from drone_mesh.communication.events.complaints import Complaints
 from drone_mesh.communication.events.observer import MeshEventKind, Reporter
-from drone_mesh.communication.heartbeats.circulation import CirculationGuard, came_round
-from drone_mesh.communication.heartbeats.delivery import Delivery
+from drone_mesh.communication.heartbeats.delivery import CirculationGuard, Delivery, came_round
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.routing.interfaces import IRoutingTechnique
 from drone_mesh.communication.timing import CIRCULATION_S, Medium, RateLimit

@@ -1,4 +1,7 @@
-"""Introduction: when a node introduces itself with a PRESENT (docs/protocol.md, "Connection")."""
+"""Introduction: what a node says of itself in PRESENT and HEARTBEAT, and when it does.
+
+docs/protocol.md, "Connection".
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,7 @@ from drone_mesh.communication.wire.packet_types import MessageType
 AFTER_POWER_S = 0.2  # the medium must register the antenna first
 SPREAD_S = 1.0  # spreads the nodes' packets after an outage
 
-_PRESENT = int(MessageType.PRESENT)
+_PRESENT, _HEARTBEAT = int(MessageType.PRESENT), int(MessageType.HEARTBEAT)
 
 
 class IIntroduced(Protocol):
@@ -33,10 +36,7 @@ class IIntroduced(Protocol):
 
 
 class Introduction:
-    """Broadcasts the PRESENT of one node, at once or later.
-
-    Called only by the node's component and its parts.
-    """
+    """Broadcasts the PRESENT of one node, at once or later, and makes its heartbeats."""
 
     def __init__(
         self,
@@ -53,7 +53,10 @@ class Introduction:
         self._node_id = node_id
         self._plane = plane
         self._technique = technique
-        self._room = messages.EXTENSION_ROOM[_PRESENT] - seals.reserved_bytes(_PRESENT)
+        self._room = {
+            kind: messages.EXTENSION_ROOM[kind] - seals.reserved_bytes(kind)
+            for kind in (_PRESENT, _HEARTBEAT)
+        }
         self._antenna = antenna
         self._deadlines = deadlines
         self._check_period_s = check_period_s
@@ -70,10 +73,7 @@ class Introduction:
         had one.
         """
         hops, connected = self._plane.hops, self._plane.connected
-        payload = messages.present(self._node_id, hops, connected)
-        extension = self._technique.extension(_PRESENT, self._room)
-        if extension:
-            payload = messages.extended(payload, extension)
+        payload = self._extended(messages.present(self._node_id, hops, connected), _PRESENT)
         if self._frame.digest:
             payload = messages.with_frame_digest(payload, self._frame.digest)
         self._antenna.broadcast_message(payload)
@@ -83,6 +83,18 @@ class Introduction:
             wait_s = self._search_again_s * (0.5 + self._rng.random())
             self._search_again_s = min(2.0 * self._search_again_s, self._check_period_s)
             self._plan(wait_s)
+
+    def heartbeat(self, to: int, forward: int, connected: bool, gateway: int) -> bytes:
+        """A heartbeat of this node for `forward`."""
+        me = self._node_id
+        return self._extended(
+            messages.heartbeat(me, me, to, forward, connected, gateway), _HEARTBEAT
+        )
+
+    def _extended(self, payload: bytes, kind: int) -> bytes:
+        """With the bytes of the technique."""
+        extension = self._technique.extension(kind, self._room[kind])
+        return messages.extended(payload, extension) if extension else payload
 
     @due(Due.INTRODUCE)
     def on_due(self) -> None:

@@ -1,4 +1,4 @@
-"""HeartbeatPlane: the part of the document's way that routers and gateways have in common."""
+"""HeartbeatPlane: a router's control plane by heartbeats (docs/protocol.md, "Connection")."""
 
 from __future__ import annotations
 
@@ -7,27 +7,43 @@ from typing import Sequence
 
 from drone_mesh.communication.control.control_plane import ControlledNode, IControlPlane
 from drone_mesh.communication.control.node_part import due, receives
+from drone_mesh.communication.control.places import PlaceRequests
+from drone_mesh.communication.control.router_states import (
+    ConnectionState,
+    RepairState,
+    RouterEvent,
+    RouterStates,
+)
+from drone_mesh.communication.heartbeats.connection import GatewayConnection
 from drone_mesh.communication.heartbeats.delivery import Delivery, ImmediateDelivery
 from drone_mesh.communication.heartbeats.forwarding import Forwarding
 from drone_mesh.communication.heartbeats.introduction import Introduction
 from drone_mesh.communication.heartbeats.node_search import NodeSearch
-from drone_mesh.communication.heartbeats.own_heartbeats import OwnHeartbeats
 from drone_mesh.communication.heartbeats.queued_delivery import QueuedDelivery
-from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE
+from drone_mesh.communication.interfaces import BROADCAST, MAX_NODE_ID, NO_ROUTE
 from drone_mesh.communication.routing.interfaces import IRoutingEssentials, IRoutingTechnique
 from drone_mesh.communication.timing import Due, Medium
 from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.packet_types import ABOUT, Handler, MessageType
 from drone_mesh.drone.location import Location
 
+_HEARTBEAT = int(MessageType.HEARTBEAT)
 _OF_TECHNIQUES = [number for number in range(256) if ABOUT[number].handler is Handler.TECHNIQUE]
+CHANGE_PERIODS = 0.3  # until the check after a neighbour was lost, on average
 
 
 class HeartbeatPlane(IControlPlane, IRoutingEssentials):
-    """Neighbours, connection and routes by PRESENT, HEARTBEAT and MISSING."""
+    """Neighbours, connection and routes by PRESENT, HEARTBEAT and MISSING.
 
-    def __init__(self, node: ControlledNode, technique: IRoutingTechnique) -> None:
+    A router keeps a connection to a gateway by heartbeats that it answers.
+    """
+
+    def __init__(
+        self, node: ControlledNode, technique: IRoutingTechnique, states: RouterStates
+    ) -> None:
         self._node_id = node.node_id
+        self._host = node.host
+        self._states = states
         self._technique = self.routes = technique
         self._antenna, self._medium = node.antenna, node.antenna.medium
         self._check_period_s = self.bids_within_s = node.timing.check_period_s
@@ -35,6 +51,8 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         self._neighbours = node.neighbours
         self._places = node.places
         self._pilot = node.pilot
+        self._may_be_gateway = node.seals.may_be_gateway
+        self._rng = node.rng
         deliver = QueuedDelivery if self._medium.shared else ImmediateDelivery
         self._delivery: Delivery = deliver(
             node.node_id,
@@ -51,7 +69,6 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         self._forwarding = Forwarding(
             node.node_id, technique, self._delivery, self._medium, node.complaints, node.report
         )
-        self._heartbeats = OwnHeartbeats(node.node_id, technique, node.seals)
         self._introduction = Introduction(
             node.node_id,
             self,
@@ -66,8 +83,29 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         self._search = NodeSearch(
             node.node_id, node.antenna, node.deadlines, node.complaints, self._answer_search
         )
+        self._connection = self._connected_by(node, GatewayConnection)
         self.learn = technique.learn
-        self.forward = self._forwarding.forward
+        is_shared = self._medium.shared
+        self.forward = self._forward_and_learn if is_shared else self._forwarding.forward
+
+    def _connected_by(
+        self, node: ControlledNode, kind: type[GatewayConnection]
+    ) -> GatewayConnection:
+        return kind(
+            node.node_id,
+            self._states,
+            self._technique,
+            self._delivery,
+            self._introduction,
+            PlaceRequests(node.node_id, node.pilot, node.antenna, self._delivery, node.deadlines),
+            self._medium,
+            node.deadlines,
+            self._check_period_s,
+            node.neighbours,
+            node.places,
+            node.report,
+            node.seals.has_key,
+        )
 
     @property
     def parts(self) -> Sequence[object]:
@@ -80,6 +118,28 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         """Start the technique, which introduces the node."""
         self._delivery.begin()
         self._technique.start_routing(self)
+
+    def check(self, due_s: float) -> None:
+        """Check neighbours, routes and gateway."""
+        if not self._host.may_connect(NO_ROUTE, False):
+            return
+        before = self._states.connection  # the routing may send a heartbeat to the gateway
+        was_connected = self._states.connected
+        self._technique.maintain_routing()
+        if was_connected:
+            self._connection.check(self._antenna.patience())
+        elif self._connection.just_lost or before is not ConnectionState.SEARCHING:
+            pass  # a repair counts from the next check, or a heartbeat is under way
+        elif self._connection.asks_gateway_that_resigned():
+            pass  # it is in reach: a flight would repair nothing
+        elif self._states.repair is not RepairState.FLYING:
+            self._host.on_unconnected_check(due_s)
+        self._connection.just_lost = False
+
+    @due(Due.ANSWER)
+    def on_answer_missed(self) -> None:
+        """The gateway did not answer in time."""
+        self._connection.answer_missed()
 
     @due(Due.ROUTING)
     def on_technique_due(self) -> None:
@@ -97,31 +157,94 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
             self._introduction.on_registered()
 
     def introduce(self) -> None:
-        """Send PRESENT to each node in range."""
         self._introduction.broadcast()
 
     def neighbour_leaves(self, neighbour: int) -> None:
         """Look for other routes on a shared medium; elsewhere the next failed packet does so."""
         self._delivery.neighbour_leaves(neighbour)
 
+    # The connection --------------------------------------------------------------------------
+
+    @property
+    def gateway(self) -> int:
+        return self._connection.gateway
+
+    @property
+    def hops(self) -> int:
+        return self._connection.hops
+
+    @property
+    def connected(self) -> bool:
+        return self._states.connected
+
+    def next_hop(self) -> int:
+        return self._connection.next_hop()
+
+    def told_of_gateway(self, gateway: int) -> bool:
+        return self._connection.told_of_gateway(gateway)
+
+    def end(self, event: RouterEvent) -> None:
+        self._connection.end(event)
+
+    def give_up_routes(self) -> None:
+        """Forget every route to the gateway and inform the neighbours."""
+        if self.gateway != NO_ROUTE:
+            self._delivery.gateway_lost(self.gateway)
+
+    def gateway_sent_place(self) -> None:
+        self._connection.gateway_sent_place()
+
     # Packets ---------------------------------------------------------------------------------
 
-    def own_came_back(self, from_: int) -> None:
-        """Learn only that `from_` is in reach: an own packet shows no route."""
-        self._technique.can_communicate_with_node(from_)
+    @receives(MessageType.PRESENT)
+    def on_present(self, payload: bytes, creator: int, _from: int) -> None:
+        """A neighbour introduces itself."""
+        hops, know_gateway = messages.present_body(payload)
+        self._neighbours.set_hops(creator, hops)
+        if know_gateway and hops == 0:
+            self._neighbours.set_gateway(creator, creator)
+        if not self._host.may_connect(creator, know_gateway):
+            return
+        if self._connection.on_present(creator, hops, know_gateway):
+            if know_gateway:
+                self.send_heartbeat(creator)
+            else:
+                self._introduction.answer_search(creator)
 
-    def says_connected(self, kind: int, payload: bytes) -> bool:
-        """Whether it is the PRESENT of a connected node."""
-        return kind == MessageType.PRESENT and messages.present_body(payload)[1]
+    @receives(MessageType.HEARTBEAT)
+    def on_heartbeat(self, payload: bytes, creator: int, from_: int) -> None:
+        """A heartbeat for this node."""
+        if creator == self._node_id:
+            return  # its own heartbeat came back, which proves nothing
+        know_gateway, preferred_gateway, hops = messages.heartbeat_body(payload)
+        if creator == from_ and know_gateway and preferred_gateway <= MAX_NODE_ID:
+            self._neighbours.set_gateway(creator, preferred_gateway)
+        if not self._host.may_connect(from_, know_gateway):
+            return
+        if creator == self.gateway != preferred_gateway:
+            self._connection.gateway_resigned()
+        if creator == preferred_gateway:
+            if creator == self.gateway:
+                self._connection.answered_itself()
+            if self._connection.on_gateway_heartbeat(creator, hops + 1):
+                self._host.on_connected()
+        elif know_gateway != self._states.connected:
+            if not know_gateway:
+                self.send_heartbeat(creator)
+            elif not self._states.awaiting:
+                self._connection.take_gateway_of(from_, preferred_gateway)
 
-    def on_delivered(self, neighbour: int, tries: int) -> None:
-        """The routes learn from this."""
-        self._delivery.delivered(neighbour, tries)
-
-    def on_undelivered(self, payload: bytes, tries: int) -> None:
-        """Send the packet over another route, if there is one; the routes learn from this."""
-        if not self._delivery.undelivered(payload, tries):
-            self._forwarding.stranded(payload, self._deadlines.now_s)
+    def _forward_and_learn(
+        self, payload: bytes, creator: int, from_: int, kind: int, forward: int, now_s: float
+    ) -> None:
+        """On a shared channel a gateway's answer proves the connection of each relay as well."""
+        if kind == _HEARTBEAT:
+            know_gateway, preferred_gateway, hops = messages.heartbeat_body(payload)
+            proves = creator == preferred_gateway and self._host.may_connect(NO_ROUTE, know_gateway)
+            proves = proves and self._may_be_gateway(creator)
+            if proves and self._connection.on_gateway_heartbeat(creator, hops + 1):
+                self._host.on_connected()
+        self._forwarding.forward(payload, creator, from_, kind, forward, now_s)
 
     @receives(MessageType.MISSING)
     def on_missing(self, payload: bytes, creator: int, from_: int) -> None:
@@ -131,10 +254,9 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
             if missing == self.gateway:
                 self._neighbours.set_hops(creator, NO_ROUTE)
             self._delivery.forget_route(creator, missing, from_)
-            self._after_missing(missing, messages.addressee(payload) != BROADCAST)
-
-    def _after_missing(self, missing: int, told: bool) -> None:
-        """The routes are updated. `told`: this node alone, not all neighbours."""
+            self._connection.on_route_lost()
+            told_alone = messages.addressee(payload) != BROADCAST
+            self._host.on_node_missing(missing, told_alone)
 
     @receives(*_OF_TECHNIQUES)
     def on_packet_of_technique(self, payload: bytes, creator: int, from_: int) -> None:
@@ -142,17 +264,37 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         kind = messages.type_of(payload)
         self._technique.on_packet(creator, from_, kind, messages.body(payload))
 
+    def own_came_back(self, from_: int) -> None:
+        """Learn only that `from_` is in reach: an own packet shows no route."""
+        self._technique.can_communicate_with_node(from_)
+
+    def says_connected(self, kind: int, payload: bytes) -> bool:
+        return kind == MessageType.PRESENT and messages.present_body(payload)[1]
+
+    def on_delivered(self, neighbour: int, tries: int) -> None:
+        self._delivery.delivered(neighbour, tries)
+
+    def on_undelivered(self, payload: bytes, tries: int) -> None:
+        """Send the packet over another route, if there is one; the routes learn from this."""
+        if not self._delivery.undelivered(payload, tries):
+            self._forwarding.stranded(payload, self._deadlines.now_s)
+
     def search(self, node: int) -> bool:
         """Ask all nodes for `node`, which answers with a heartbeat."""
         return self._search.search(node)
 
-    def on_neighbour_lost(self, node: int) -> None:
-        """See IWayFinder, also for the functions below."""
+    # For the delivery: see IWayFinder --------------------------------------------------------
+
+    def on_neighbour_lost(self, node: int) -> None:  # noqa: D102
+        if self._medium.shared and self._states.connected:  # check soon: what else has changed?
+            share = CHANGE_PERIODS * (0.5 + self._rng.random())
+            soon_s = self._deadlines.now_s + share * self._check_period_s
+            self._deadlines.set(Due.CHECK, min(soon_s, self._deadlines.get(Due.CHECK)))
+        self._connection.on_route_lost()
+        self._host.on_neighbour_lost(node)
 
     def another_next_hop(self, node: int, but: int) -> int:  # noqa: D102
-        return NO_ROUTE
-
-    # Users' data for nodes to which there is no route -----------------------------------------
+        return self._connection.another_next_hop(but) if node == self.gateway else NO_ROUTE
 
     def way_up(self, but: int) -> int:  # noqa: D102
         to = self.next_hop()
@@ -163,80 +305,79 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
     def seek(self, node: int) -> bool:  # noqa: D102
         return False
 
-    # For the routing technique ---------------------------------------------------------------
+    # For the routing technique: see IRoutingEssentials ---------------------------------------
 
     def get_node_id(self) -> int:
-        """This node's id, 0..253."""
         return self._node_id
 
     def get_preferred_gateway(self) -> int:
-        """The gateway that this node uses, itself for a gateway."""
         return self.gateway
 
     def get_connected_to_gateway(self) -> bool:
-        """Whether a gateway answered the last heartbeat, or may still answer."""
         return self.connected
 
     def search_other_nodes_in_range(self) -> None:
-        """Send PRESENT to each node in range."""
         self._introduction.broadcast()
 
     def send_heartbeat(self, other: int) -> bool:
-        """Send a heartbeat to `other`."""
-        return self._delivery.send_own(messages.addressed(self._heartbeat(), other))
-
-    def send_heartbeats(self, others: Sequence[int]) -> None:
-        """Send a heartbeat to each of these; those for direct neighbours leave together.
-
-        On a busy channel, skip neighbours that were heard recently.
-        """
-        patience = max(self._antenna.patience(), self._medium.heard_periods)
-        if patience > 0.0:
-            since_s = self._deadlines.now_s - patience * self._check_period_s
-            heard_s = self._neighbours.last_heard_s
-            others = [other for other in others if heard_s(other, otherwise=since_s) <= since_s]
-        self._delivery.send_own_to_each(self._heartbeat(), others)
-
-    def now_s(self) -> float:
-        """The time of the component's latest call."""
-        return self._deadlines.now_s
-
-    @property
-    def medium(self) -> Medium:
-        """The properties of the antenna's medium."""
-        return self._medium
-
-    def wake_at(self, at_s: float) -> None:
-        """Call the technique's `on_time` at this time."""
-        self._deadlines.set(Due.ROUTING, at_s)
-
-    def send_packet(self, kind: int, neighbour: int, body: bytes) -> bool:
-        """Send a packet of the technique's own type to a neighbour."""
-        me = self._node_id
-        return self._delivery.send(
-            messages.packet(kind, me, me, neighbour, neighbour, body), neighbour
-        )
-
-    def broadcast_packet(self, kind: int, body: bytes) -> None:
-        """Send a packet of the technique's own type to each node in range."""
-        me = self._node_id
-        self._antenna.broadcast_message(messages.packet(kind, me, me, BROADCAST, BROADCAST, body))
-
-    def own_place(self) -> Location | None:
-        """The drone's position, if it can report it."""
-        return self._pilot.location()
-
-    def place_of(self, node: int) -> Location | None:
-        """The last place reported by `node`, or None."""
-        places = self._places
-        if node == self.gateway:
-            return places.gateway
-        return places.good if node == places.good_id else None
+        """Send a heartbeat to `other`; the preferred gateway is expected to answer."""
+        if other == self.gateway:
+            return self._connection.send_heartbeat()
+        return self._answer_search(other)
 
     def _answer_search(self, gateway: int) -> bool:
         """Send a heartbeat even if one is under way: that one may have been lost."""
         return self._delivery.send_own(messages.addressed(self._heartbeat(), gateway))
 
+    def send_heartbeats(self, others: Sequence[int]) -> None:
+        """Send a heartbeat to each of these; those for direct neighbours leave together.
+
+        The preferred gateway's is sent as if alone. On a busy channel, skip neighbours that were
+        heard recently.
+        """
+        patience, gateway = self._antenna.patience(), self.gateway
+        if gateway in others and not self._connection.proven(patience):
+            self._connection.send_heartbeat()
+        since_s = math.inf
+        patience = max(patience, self._medium.heard_periods)
+        if patience > 0.0:
+            since_s = self._deadlines.now_s - patience * self._check_period_s
+        heard_s = self._neighbours.last_heard_s
+        others = [
+            other
+            for other in others
+            if other != gateway and heard_s(other, otherwise=since_s) <= since_s
+        ]
+        self._delivery.send_own_to_each(self._heartbeat(), others)
+
     def _heartbeat(self) -> bytes:
         me = self._node_id
-        return self._heartbeats.packet(me, me, self.connected, self.gateway)
+        return self._introduction.heartbeat(me, me, self.connected, self.gateway)
+
+    def now_s(self) -> float:
+        return self._deadlines.now_s
+
+    @property
+    def medium(self) -> Medium:
+        return self._medium
+
+    def wake_at(self, at_s: float) -> None:
+        self._deadlines.set(Due.ROUTING, at_s)
+
+    def send_packet(self, kind: int, neighbour: int, body: bytes) -> bool:
+        me = self._node_id
+        packet = messages.packet(kind, me, me, neighbour, neighbour, body)
+        return self._delivery.send(packet, neighbour)
+
+    def broadcast_packet(self, kind: int, body: bytes) -> None:
+        me = self._node_id
+        self._antenna.broadcast_message(messages.packet(kind, me, me, BROADCAST, BROADCAST, body))
+
+    def own_place(self) -> Location | None:
+        return self._pilot.location()
+
+    def place_of(self, node: int) -> Location | None:
+        places = self._places
+        if node == self.gateway:
+            return places.gateway
+        return places.good if node == places.good_id else None

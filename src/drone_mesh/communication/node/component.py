@@ -32,7 +32,7 @@ from drone_mesh.communication.events.observer import (
     ignore_events,
 )
 from drone_mesh.communication.heartbeats.gateway_plane import GatewayHeartbeats
-from drone_mesh.communication.heartbeats.router_plane import RouterHeartbeats
+from drone_mesh.communication.heartbeats.plane import HeartbeatPlane
 from drone_mesh.communication.interfaces import (
     BROADCAST,
     MAX_NODE_ID,
@@ -362,7 +362,7 @@ def _control_plane(node: ControlledNode, routing: ITechnique) -> IControlPlane:
         raise TypeError(f"{type(routing).__name__} is no technique")
     if node.states is None:
         return GatewayHeartbeats(node, routing)
-    return RouterHeartbeats(node, routing, node.states)
+    return HeartbeatPlane(node, routing, node.states)
 
 
 def _ignore(_payload: bytes, _creator: int, _from: int) -> None:

@@ -14,20 +14,20 @@ _HEARTBEAT = int(MessageType.HEARTBEAT)
 class ChildTableTree(IRoutingTechnique):
     """Direct neighbours ("children"), and per child what it can reach ("grandchildren")."""
 
+    _essentials: IRoutingEssentials  # from start_routing on
+
     def __init__(self) -> None:
         self._children: dict[int, set[int]] = {}
         # The inverse of the table, and the next hops that follow from it: no lookup has to search.
         self._children_with: dict[int, set[int]] = {}
         self._next_hops: dict[int, int] = {}
         self._entries = 0  # grandchildren in all sets together
-        self._essentials: IRoutingEssentials | None = None
 
     def get_direction_to_node(self, node: int) -> int:
         """The node itself if it is a child, else the child with the lowest id that has it."""
         return self._next_hops.get(node, NO_ROUTE)
 
     def may_reach(self, node: int) -> bool:
-        """Whether there is a next hop."""
         return self.get_direction_to_node(node) != NO_ROUTE
 
     def directions(self, node: int, came_from: int, creator: int) -> Sequence[int]:
@@ -36,22 +36,15 @@ class ChildTableTree(IRoutingTechnique):
         return () if to == NO_ROUTE else (to,)
 
     def start_routing(self, essentials: IRoutingEssentials) -> None:
-        """Introduce this node to its surroundings."""
         self._essentials = essentials
         essentials.search_other_nodes_in_range()
 
     def maintain_routing(self) -> None:
-        """Introduce this node again, and check each child with a heartbeat.
-
-        Raises RuntimeError before start_routing.
-        """
-        if self._essentials is None:
-            raise RuntimeError("maintain_routing before start_routing")
+        """Introduce this node again, and check each child with a heartbeat."""
         self._essentials.search_other_nodes_in_range()
         self._essentials.send_heartbeats(sorted(self._children))
 
     def node_moved_location(self) -> None:
-        """Forget everything."""
         self._children.clear()
         self._children_with.clear()
         self._next_hops.clear()
@@ -92,12 +85,10 @@ class ChildTableTree(IRoutingTechnique):
         return True
 
     def sent(self, neighbour: int, ok: bool, transmissions: int) -> None:
-        """A neighbour that took a packet is a child."""
         if ok and neighbour not in self._children:
             self.can_communicate_with_node(neighbour)
 
     def can_communicate_with_node(self, node: int) -> None:
-        """`node` becomes a child."""
         if node not in self._children:
             self._children[node] = set()
             self._next_hops[node] = node
@@ -121,17 +112,8 @@ class ChildTableTree(IRoutingTechnique):
         """Children and all their grandchildren; a node under two children counts twice."""
         return len(self._children) + self._entries
 
-    def get_amount_of_children(self) -> int:
-        """Number of nodes in direct reach."""
-        return len(self._children)
-
     def get_set_of_children(self) -> frozenset[int]:
-        """Ids of the nodes in direct reach."""
         return frozenset(self._children)
-
-    def empty(self) -> bool:
-        """Whether no node is known."""
-        return not self._children
 
     def _forget_holder(self, node: int, child: int) -> None:
         self._entries -= 1

@@ -112,13 +112,13 @@ class IRoutingTechnique(ITechnique, IRoutes):
     def other_can_communicate_with_node(self, other: int, node: int) -> None:
         """Neighbour `other` can reach `node`."""
 
-    @abc.abstractmethod
     def get_amount_of_children(self) -> int:
         """Number of nodes in direct reach."""
+        return len(self.get_set_of_children())
 
-    @abc.abstractmethod
     def empty(self) -> bool:
         """Whether no node is known."""
+        return self.get_table_size() == 0
 
     def proven_path_to_node(self, other: int, node: int) -> None:
         """A packet created by `node` just arrived through `other`, which is now the route to it.

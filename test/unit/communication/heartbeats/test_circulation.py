@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from proofs.fuzz import tables
 
-from drone_mesh.communication.heartbeats.circulation import CirculationGuard, came_round
+from drone_mesh.communication.heartbeats.delivery import CirculationGuard, came_round
 
 
 def test_a_passage_is_remembered_for_half_a_second_whenever_it_came():

@@ -746,9 +746,9 @@ def test_a_queued_packet_teaches_the_routes_when_the_antenna_reports_its_outcome
     rig = Rig(routing=routing, medium=Medium(shared=True))
     rig.connect_through(2)
     rig.mesh.control.send_heartbeat(0)
-    assert routing.links.etx(2) == 1.0
+    assert routing.etx(2) == 1.0
     rig.mesh.on_delivered(2, 4, rig.now_s)
-    assert routing.links.etx(2) > 1.0
+    assert routing.etx(2) > 1.0
 
 
 def test_a_router_that_takes_off_announces_its_goal():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from routing_rig import RecordingEssentials
@@ -125,11 +124,6 @@ def test_maintaining_asks_for_all_children_together_even_if_one_heartbeat_costs_
     tree.maintain_routing()
     assert essentials.asked == ["search", "search", 1, 2, 3]
     assert tree.get_set_of_children() == {3}
-
-
-def test_maintaining_before_starting_is_an_error():
-    with pytest.raises(RuntimeError, match="maintain_routing before start_routing"):
-        ChildTableTree().maintain_routing()
 
 
 def test_a_proven_path_takes_a_node_away_from_all_other_children():

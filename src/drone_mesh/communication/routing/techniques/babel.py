@@ -10,11 +10,7 @@ import struct
 from typing import NamedTuple
 
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.routing.techniques.gateway_routes import (
-    GatewayRoutes,
-    LinkCosts,
-    newer_by,
-)
+from drone_mesh.communication.routing.techniques.gateway_routes import GatewayRoutes, newer_by
 from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.packet_types import MessageType
 
@@ -39,72 +35,13 @@ class Distance(NamedTuple):
         return newer > 0 or (newer == 0 and self.metric < other.metric)
 
 
-class FeasibleRoutes:
-    """Routes to gateways through neighbours. Called only by the technique that owns it."""
-
-    def __init__(self, links: LinkCosts) -> None:
-        self._links = links
-        self._updates: dict[int, dict[int, Distance]] = {}  # by gateway, by neighbour
-        self._feasibility: dict[int, Distance] = {}  # by gateway: the best ever advertised
-
-    def hear(self, gateway: int, neighbour: int, update: Distance) -> None:
-        """Store an update from a neighbour."""
-        self._updates.setdefault(gateway, {})[neighbour] = update
-
-    def best(self, gateway: int) -> int:
-        """The feasible neighbour with the smallest sum of its metric and the link's cost."""
-        updates, limit = self._updates.get(gateway, {}), self._feasibility.get(gateway)
-        costs = {
-            n: self._cost(n, update)
-            for n, update in updates.items()
-            if update.metric != INFINITE and (limit is None or update.better_than(limit))
-        }
-        return min(costs, key=lambda n: (costs[n], n)) if costs else NO_ROUTE
-
-    def advertise(self) -> list[tuple[int, Distance]]:
-        """(gateway, own distance) of each gateway. Advertised distances bound what is feasible."""
-        found = [(gateway, self._distance(gateway)) for gateway in self._updates]
-        for gateway, update in found:
-            limit = self._feasibility.get(gateway)
-            if update.metric != INFINITE and (limit is None or update.better_than(limit)):
-                self._feasibility[gateway] = update
-        return found
-
-    def forget_neighbour(self, neighbour: int) -> list[int]:
-        """Drop its updates. Returns the gateways that no feasible route leads to now."""
-        return [
-            gateway
-            for gateway, updates in self._updates.items()
-            if updates.pop(neighbour, None) and self.best(gateway) == NO_ROUTE
-        ]
-
-    def forget_gateway(self, gateway: int) -> None:
-        """Drop all updates for it until they are repeated."""
-        self._updates.get(gateway, {}).clear()
-
-    def needed_sequence(self, gateway: int) -> int | None:
-        """The sequence number that would make a route feasible again; None: any would."""
-        limit = self._feasibility.get(gateway)
-        return None if limit is None else (limit.sequence + 1) % 2**16
-
-    def _distance(self, gateway: int) -> Distance:
-        to = self.best(gateway)
-        if to == NO_ROUTE:
-            limit = self._feasibility.get(gateway, Distance(0, INFINITE))
-            return Distance(limit.sequence, INFINITE)
-        update = self._updates[gateway][to]
-        return Distance(update.sequence, self._cost(to, update))
-
-    def _cost(self, neighbour: int, update: Distance) -> int:
-        return min(update.metric + round(COST_PER_ETX * self._links.etx(neighbour)), INFINITE - 1)
-
-
 class Babel(GatewayRoutes):
     """Uses the cheapest of the neighbours that cannot be behind this node."""
 
     def __init__(self) -> None:
         super().__init__()
-        self._routes = FeasibleRoutes(self.links)
+        self._updates: dict[int, dict[int, Distance]] = {}  # by gateway, by neighbour
+        self._feasibility: dict[int, Distance] = {}  # by gateway: the best ever advertised
         self._own_sequence = 0
 
     def maintain_routing(self) -> None:
@@ -124,31 +61,39 @@ class Babel(GatewayRoutes):
 
     def extension(self, kind: int, room: int) -> bytes:
         """The updates that fit into a PRESENT."""
-        if kind != MessageType.PRESENT or self._essentials is None:
+        if kind != MessageType.PRESENT:
             return b""
         me, packed = self._essentials.get_node_id(), []
         if self._essentials.get_preferred_gateway() == me:
             packed.append(UPDATE.pack(me + 1, self._own_sequence, 0))
-        for gateway, update in self._routes.advertise():
+        for gateway in self._updates:
+            update = self._distance(gateway)
             packed.append(UPDATE.pack(gateway + 1, *update))
+            if self._is_feasible(gateway, update):  # what is advertised bounds what is feasible
+                self._feasibility[gateway] = update
         return b"".join(packed[: room // UPDATE.size])
 
     def next_hop_to_gateway(self, gateway: int) -> int:
-        """The best feasible neighbour."""
-        return self._routes.best(gateway)
+        """The feasible neighbour with the smallest sum of its metric and the link's cost."""
+        costs = {
+            n: self._cost(n, update)
+            for n, update in self._updates.get(gateway, {}).items()
+            if self._is_feasible(gateway, update)
+        }
+        return min(costs, key=lambda n: (costs[n], n)) if costs else NO_ROUTE
 
     def forget_neighbour(self, neighbour: int) -> None:
         """Drop its updates; if no other route is left, advertise that soon."""
-        for gateway in self._routes.forget_neighbour(neighbour):
-            self._starve(gateway)
+        for gateway, updates in list(self._updates.items()):
+            if updates.pop(neighbour, None) and self.next_hop_to_gateway(gateway) == NO_ROUTE:
+                self._starve(gateway)
 
     def forget_gateway(self, gateway: int) -> None:
-        """Drop all updates for it until they are repeated."""
-        self._routes.forget_gateway(gateway)
+        self._updates.get(gateway, {}).clear()
 
     def on_packet(self, creator: int, from_: int, kind: int, body: bytes) -> None:
         """A starving node needs a new sequence number: create it, or forward the request."""
-        if kind != REQUEST_TYPE or self._essentials is None:
+        if kind != REQUEST_TYPE:
             return
         gateway, sequence, hops_left = REQUEST.unpack_from(body)
         if gateway == self._essentials.get_node_id():
@@ -162,11 +107,10 @@ class Babel(GatewayRoutes):
                 self._essentials.send_packet(REQUEST_TYPE, to, again)
 
     def _hear(self, gateway: int, neighbour: int, update: Distance) -> None:
-        assert self._essentials is not None
         if gateway == self._essentials.get_node_id():
             return
         had_route = self.next_hop_to_gateway(gateway) != NO_ROUTE
-        self._routes.hear(gateway, neighbour, update)
+        self._updates.setdefault(gateway, {})[neighbour] = update
         has_route = self.next_hop_to_gateway(gateway) != NO_ROUTE
         if had_route and not has_route:
             self._starve(gateway)
@@ -174,9 +118,25 @@ class Babel(GatewayRoutes):
             self._essentials.wake_at(self._essentials.now_s() + SOON_S)
 
     def _starve(self, gateway: int) -> None:
-        sequence = self._routes.needed_sequence(gateway)
-        if self._essentials is None or sequence is None:
+        """Ask for the sequence number that would make a route feasible again."""
+        limit = self._feasibility.get(gateway)
+        if limit is None:  # any would
             return
-        wanted = REQUEST.pack(gateway, sequence, REQUEST_HOPS)
+        wanted = REQUEST.pack(gateway, (limit.sequence + 1) % 2**16, REQUEST_HOPS)
         self._essentials.broadcast_packet(REQUEST_TYPE, wanted)
         self._essentials.wake_at(self._essentials.now_s() + SOON_S)
+
+    def _is_feasible(self, gateway: int, update: Distance) -> bool:
+        limit = self._feasibility.get(gateway)
+        return update.metric != INFINITE and (limit is None or update.better_than(limit))
+
+    def _distance(self, gateway: int) -> Distance:
+        to = self.next_hop_to_gateway(gateway)
+        if to == NO_ROUTE:
+            limit = self._feasibility.get(gateway, Distance(0, INFINITE))
+            return Distance(limit.sequence, INFINITE)
+        update = self._updates[gateway][to]
+        return Distance(update.sequence, self._cost(to, update))
+
+    def _cost(self, neighbour: int, update: Distance) -> int:
+        return min(update.metric + round(COST_PER_ETX * self.etx(neighbour)), INFINITE - 1)

@@ -47,20 +47,19 @@ class Batman(GatewayRoutes):
     def maintain_routing(self) -> None:
         """A gateway originates; all nodes check their neighbours as the tree does."""
         super().maintain_routing()
-        assert self._essentials is not None
         if self._essentials.get_preferred_gateway() == self._essentials.get_node_id():
             self._originate()
 
     def on_packet(self, creator: int, from_: int, kind: int, body: bytes) -> None:
         """Record its quality, and repeat it if it came from the best neighbour."""
-        if kind != ORIGINATOR_TYPE or self._essentials is None:
+        if kind != ORIGINATOR_TYPE:
             return
         gateway, sequence, quality, hops_left = ORIGINATOR.unpack_from(body)
         me = self._essentials.get_node_id()
         age = newer_by(sequence, self._newest.get(gateway, sequence - 1))
         if gateway == me or age < 1 - WINDOW:
             return
-        quality = round(quality / self.links.etx(from_)) * (MAX_QUALITY - HOP_PENALTY)
+        quality = round(quality / self.etx(from_)) * (MAX_QUALITY - HOP_PENALTY)
         quality //= MAX_QUALITY
         heard = self._heard.setdefault(gateway, {}).setdefault(from_, deque(maxlen=WINDOW))
         heard.append(Heard(sequence, quality))
@@ -74,7 +73,6 @@ class Batman(GatewayRoutes):
 
     def on_time(self, now_s: float) -> None:
         """Repeat due messages; a gateway originates again."""
-        assert self._essentials is not None
         due = [repeated for at_s, repeated in self._repeat if at_s <= now_s]
         self._repeat = [(at_s, repeated) for at_s, repeated in self._repeat if at_s > now_s]
         for repeated in due:
@@ -95,16 +93,13 @@ class Batman(GatewayRoutes):
         return max(qualities, key=lambda neighbour: (qualities[neighbour], -neighbour))
 
     def forget_neighbour(self, neighbour: int) -> None:
-        """Forget its messages."""
         for heard in self._heard.values():
             heard.pop(neighbour, None)
 
     def forget_gateway(self, gateway: int) -> None:
-        """Forget it until its next message."""
         self._heard.pop(gateway, None)
 
     def _originate(self) -> None:
-        assert self._essentials is not None
         self._sequence = (self._sequence + 1) % 2**16
         packet = ORIGINATOR.pack(self._essentials.get_node_id(), self._sequence, MAX_QUALITY, HOPS)
         self._essentials.broadcast_packet(ORIGINATOR_TYPE, packet)
@@ -112,7 +107,6 @@ class Batman(GatewayRoutes):
         self._plan()
 
     def _plan(self) -> None:
-        assert self._essentials is not None
         times_s = [at_s for at_s, _repeated in self._repeat]
         if self._originate_s > -math.inf:
             times_s.append(self._originate_s)

@@ -52,7 +52,7 @@ class Dsdv(GatewayRoutes):
 
     def extension(self, kind: int, room: int) -> bytes:
         """The entries that fit into a PRESENT; a gateway's first is its own."""
-        if kind != MessageType.PRESENT or self._essentials is None:
+        if kind != MessageType.PRESENT:
             return b""
         entries = dict(self._vectors)
         me = self._essentials.get_node_id()
@@ -73,13 +73,11 @@ class Dsdv(GatewayRoutes):
                 self._break(gateway, entry)
 
     def forget_gateway(self, gateway: int) -> None:
-        """Mark the route to it as broken."""
         entry = self._vectors.get(gateway)
         if entry is not None and entry.hops != INFINITE_HOPS:
             self._break(gateway, entry)
 
     def _hear(self, gateway: int, heard: Entry) -> None:
-        assert self._essentials is not None
         if gateway == self._essentials.get_node_id():
             return
         known = self._vectors.get(gateway)
@@ -98,5 +96,4 @@ class Dsdv(GatewayRoutes):
         self._advertise_soon()
 
     def _advertise_soon(self) -> None:
-        if self._essentials is not None:
-            self._essentials.wake_at(self._essentials.now_s() + SETTLING_S)
+        self._essentials.wake_at(self._essentials.now_s() + SETTLING_S)

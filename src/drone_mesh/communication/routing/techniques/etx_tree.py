@@ -46,7 +46,7 @@ class EtxTree(GatewayRoutes):
 
     def extension(self, kind: int, room: int) -> bytes:
         """The node's own rank, for PRESENT."""
-        if kind != MessageType.PRESENT or self._essentials is None:
+        if kind != MessageType.PRESENT:
             return b""
         gateway = self._essentials.get_preferred_gateway()
         rank = self._rank(gateway)
@@ -54,7 +54,7 @@ class EtxTree(GatewayRoutes):
 
     def on_packet(self, creator: int, from_: int, kind: int, body: bytes) -> None:
         """A neighbour has no parent: advertise soon, if that helps."""
-        if kind == SOLICITATION_TYPE and self._essentials is not None:
+        if kind == SOLICITATION_TYPE:
             gateway = self._essentials.get_preferred_gateway()
             if self._rank(gateway) and self.next_hop_to_gateway(gateway) != from_:
                 self._essentials.wake_at(self._essentials.now_s() + SOON_S)
@@ -62,7 +62,7 @@ class EtxTree(GatewayRoutes):
     def next_hop_to_gateway(self, gateway: int) -> int:
         """The parent, replaced only by one that is better by SWITCH_BELOW."""
         costs = {
-            neighbour: advertised.rank + RANK_PER_ETX * self.links.etx(neighbour)
+            neighbour: advertised.rank + RANK_PER_ETX * self.etx(neighbour)
             for neighbour, advertised in self._advertised.items()
             if advertised.gateway == gateway
         }
@@ -82,7 +82,6 @@ class EtxTree(GatewayRoutes):
             self._solicit()
 
     def forget_gateway(self, gateway: int) -> None:
-        """Drop all advertisements for it until they are repeated."""
         for neighbour in [
             n for n, advertised in self._advertised.items() if advertised.gateway == gateway
         ]:
@@ -90,11 +89,9 @@ class EtxTree(GatewayRoutes):
         self._solicit()
 
     def _solicit(self) -> None:
-        if self._essentials is not None:
-            self._essentials.broadcast_packet(SOLICITATION_TYPE, b"")
+        self._essentials.broadcast_packet(SOLICITATION_TYPE, b"")
 
     def _rank(self, gateway: int) -> int:
-        assert self._essentials is not None
         if not self._essentials.get_connected_to_gateway():
             return 0  # otherwise nodes without a gateway would raise each other's ranks for ever
         if gateway == self._essentials.get_node_id():
@@ -102,5 +99,5 @@ class EtxTree(GatewayRoutes):
         parent = self.next_hop_to_gateway(gateway)
         if parent == NO_ROUTE:
             return 0
-        rank = self._advertised[parent].rank + RANK_PER_ETX * self.links.etx(parent)
+        rank = self._advertised[parent].rank + RANK_PER_ETX * self.etx(parent)
         return min(round(rank), MAX_RANK)

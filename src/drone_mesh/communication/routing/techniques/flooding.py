@@ -38,7 +38,6 @@ class Flooding(ChildTableTree):
             self._hops[from_] = messages.hops(payload)
             return True
         essentials = self._essentials
-        assert essentials is not None
         now_s, copy = essentials.now_s(), _identity(payload, kind)
         self._heard_s[creator] = now_s
         circulates_s = essentials.medium.stretched(CIRCULATION_S)
@@ -65,7 +64,7 @@ class Flooding(ChildTableTree):
         children = self.get_set_of_children()
         if node in children:
             return node
-        if self._essentials is None or not children:
+        if not children:
             return NO_ROUTE
         if self._essentials.now_s() - self._heard_s.get(node, -math.inf) > REACHABLE_S:
             return NO_ROUTE

@@ -11,26 +11,6 @@ ETX_GAIN = 0.1  # weight of a new sample; CTP (TEP 123) uses the same exponentia
 WORST_ETX = 16.0  # worse links count as this value
 
 
-class LinkCosts:
-    """Expected transmissions (ETX, De Couto et al., 2003) per packet to each neighbour.
-
-    Called only by the technique that owns it.
-    """
-
-    def __init__(self) -> None:
-        self._etx: dict[int, float] = {}
-
-    def sent(self, neighbour: int, ok: bool, transmissions: int) -> None:
-        """A packet took this many transmissions; one that was given up counts twice as many."""
-        sample = min(float(transmissions if ok else 2 * transmissions), WORST_ETX)
-        before = self._etx.get(neighbour, 1.0)
-        self._etx[neighbour] = before + ETX_GAIN * (sample - before)
-
-    def etx(self, neighbour: int) -> float:
-        """The ETX; 1.0 for a link that never lost a packet or had no traffic yet."""
-        return self._etx.get(neighbour, 1.0)
-
-
 def newer_by(sequence: int, other: int) -> int:
     """The distance from `other` to `sequence` on a circle of 2**16; negative: it is older."""
     return (sequence - other + 2**15) % 2**16 - 2**15
@@ -46,7 +26,7 @@ class GatewayRoutes(ChildTableTree):
 
     def __init__(self) -> None:
         super().__init__()
-        self.links = LinkCosts()
+        self._etx: dict[int, float] = {}
 
     @abc.abstractmethod
     def next_hop_to_gateway(self, gateway: int) -> int:
@@ -62,26 +42,31 @@ class GatewayRoutes(ChildTableTree):
 
     def on_time(self, now_s: float) -> None:
         """Advertise what has changed: PRESENT carries it, where the technique says so."""
-        assert self._essentials is not None
         self._essentials.search_other_nodes_in_range()
 
     def get_direction_to_node(self, node: int) -> int:
-        """The next hop for `node`, or NO_ROUTE."""
         to = self.next_hop_to_gateway(node)
         return to if to != NO_ROUTE else super().get_direction_to_node(node)
 
+    def etx(self, neighbour: int) -> float:
+        """Expected transmissions per packet to a neighbour (De Couto et al., 2003).
+
+        1.0 for a link that never lost a packet or had no traffic yet.
+        """
+        return self._etx.get(neighbour, 1.0)
+
     def sent(self, neighbour: int, ok: bool, transmissions: int) -> None:
-        """Measure the link; otherwise like the tree."""
-        self.links.sent(neighbour, ok, transmissions)
+        """Measure the link; a packet that was given up counts twice."""
+        sample = min(float(transmissions if ok else 2 * transmissions), WORST_ETX)
+        before = self.etx(neighbour)
+        self._etx[neighbour] = before + ETX_GAIN * (sample - before)
         super().sent(neighbour, ok, transmissions)
 
     def cant_communicate_with_node(self, node: int) -> int:
-        """Neighbour `node` did not take a packet."""
         self.forget_neighbour(node)
         return super().cant_communicate_with_node(node)
 
     def gateway_lost(self, gateway: int) -> bool:
-        """The gateway no longer answers."""
         self.forget_gateway(gateway)
         return super().gateway_lost(gateway)
 
