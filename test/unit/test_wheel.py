@@ -37,7 +37,7 @@ def installed(tmp_path):
     checkout.mkdir()  # building leaves files in the checkout that it builds from
     for name in FILES:
         shutil.copy(ROOT / name, checkout / name)
-    for name in ("config", "requirements", "src"):
+    for name in ("config", "nodes", "requirements", "src"):
         ignored = shutil.ignore_patterns("*.egg-info", "__pycache__")
         shutil.copytree(ROOT / name, checkout / name, ignore=ignored)
     pip = (sys.executable, "-m", "pip", "--disable-pip-version-check")
