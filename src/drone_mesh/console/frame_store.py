@@ -42,7 +42,8 @@ from drone_mesh.view.scene import shape_named
 
 EVENTS_KEPT = 1000  # more than a person scrolls back
 EVENTS_PER_FRAME = 300  # of a burst of thousands only the newest are read
-SAMPLES_KEPT = 600  # ten minutes
+CHARTS_S = 600.0  # simulated
+SAMPLES_KEPT = 600
 SAMPLE_PERIOD_S = 1.0  # wall time
 NOTHING_MORE: Mapping[int, Mapping[str, Any]] = {}
 
@@ -139,19 +140,22 @@ class FrameStore:
         self._replace("alarms", self._alarms.groups())
         if self.history is not None:
             self.history.add_events(events)
-        for event in events:
-            self._events.append(
-                (
-                    self.version,
-                    {
-                        "t": round(event.stamp_s, 2),
-                        "node": event.node,
-                        "kind": event.kind,
-                        "peers": list(event.peers),
-                        "detail": event.explanation(),
-                    },
-                )
+        self._show_events(events)
+
+    def _show_events(self, events: Iterable[EventRecord]) -> None:
+        self._events.extend(
+            (
+                self.version,
+                {
+                    "t": round(event.stamp_s, 2),
+                    "node": event.node,
+                    "kind": event.kind,
+                    "peers": list(event.peers),
+                    "detail": event.explanation(),
+                },
             )
+            for event in events
+        )
 
     def expect_orders(self, drones: Iterable[int]) -> int:
         """An order to these drones is being sent; returns a ticket for `forget_expected`."""
@@ -190,38 +194,29 @@ class FrameStore:
         self._next_version()
         self._forget_run()
         self._mesh = None
-        self._samples.extend((self.version, sample) for sample in samples[-SAMPLES_KEPT:])
+        recent = [s for s in samples if s.stamp_s > samples[-1].stamp_s - CHARTS_S]
+        step = math.ceil(len(recent) / SAMPLES_KEPT) or 1
+        self._samples.extend((self.version, sample) for sample in recent[::-step][::-1])
         self._sampled_at_s = float("-inf")
 
-    @property
-    def noted_at(self) -> int:
-        """The version in which the latest event came or the alarms changed."""
-        return max(self._complete["alarms"][0], self._events[-1][0] if self._events else 0)
-
     def saved(self) -> dict[str, Any]:
-        """What cannot be seen in the next state, as plain values that `restore` reads."""
-        return {
-            "events": [event for _version, event in self._events],
-            "samples": [list(astuple(sample)) for _version, sample in self._samples],
-            "alarms": self._alarms.saved(),
-            "orders": self._orders.saved(),
-        }
+        """What neither the next state nor the history tells, as plain values for `restore`."""
+        return {"alarms": self._alarms.saved(), "orders": self._orders.saved()}
 
-    def restore(self, saved: Mapping[str, Any]) -> None:
+    def restore(
+        self,
+        saved: Mapping[str, Any],
+        events: Sequence[EventRecord],
+        samples: Sequence[MeshSample],
+    ) -> None:
         """Go on with what a console before this one saved in the same run.
 
         Raises KeyError, TypeError or ValueError if it is no such thing.
         """
-        events = [_restored_event(event) for event in saved["events"]]
-        samples = [MeshSample(*sample) for sample in saved["samples"]]
+        self.restart(samples)
         self._alarms.restore(saved["alarms"])
         self._orders.restore(saved["orders"])
-        self._next_version()
-        self._run_began_at = self.version  # pages begin anew: these come before what they have
-        before = [(self.version, event) for event in events]
-        self._events = deque([*before, *self._events], maxlen=EVENTS_KEPT)
-        earlier = [(self.version, sample) for sample in samples]
-        self._samples = deque([*earlier, *self._samples], maxlen=SAMPLES_KEPT)
+        self._show_events(events)
         self._replace("alarms", self._alarms.groups())
 
     def set_story(self, story: Mapping[str, Any]) -> None:
@@ -354,16 +349,6 @@ def _fields(node: NodeStatus, trouble: Trouble | None) -> dict[str, Any]:
         "data": data_in_words(node),
         "trouble": trouble.text if trouble else "",
         "severity": int(trouble.severity) if trouble else 0,
-    }
-
-
-def _restored_event(event: Mapping[str, Any]) -> dict[str, Any]:
-    return {
-        "t": float(event["t"]),
-        "node": int(event["node"]),
-        "kind": str(event["kind"]),
-        "peers": list(map(int, event["peers"])),
-        "detail": str(event["detail"]),
     }
 
 

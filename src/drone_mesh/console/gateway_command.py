@@ -15,6 +15,7 @@ from drone_mesh.console import DEFAULT_PORT
 from drone_mesh.console.frame_store import FrameStore
 from drone_mesh.console.gateway_client import GatewayClient, GatewayControls
 from drone_mesh.console.history import History
+from drone_mesh.console.memory import ConsoleMemory, memory_of
 from drone_mesh.console.page_token import PageToken
 from drone_mesh.console.real_mesh import events_of, origin_of, real_mesh
 from drone_mesh.console.runner import ConsoleRunner
@@ -34,11 +35,15 @@ PAGE_TOKEN = "DRONE_MESH_CONSOLE_TOKEN"
 class GatewayFeed:
     """Polls the gateway once a second and passes its answers to the store. One thread."""
 
-    def __init__(self, client: GatewayClient, store: FrameStore, runner: ConsoleRunner) -> None:
+    def __init__(
+        self, client: GatewayClient, store: FrameStore, runner: ConsoleRunner, memory: ConsoleMemory
+    ) -> None:
         self._client = client
         self._store = store
         self._runner = runner
+        self._memory = memory
         self._seen = 0  # number of the last event
+        self._run: str | None = None  # of the gateway, from its start to its end
         self._uptime_s = 0.0
 
     def ask(self) -> None:
@@ -47,8 +52,13 @@ class GatewayFeed:
             answer = self._client.mesh(self._seen)
             mesh, more = real_mesh(answer)
             origin = origin_of(answer)
-            events = events_of(answer)
-            last = max((int(event["number"]) for event in answer["events"]), default=self._seen)
+            run = str(answer.get("run", ""))  # an older gateway does not tell
+            is_new = run != self._run or mesh.stamp_s < self._uptime_s
+            seen = self._memory.seen_in(run) if is_new else self._seen
+            told = answer["events"] if not (is_new and self._seen) else ()  # of another run
+            told = [event for event in told if int(event["number"]) > seen]
+            events = events_of({"events": told})
+            seen = max((int(event["number"]) for event in told), default=seen)
         except NoAnswer as error:
             self._runner.in_loop(partial(self._store.set_link, str(error)))
             return
@@ -56,17 +66,20 @@ class GatewayFeed:
             text = f"{self._client.url}: invalid answer: {error!r}"
             self._runner.in_loop(partial(self._store.set_link, text))
             return
-        if mesh.stamp_s < self._uptime_s:  # restarted: its events count from 1 again
-            self._seen, last, events = 0, 0, []
-        self._seen, self._uptime_s = last, mesh.stamp_s
+        self._seen, self._run, self._uptime_s = seen, run, mesh.stamp_s
 
         def show() -> None:
+            if is_new:
+                self._memory.recall(run)
             self._store.origin = origin
             self._store.update_mesh(mesh, time.monotonic(), more)
             if events:
                 self._store.add_events(events)
+            self._memory.seen = seen
+            self._memory.collect()
 
         self._runner.in_loop(show)
+        self._memory.save()
 
 
 @ends_as("drone_mesh_console")
@@ -86,9 +99,10 @@ def main(
         access = token.access(options.bind)
         server = ConsoleServer(store, controls, access, actions=controls.ACTIONS, tiles=tiles)
         runner = ConsoleRunner(server, options.bind, options.port)
+        memory = ConsoleMemory(store, memory_of(options.port))
         runner.start()
         print(token.greeting(options.bind, runner.port), flush=True)
-        feed = GatewayFeed(client, store, runner)
+        feed = GatewayFeed(client, store, runner, memory)
         try:
             feed.ask()
             while not stop.wait(ASK_PERIOD_S):

@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import bisect
+import json
 import math
-import pickle
 import zlib
-from typing import Any, Iterable, Sequence
+from dataclasses import fields, replace
+from typing import Any, Iterable, NamedTuple, Sequence
 
 from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.console.dots import RecordedDots
-from drone_mesh.state.model import EventRecord, MeshStatus
+from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus, ObstacleStatus
 from drone_mesh.state.outages import MeshSample, take_sample
 
 KEPT_S = 1800.0  # simulated
 KEPT_BYTES = 64_000_000  # 254 nodes with 200 neighbours each need some 20 kB per state
 PERIOD_S = 0.4  # wall, between two states of a live run
 MOST_MARKS = 400
+_OF_BYTES = [at for at, field in enumerate(fields(NodeStatus)) if field.default == b""]
 _MARKED = {
     MeshEventKind.POWER_OFF.value: "off",
     MeshEventKind.POWER_ON.value: "on",
@@ -25,10 +27,35 @@ _MARKED = {
 }
 
 
+class KeptState(NamedTuple):
+    """A state in its compressed form, and what charts show of it."""
+
+    stamp_s: float
+    packed: bytes
+    sample: MeshSample
+
+
+def packed(mesh: MeshStatus) -> bytes:
+    """A state in a compressed form. Any thread."""
+    return zlib.compress(json.dumps(mesh, default=_plain, separators=(",", ":")).encode(), 1)
+
+
 def unpacked(state: bytes) -> MeshStatus:
-    """The state in a compressed form that a History keeps. Any thread."""
-    mesh: MeshStatus = pickle.loads(zlib.decompress(state))
-    return mesh
+    """The state in such a compressed form. Any thread. Raises TypeError or ValueError."""
+    mesh = MeshStatus(*json.loads(zlib.decompress(state)))
+    nodes = [NodeStatus(*_with_bytes(values)) for values in mesh.nodes]
+    return replace(mesh, nodes=nodes, obstacles=[ObstacleStatus(*box) for box in mesh.obstacles])
+
+
+def _plain(value: Any) -> Any:
+    """The values of an object in the order of its fields; of bytes their hexadecimal digits."""
+    return value.hex() if isinstance(value, bytes) else list(vars(value).values())
+
+
+def _with_bytes(values: list[Any]) -> list[Any]:
+    for at in _OF_BYTES:
+        values[at] = bytes.fromhex(values[at])
+    return values
 
 
 class History:
@@ -36,9 +63,10 @@ class History:
 
     def __init__(self, kept_s: float = KEPT_S, kept_bytes: float = KEPT_BYTES) -> None:
         self._kept_s, self._kept_bytes = kept_s, kept_bytes
-        self._clear()
+        self.clear()
 
-    def _clear(self) -> None:
+    def clear(self) -> None:
+        """Forget everything: a new run begins."""
         self._states: list[bytes] = []
         self._bytes = 0
         self._added_at_s = -math.inf  # wall
@@ -46,6 +74,7 @@ class History:
         self._samples: list[MeshSample] = []  # one per state
         self._events: list[EventRecord] = []  # oldest first
         self._event_times: list[float] = []
+        self._events_forgotten = 0
         self._packets: list[RecordedDots] = []  # oldest first
         self._packet_times: list[float] = []
         self.marks: list[dict[str, Any]] = []  # what a time line shows: t, node and kind
@@ -67,7 +96,7 @@ class History:
     def add(self, mesh: MeshStatus, wall_s: float) -> None:
         """Add a state of a live run unless the last is too recent. A new run clears the history."""
         if self.times and mesh.stamp_s < self.times[-1]:
-            self._clear()
+            self.clear()
         stands_still = bool(self.times) and mesh.stamp_s == self.times[-1]
         if stands_still or wall_s - self._added_at_s < PERIOD_S:
             return
@@ -127,12 +156,30 @@ class History:
         """The samples for charts, up to this time."""
         return self._samples[: bisect.bisect_right(self.times, at_s)]
 
+    def states_after(self, at_s: float) -> list[KeptState]:
+        """The states after this time."""
+        first = bisect.bisect_right(self.times, at_s)
+        kept = zip(self.times[first:], self._states[first:], self._samples[first:])
+        return list(map(KeptState._make, kept))
+
+    def events_after(self, number: int) -> tuple[int, Sequence[EventRecord]]:
+        """How many events of this run were added so far, and those after this number of them."""
+        forgotten = self._events_forgotten
+        return forgotten + len(self._events), self._events[max(0, number - forgotten) :]
+
+    def restore(self, states: Iterable[KeptState]) -> None:
+        """Put these before all that is added, oldest first."""
+        for state in states:
+            self._keep(state)
+
     def _append(self, mesh: MeshStatus) -> None:
-        packed = zlib.compress(pickle.dumps(mesh), 1)
-        self._states.append(packed)
-        self._bytes += len(packed)
-        self.times.append(mesh.stamp_s)
-        self._samples.append(take_sample(mesh))
+        self._keep(KeptState(mesh.stamp_s, packed(mesh), take_sample(mesh)))
+
+    def _keep(self, state: KeptState) -> None:
+        self._states.append(state.packed)
+        self._bytes += len(state.packed)
+        self.times.append(state.stamp_s)
+        self._samples.append(state.sample)
 
     def _forget(self, states: int) -> None:
         """Drop the oldest `states` states."""
@@ -140,5 +187,6 @@ class History:
         for kept in (self._states, self.times, self._samples):
             del kept[:states]
         old = bisect.bisect_left(self._event_times, self.times[0])
+        self._events_forgotten += old
         del self._events[:old], self._event_times[:old]
         self.marks = [mark for mark in self.marks if mark["t"] >= self.times[0]]

@@ -6,6 +6,7 @@ import contextlib
 import dataclasses
 import logging
 import random
+import secrets
 import time
 from typing import Any, Callable
 
@@ -92,6 +93,7 @@ class RadioNode:
         )
         self.users.open(self.component.data)
         self._started = False
+        self._run = secrets.token_hex(8)  # tells this start of the node from others
         self._started_s = self._beat_s = time.monotonic()
 
     def submit(self, work: Work) -> None:
@@ -105,6 +107,7 @@ class RadioNode:
         report = mesh_report(component, self.engine, self._antenna.on(), self._origin, now_s)
         return {
             **report,
+            "run": self._run,
             "uptime_s": round(now_s - self._started_s, 2),
             "events": self.events.since(after, self._started_s),
         }

@@ -6,11 +6,12 @@ import json
 import math
 from dataclasses import replace
 
-from drone_mesh.console.frame_store import EVENTS_KEPT, EVENTS_PER_FRAME, FrameStore
+from drone_mesh.console.frame_store import EVENTS_PER_FRAME, SAMPLES_KEPT, FrameStore
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
 from drone_mesh.state.links import JUST_LOST_S
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus, ObstacleStatus
+from drone_mesh.state.outages import take_sample
 
 A, B = Location(3.0, 2.0, 0.0), Location(0.0, 0.0, 0.0)
 
@@ -287,50 +288,24 @@ def eventful_store() -> FrameStore:
     return store
 
 
-def test_a_console_goes_on_with_what_another_one_of_the_same_run_has_saved():
+def test_alarms_and_orders_go_on_with_what_another_store_has_saved():
     before = eventful_store()
     saved = json.loads(json.dumps(before.saved()))
     store = FrameStore()
-    store.add_events([EventRecord(50.0, 1, "landed")])  # before the first state
-    known = store.version
-    store.restore(saved)
+    store.restore(saved, [], [])
     store.update_mesh(mesh(51.0, connected=False), wall_s=0.0)
-    first = frame(store, known)
-    assert first["full"]
-    assert [event["kind"] for event in first["events"]] == [
-        "order sent",
-        "order given up",
-        "landed",
-    ]
+    first = frame(store, 0)
     assert first["alarms"] == frame(before, 0)["alarms"]
     assert [alarm["since"] for alarm in first["alarms"]] == [41.0, 40.0]
-    assert [sample["stamp_s"] for sample in first["samples"]] == [1.0, 40.0, 51.0]
     assert first["nodes"]["1"]["order"].startswith("order 7 to x 2.00 m, y 3.00 m, z 0 m: given up")
     store.update_mesh(mesh(60.0), wall_s=2.0)  # an acknowledged alarm that is over goes
     assert [alarm["since"] for alarm in frame(store, 0)["alarms"]] == [41.0]
 
 
-def test_what_a_console_goes_on_with_is_bounded():
-    before = FrameStore()
-    before.add_events([EventRecord(float(n), 1, "landed") for n in range(EVENTS_KEPT + 9)])
+def test_charts_begin_with_ten_minutes_of_the_samples_that_a_store_is_given():
+    samples = [take_sample(mesh(float(half) / 2)) for half in range(3001)]
     store = FrameStore()
-    store.add_events([EventRecord(2000.0, 1, "landed")])
-    store.update_mesh(mesh(2000.0), wall_s=0.0)
-    before.update_mesh(mesh(9.0), wall_s=0.0)
-    store.restore(before.saved())
-    assert [sample["stamp_s"] for sample in frame(store, 0)["samples"]] == [9.0, 2000.0]
-    times = [event["t"] for event in store.saved()["events"]]
-    assert (len(times), times[0], times[-1]) == (EVENTS_KEPT, 10.0, 2000.0)
-
-
-def test_an_event_or_an_alarm_is_worth_saving_and_a_state_is_not():
-    store = FrameStore()
-    store.update_mesh(mesh(), wall_s=0.0)
-    noted_at = store.noted_at
-    store.update_mesh(mesh(1.2, hops=2), wall_s=0.2)
-    assert store.noted_at == noted_at
-    store.add_events([EventRecord(1.3, 1, "landed")])
-    landed_at = store.noted_at
-    assert landed_at > noted_at
-    store.update_mesh(mesh(1.4, connected=False), wall_s=0.4)
-    assert store.noted_at > landed_at
+    store.restart(samples)
+    store.update_mesh(mesh(1500.5), wall_s=0.0)
+    stamps = [sample["stamp_s"] for sample in frame(store, 0)["samples"]]
+    assert (stamps[0], stamps[-2:], len(stamps)) == (902.0, [1500.0, 1500.5], SAMPLES_KEPT)

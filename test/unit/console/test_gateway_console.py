@@ -15,6 +15,8 @@ from drone_mesh.console.controls import OrderRefused
 from drone_mesh.console.frame_store import FrameStore
 from drone_mesh.console.gateway_client import GatewayClient, GatewayControls
 from drone_mesh.console.gateway_command import GatewayFeed, main
+from drone_mesh.console.history import History
+from drone_mesh.console.memory import ConsoleMemory
 from drone_mesh.console.real_mesh import origin_of
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.errors import ConfigurationError
@@ -37,7 +39,7 @@ NODE = {
     "earth": [52.0, 5.0, 3.0],
 }
 EVENT = {"number": 7, "t": 1.5, "node": 0, "kind": "started", "peers": [], "detail": ""}
-MESH = {"gateway": 0, "uptime_s": 60.0, "nodes": [NODE], "events": [EVENT]}
+MESH = {"gateway": 0, "run": "a1b2", "uptime_s": 60.0, "nodes": [NODE], "events": [EVENT]}
 
 
 class Gateway(HTTPServer):
@@ -88,13 +90,18 @@ class PromptRunner:
         function()
 
 
+def feed_of(gateway_url, store, path=None, token=""):
+    memory = ConsoleMemory(store, path)
+    return GatewayFeed(GatewayClient(gateway_url, token), store, PromptRunner(), memory)
+
+
 def frame(store):
     return json.loads(store.frame_since(0))
 
 
 def test_each_request_asks_for_the_events_after_the_last_one(gateway):
-    store = FrameStore()
-    feed = GatewayFeed(GatewayClient(gateway.url, "secret"), store, PromptRunner())
+    store = FrameStore(History())
+    feed = feed_of(gateway.url, store, token="secret")
     feed.ask()
     feed.ask()
     assert gateway.requests == [
@@ -119,8 +126,8 @@ def test_the_battery_and_the_reason_not_to_fly_are_fields_and_a_trouble(gateway)
         "tries": 1.5,
     }
     gateway.answer = {**MESH, "nodes": [NODE, drone]}
-    store = FrameStore()
-    GatewayFeed(GatewayClient(gateway.url), store, PromptRunner()).ask()
+    store = FrameStore(History())
+    feed_of(gateway.url, store).ask()
     shown = frame(store)["nodes"]["4"]
     assert (shown["battery"], shown["channel"]) == (4, "1.5 tries per packet")
     assert shown["why_not_fly"] == "battery at 4 %, below --min-battery 30"
@@ -129,7 +136,7 @@ def test_the_battery_and_the_reason_not_to_fly_are_fields_and_a_trouble(gateway)
 
 
 def test_a_gateway_that_was_restarted_is_asked_from_the_start(gateway):
-    feed = GatewayFeed(GatewayClient(gateway.url), FrameStore(), PromptRunner())
+    feed = feed_of(gateway.url, FrameStore(History()))
     feed.ask()
     gateway.answer = {**MESH, "uptime_s": 3.0, "events": []}
     feed.ask()
@@ -139,6 +146,30 @@ def test_a_gateway_that_was_restarted_is_asked_from_the_start(gateway):
         "/mesh?after=7",
         "/mesh?after=0",
     ]
+
+
+def test_a_console_that_was_restarted_goes_on_where_it_was(gateway, tmp_path):
+    path = tmp_path / "console.sqlite"
+    before = feed_of(gateway.url, FrameStore(History()), path)
+    before.ask()
+    gateway.answer = {**MESH, "uptime_s": 70.0, "events": [EVENT, {**EVENT, "number": 8}]}
+    store = FrameStore(History())
+    feed = feed_of(gateway.url, store, path)
+    feed.ask()
+    assert len(frame(store)["events"]) == 2  # what happened while it was away, once
+    assert store.history.times == [60.0, 70.0]
+    feed.ask()
+    assert gateway.requests[-1][1] == "/mesh?after=8"
+
+
+def test_of_a_gateway_that_was_restarted_meanwhile_nothing_old_is_shown(gateway, tmp_path):
+    path = tmp_path / "console.sqlite"
+    feed_of(gateway.url, FrameStore(History()), path).ask()
+    gateway.answer = {**MESH, "run": "c3d4", "uptime_s": 90.0, "events": []}
+    store = FrameStore(History())
+    feed_of(gateway.url, store, path).ask()
+    assert "events" not in frame(store)
+    assert store.history.times == [90.0]
 
 
 @pytest.mark.parametrize(
@@ -152,14 +183,14 @@ def test_a_gateway_that_was_restarted_is_asked_from_the_start(gateway):
 )
 def test_a_gateway_with_an_invalid_answer_is_named_on_the_page(gateway, status, answer, said):
     gateway.status, gateway.answer = status, answer
-    store = FrameStore()
-    GatewayFeed(GatewayClient(gateway.url), store, PromptRunner()).ask()
+    store = FrameStore(History())
+    feed_of(gateway.url, store).ask()
     assert said in frame(store)["link"]
 
 
 def test_a_gateway_that_does_not_answer_is_named_on_the_page():
-    store = FrameStore()
-    GatewayFeed(GatewayClient("http://127.0.0.1:1"), store, PromptRunner()).ask()
+    store = FrameStore(History())
+    feed_of("http://127.0.0.1:1", store).ask()
     assert frame(store)["link"].startswith("no answer from http://127.0.0.1:1")
 
 

@@ -7,7 +7,7 @@ import json
 from drone_mesh.console.frame_store import FrameStore
 from drone_mesh.console.history import History
 from drone_mesh.console.player import Player
-from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
+from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus, ObstacleStatus
 
 
 def mesh(stamp_s: float, hops: int = 1, size: int = 1) -> MeshStatus:
@@ -31,9 +31,17 @@ def test_a_state_comes_back_as_it_was():
         3.0,
         [
             NodeStatus(
-                4, position=(1.0, 2.0, 0.5), neighbours=b"\x01", battery=80.0, fallback_age=1.5
+                4,
+                position=[1.0, 2.0, 0.5],
+                path=[],
+                heading=[2.0, 2.0, 0.5],
+                neighbours=b"\x01",
+                battery=80.0,
+                fallback_age=1.5,
             )
         ],
+        obstacles=[ObstacleStatus([1.0, 2.0, 0.0], [1.0, 1.0, 3.0], 0.5)],
+        layouts=["202: 1 of 9"],
     )
     history.add(given, wall_s=0.0)
     assert history.state(0) == given

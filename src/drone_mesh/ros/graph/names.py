@@ -46,7 +46,6 @@ REMOVE_DRONE_SERVICE = "DroneFactory/removeDrone"  # RemoveDrone
 PROGRESS_TOPIC = "mesh/progress"  # HostProgress: progress of a host in another process
 SIM_TIME_PARAM = "/use_sim_time"  # one for all nodes of a master
 FLEET_PARAM = "drone_mesh/fleet"  # the factory's configuration, for hosts in other processes
-CONSOLE_MEMORY_PARAM = "drone_mesh/console_memory"  # what a restarted console goes on with
 DRONES_PARAM = "drone_mesh/drones"  # the ids of the present drones, see fleet_parameter.py
 
 REPORTS_TOPIC = "mesh/reports"  # HostReport: each process that hosts nodes -> DroneFactory

@@ -16,6 +16,7 @@ from drone_mesh.console.controls import MeshControls, RecordingControls
 from drone_mesh.console.dots import make_dots
 from drone_mesh.console.frame_store import FrameStore
 from drone_mesh.console.history import History
+from drone_mesh.console.memory import ConsoleMemory, memory_of
 from drone_mesh.console.orders import LayoutOffer, places_of
 from drone_mesh.console.page_token import PageToken
 from drone_mesh.console.runner import ConsoleRunner
@@ -33,7 +34,6 @@ from drone_mesh.ros.graph.master_watch import MasterWatch
 from drone_mesh.ros.graph.parameters import earth_origin, manager_layouts
 from drone_mesh.ros.graph.run import Run, run_of
 from drone_mesh.ros.views.console_controls import RosControls
-from drone_mesh.ros.views.console_memory import ConsoleMemory
 from drone_mesh.ros.views.recording import Recording
 from drone_mesh.ros.views.state_source import OLD_STATE_S
 from drone_mesh.secret_file import read_secret
@@ -201,7 +201,7 @@ def _run() -> int:
         if reading is not None:
             reading.start()
         MasterWatch().start()
-        memory = ConsoleMemory(store) if whole is None else None
+        memory = ConsoleMemory(store, memory_of(port)) if whole is None else None
         MeshFeed(store, server, runner, memory).watch(stop)
     finally:
         if reading is not None:
