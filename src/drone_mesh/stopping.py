@@ -1,4 +1,4 @@
-"""How programs end: StopRequest, errors, Ctrl-C, and a reader that has closed the pipe."""
+"""How programs start and end: a missing extra, StopRequest, errors, Ctrl-C, a closed pipe."""
 
 from __future__ import annotations
 
@@ -12,6 +12,23 @@ import threading
 from typing import Any, Callable, Iterator, TypeVar, cast
 
 from drone_mesh.errors import MeshError
+
+
+def run_with_extra(program: str, extra: str, load: Callable[[], Callable[[], int]]) -> int:
+    """Run what `load` imports; the exit status, 1 if a package is missing."""
+    before = signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C leaves no traceback
+    try:
+        main = load()
+    except ImportError as error:
+        print(
+            f"{program} needs the Python package {error.name}: pip install 'drone_mesh[{extra}]'",
+            file=sys.stderr,
+        )
+        return 1
+    finally:
+        signal.signal(signal.SIGINT, before)
+    return main()
+
 
 INTERRUPTED = 130  # exit status, as in a shell for SIGINT
 CLOSED_PIPE = 141  # as in a shell for SIGPIPE

@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from drone_mesh.drone.geodesy import EarthPlace
 from drone_mesh.drone.mavlink.autopilots import ARDUPILOT
-from drone_mesh.drone.mavlink.lines import Line, open_line
+from drone_mesh.drone.mavlink.link import Line, open_line
 from drone_mesh.drone.mavlink.telemetry import Message
 from drone_mesh.errors import MeshError
 

@@ -15,7 +15,6 @@ class Mode(enum.Enum):
     PILOT = "its pilot flies"
     HOLD = "holds its position"
     FOLLOW = "follows targets"  # GUIDED, OFFBOARD
-    MISSION = "flies its mission"
     TAKE_OFF = "takes off"  # PX4 only
     LAND = "lands"
     RETURN = "returns home and lands"
@@ -26,7 +25,6 @@ _NUMBERS = {
         Mode.PILOT: mavlink.COPTER_MODE_STABILIZE,
         Mode.HOLD: mavlink.COPTER_MODE_LOITER,
         Mode.FOLLOW: mavlink.COPTER_MODE_GUIDED,
-        Mode.MISSION: mavlink.COPTER_MODE_AUTO,
         Mode.LAND: mavlink.COPTER_MODE_LAND,
         Mode.RETURN: mavlink.COPTER_MODE_RTL,
     },
@@ -34,7 +32,6 @@ _NUMBERS = {
         Mode.PILOT: px4_mode(3),
         Mode.HOLD: px4_mode(4, 3),
         Mode.FOLLOW: px4_mode(6),
-        Mode.MISSION: px4_mode(4, 4),
         Mode.TAKE_OFF: px4_mode(4, 2),
         Mode.LAND: px4_mode(4, 6),
         Mode.RETURN: px4_mode(4, 5),

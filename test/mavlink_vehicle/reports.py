@@ -18,7 +18,6 @@ from drone_mesh.drone.mavlink.telemetry import (
 )
 from mavlink_vehicle.body import Body, VehicleFaults
 from mavlink_vehicle.modes import Mode, mode_number
-from mavlink_vehicle.uploaded_mission import UploadedMission
 
 SENSORS = (
     mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO
@@ -31,7 +30,6 @@ SENSORS = (
 CAPABILITIES = (
     mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
     | mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
-    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT
     | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
 )
 FULL_CELL_MV, EMPTY_CELL_MV, CELLS = 4200, 3300, 4
@@ -45,7 +43,6 @@ class Reported(Protocol):
     body: Body
     faults: VehicleFaults
     mode: Mode
-    mission: UploadedMission
     in_failsafe: bool
     now_s: float
 
@@ -62,7 +59,6 @@ class Reports:
         self._makers: dict[int, Callable[[], Message]] = {
             mavlink.MAVLINK_MSG_ID_HEARTBEAT: self._heartbeat,
             mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: self._position,
-            mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: self._local_position,
             mavlink.MAVLINK_MSG_ID_GPS_RAW_INT: self._gps,
             vehicle.autopilot.estimate_message: estimate,
             mavlink.MAVLINK_MSG_ID_SYS_STATUS: self._status,
@@ -71,7 +67,6 @@ class Reports:
             mavlink.MAVLINK_MSG_ID_RC_CHANNELS: self._sticks,
             mavlink.MAVLINK_MSG_ID_VFR_HUD: self._hud,
             mavlink.MAVLINK_MSG_ID_ATTITUDE: self._attitude,
-            mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: lambda: vehicle.mission.report(),
         }
         # Two messages want it, and while the drone stands or hovers it is the same.
         self._on_earth = functools.lru_cache(maxsize=1)(vehicle.home.to_earth)
@@ -167,15 +162,6 @@ class Reports:
             round(east * 100),
             round(-up * 100),
             0,
-        )
-
-    def _local_position(self) -> Message:
-        """From home: north, east and down, in metres and metres per second."""
-        body = self._vehicle.body
-        north, east, up = body.velocity
-        latitude, longitude, height = body.place
-        return mavlink.MAVLink_local_position_ned_message(
-            self._ms(), latitude, longitude, -height, north, east, -up
         )
 
     def _gps(self) -> Message:

@@ -15,7 +15,6 @@ from mavlink_vehicle.body import LANDING_SPEED_M_S, Body, VehicleFaults
 from mavlink_vehicle.modes import Mode, mode_of
 from mavlink_vehicle.parameters import Parameters
 from mavlink_vehicle.reports import Reports
-from mavlink_vehicle.uploaded_mission import UploadedMission
 
 RETURN_HEIGHT_M = 15.0  # ArduPilot's RTL_ALT
 GROUND_STATION_LOST_S = 5.0  # ArduPilot's FS_GCS_TIMEOUT
@@ -58,12 +57,7 @@ class MavlinkVehicle:
         self._stands_since_s = math.inf
         self._lifts_s = -math.inf  # when the motors have spooled up
         self._ground_station_s = math.nan  # when its heartbeat was heard; NaN: never
-        # ArduPilot keeps home in item 0.
-        self.mission = UploadedMission(
-            self._send, self._place, lambda: self.now_s, 0 if autopilot is PX4 else 1
-        )
         self._reports = Reports(self, self._send)
-        mission = self.mission
         self._takes: dict[str, Callable[[Message], None]] = {
             "HEARTBEAT": self._take_heartbeat,
             "COMMAND_LONG": self._take_command,
@@ -74,13 +68,6 @@ class MavlinkVehicle:
             "PARAM_REQUEST_LIST": parameters.take_list_request,
             "PARAM_SET": parameters.take,
             "TIMESYNC": self._take_timesync,
-            "MISSION_REQUEST_LIST": mission.take_list_request,
-            "MISSION_REQUEST_INT": mission.take_request,
-            "MISSION_REQUEST": mission.take_request,
-            "MISSION_COUNT": mission.take_count,
-            "MISSION_ITEM_INT": mission.take_item,
-            "MISSION_CLEAR_ALL": mission.take_clear,
-            "MISSION_SET_CURRENT": mission.take_current,
         }
 
     # Actions of the human pilot --------------------------------------------------------------
@@ -112,7 +99,6 @@ class MavlinkVehicle:
         passed_s = min(1.0, max(0.0, now_s - self.now_s))
         self.now_s = now_s
         self._watch_for_failsafes()
-        self.mission.tick()
         self._fly(passed_s)
         for message in self._reports.due(now_s):
             self._send(message)
@@ -131,8 +117,6 @@ class MavlinkVehicle:
             target, speed_m_s = here._replace(height=0.0), LANDING_SPEED_M_S
         elif self.mode is Mode.RETURN:
             target, speed_m_s = self._way_home(here)
-        elif self.mode is Mode.MISSION:
-            target = self._next_way_point(here)
         elif self.mode in (Mode.PILOT, Mode.HOLD) and self._target is None:
             target = here
         if self.now_s < self._lifts_s:
@@ -140,22 +124,7 @@ class MavlinkVehicle:
         arrived = body.move(target, passed_s, speed_m_s)
         if self.mode is Mode.TAKE_OFF and arrived:
             self._enter(Mode.HOLD)
-        elif self.mode is Mode.MISSION and arrived and self.mission.item() is not None:
-            self.mission.arrived()
         self._disarm_on_ground()
-
-    def _next_way_point(self, here: Location) -> Location:
-        """Here, at the end of a mission: it hovers there. Enters the mode to land or to return."""
-        item = self.mission.item()
-        if item is None:
-            return here
-        if item.command == mavlink.MAV_CMD_NAV_LAND:
-            self._enter(Mode.LAND)
-        elif item.command == mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH:
-            self._enter(Mode.RETURN)
-        else:
-            return self.mission.target(item, here)
-        return here
 
     def _way_home(self, here: Location) -> tuple[Location, float]:
         above_home = Location(0.0, 0.0, max(RETURN_HEIGHT_M, here.height))
@@ -305,10 +274,6 @@ class MavlinkVehicle:
             return int(DENIED)
         if mode is Mode.FOLLOW and self.autopilot is PX4 and self.now_s - self._target_s > 1.0:
             return int(REJECTED)  # PX4 requires targets first
-        if mode is Mode.MISSION:
-            if self.mission.is_empty:
-                return int(DENIED)
-            self.mission.begin()
         self._enter(mode)
         return int(ACCEPTED)
 

@@ -91,11 +91,3 @@ def test_each_picture_is_shown_in_a_document():
     text = "".join(page.read_text(encoding="utf-8") for page in pages)
     for picture in (ROOT / "docs" / "pictures").iterdir():
         assert f"pictures/{picture.name})" in text, picture.name
-
-
-def test_a_citation_of_a_section_that_is_not_there_is_found():
-    assert wrong_citations('# docs/repair.md, "Flight" and\n# "Landing gear"') == [
-        'docs/repair.md, "Landing gear"'
-    ]
-    assert wrong_citations("see docs/nowhere.md") == ["docs/nowhere.md"]
-    assert wrong_citations('docs/repair.md, "Lost connection", "Negotiation" and "Flight".') == []

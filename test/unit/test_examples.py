@@ -41,12 +41,6 @@ def test_a_mesh_in_process_heals(run_example):
     assert "all nodes with a path are connected: True" in printed
 
 
-def test_ten_lines_are_enough_for_a_network():
-    lines = (ROOT / "examples" / "inprocess_network.py").read_text(encoding="utf-8").splitlines()
-    code = [line for line in lines if line and not line.startswith('"""')]
-    assert len(code) == 10
-
-
 def test_two_routing_techniques_are_compared_and_one_run_is_drawn(run_example, tmp_path):
     printed = run_example("own_routing.py", "--runs", "1", "--gridsize", "4", "--page", "run.html")
     rows = [line.split() for line in printed.splitlines()[1:3]]
@@ -94,11 +88,6 @@ def test_a_users_own_engine_is_chosen_by_name_and_flies(monkeypatch):
                 assert time.monotonic() < deadline, "the place never arrived"
                 time.sleep(0.01)
             assert engine.get_location() == Location(latitude=2.5, longitude=1.5, height=4.0)
-
-
-def test_a_users_own_engine_takes_forty_lines():
-    lines = (ROOT / "examples" / "own_engine.py").read_text(encoding="utf-8").splitlines()
-    assert len(lines) <= 40
 
 
 def test_a_users_own_repair_runs_beside_the_default(run_example):

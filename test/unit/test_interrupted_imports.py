@@ -10,8 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from drone_mesh.extras import run_with_extra
-from drone_mesh.stopping import INTERRUPTED, ends_as
+from drone_mesh.stopping import INTERRUPTED, ends_as, run_with_extra
 
 ROOT = Path(__file__).resolve().parents[2]
 # Python runs this module, if it is found, before each program.

@@ -50,16 +50,6 @@ def test_each_path_that_a_page_names_exists(page):
     assert [path for path, room in named if not is_there(path, room)] == []
 
 
-def test_a_module_that_moved_and_a_folder_that_went_are_found():
-    text = "| `air` | `box.py`, `gone.py` |\nSee `box.py` and `old/`, not `/Node/1` or `a.b`.\n"
-    named = named_paths(text)
-    assert [path for path, room in named if not is_there(path, room)] == [
-        "gone.py",
-        "box.py",
-        "old/",
-    ]
-
-
 def test_each_path_that_a_module_names_exists():
     """From the root, the package, or a folder above the module."""
     missing = []

@@ -45,7 +45,7 @@ OTHERS = {  # modules that parse no file of a user, and what it is instead
     "lab/plan": "its own memory",
     "lab/show": "its own memory",
     "lab/worker": "its own memory",
-    "nrf24/emulator/measured": "a file of this package",
+    "nrf24/emulator/links": "a file of this package",
     "console/history": "its own memory",
     "console/memory": "its own file",
     "ros/services/standing_layouts": "its own parameter",

@@ -9,8 +9,7 @@ from typing import Any, Dict, List, Tuple, Union
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from typing_extensions import Annotated, Literal
 
-from drone_mesh.air.box import CUT_DB, Box
-from drone_mesh.air.obstacles import Obstacles
+from drone_mesh.air.obstacles import CUT_DB, Box, Obstacles
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.yaml_file import YamlFile, read_mapping
 

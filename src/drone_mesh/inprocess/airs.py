@@ -10,9 +10,8 @@ from drone_mesh.inprocess.clock import VirtualClock
 from drone_mesh.inprocess.interfaces import IInProcessAir
 from drone_mesh.inprocess.radio import InProcessAir
 from drone_mesh.inprocess.shared_antenna import SharedChannel
-from drone_mesh.nrf24.emulator.fading import Fading
 from drone_mesh.nrf24.emulator.links import IdealDisc, LinkModel, LogDistance
-from drone_mesh.nrf24.emulator.space import Space
+from drone_mesh.nrf24.emulator.space import Fading, Space
 from drone_mesh.nrf24.settings import RadioSettings, data_rate
 
 

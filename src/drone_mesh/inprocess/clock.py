@@ -8,7 +8,7 @@ import math
 from collections import deque
 from typing import Any, Callable, Protocol, Tuple
 
-from drone_mesh.nrf24.airtime import NS_PER_S
+from drone_mesh.nrf24.registers import NS_PER_S
 
 Event = Tuple[float, float, Callable[[Any], None], Any]
 """Time, sequence number among events of the same time, function, argument."""

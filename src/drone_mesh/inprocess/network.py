@@ -39,8 +39,8 @@ from drone_mesh.inprocess.positions import PositionErrors, PositionReceiver
 from drone_mesh.inprocess.radio import HOP_DELAY_S
 from drone_mesh.inprocess.status import event_records, mesh_status
 from drone_mesh.mobility import Track
-from drone_mesh.nrf24.emulator.fading import RICIAN_K_DB
 from drone_mesh.nrf24.emulator.links import LinkModel
+from drone_mesh.nrf24.emulator.space import RICIAN_K_DB
 from drone_mesh.nrf24.settings import DEFAULT_RATE
 from drone_mesh.state.model import EventRecord, MeshStatus
 

@@ -20,10 +20,10 @@ from drone_mesh.drone.flight_path import Vector
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.inprocess.clock import VirtualClock
 from drone_mesh.inprocess.interfaces import IInProcessAir, IInProcessAntenna
-from drone_mesh.nrf24.airtime import NS_PER_S
 from drone_mesh.nrf24.emulator.air import CAPTURE_DB, RPD_DBM, RPD_NS
 from drone_mesh.nrf24.emulator.links import Hop, LinkModel
 from drone_mesh.nrf24.emulator.space import Space
+from drone_mesh.nrf24.registers import NS_PER_S
 from drone_mesh.nrf24.settings import RadioSettings
 
 MOST_GAIN_DB = 10.0  # Rayleigh fading exceeds it once in 22,000 blocks

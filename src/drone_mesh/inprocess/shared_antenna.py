@@ -21,8 +21,7 @@ from drone_mesh.communication.wire.messages import (
 from drone_mesh.inprocess.clock import VirtualClock
 from drone_mesh.inprocess.interfaces import Host
 from drone_mesh.inprocess.shared_air import SharedAir, SharedRadio, Transmission
-from drone_mesh.nrf24.airtime import NS_PER_S, SETTLING_NS, ard_s
-from drone_mesh.nrf24.registers import FIFO_DEPTH
+from drone_mesh.nrf24.registers import FIFO_DEPTH, NS_PER_S, SETTLING_NS, ard_s
 from drone_mesh.nrf24.transceiver import CE_PULSE_S, TX_DELAY_S
 
 SETTLING_S = SETTLING_NS / NS_PER_S

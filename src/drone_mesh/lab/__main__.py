@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import sys
 
-from drone_mesh.extras import Main, run_with_extra
+from drone_mesh.stopping import Main, run_with_extra
 
 
 def _load() -> Main:

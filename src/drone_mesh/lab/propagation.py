@@ -14,8 +14,8 @@ from drone_mesh.inprocess import Network
 from drone_mesh.lab import scenario as given
 from drone_mesh.lab.faults import Jam
 from drone_mesh.lab.impairments import Impairments
-from drone_mesh.nrf24.airtime import NS_PER_S
 from drone_mesh.nrf24.emulator.space import Noise, Space
+from drone_mesh.nrf24.registers import NS_PER_S
 from drone_mesh.nrf24.settings import RadioSettings
 
 MARGIN_STEP_DB = 0.1  # of the fading table

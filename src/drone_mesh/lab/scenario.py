@@ -6,9 +6,8 @@ from typing import ClassVar, Dict, FrozenSet, List, Optional, Tuple, Union
 from pydantic import Field, field_validator, model_validator
 from typing_extensions import Annotated, Literal
 
-from drone_mesh.air.box import CUT_DB
 from drone_mesh.air.obstacle_file import BoxRow
-from drone_mesh.air.obstacles import Obstacles
+from drone_mesh.air.obstacles import CUT_DB, Obstacles
 from drone_mesh.communication.node.node_configuration import DEFAULT_ROUTING
 from drone_mesh.communication.repair.options import DEFAULT_REPAIR, RANGE_M, RepairOptions
 from drone_mesh.communication.timing import MeshTiming
@@ -30,7 +29,7 @@ from drone_mesh.lab.faults import Fault
 from drone_mesh.mobility import Mobility
 from drone_mesh.mobility.settings import Knot
 from drone_mesh.mobility.settings import check as check_mobility
-from drone_mesh.nrf24.emulator.fading import RICIAN_K_DB
+from drone_mesh.nrf24.emulator.space import RICIAN_K_DB
 from drone_mesh.yaml_file import is_number
 
 _MODEL = ("speed_m_s", "height_m", "share", "gateways")

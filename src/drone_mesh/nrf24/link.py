@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Iterator, Mapping
 
 from drone_mesh.nrf24.errors import RadioError
+from drone_mesh.nrf24.pins import SpiDevice
 from drone_mesh.nrf24.registers import RF_DR_LOW, Command, Register
-from drone_mesh.nrf24.spi import SpiDevice
 
 _NO_CHIP = (0x00, 0xFF)  # STATUS if nothing drives MISO, or nothing is connected
 _BAD_SPI = "check wiring and supply, or use a slower SPI clock"

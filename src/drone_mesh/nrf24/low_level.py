@@ -16,9 +16,8 @@ from drone_mesh.channel.statistics import RadioStatistics
 from drone_mesh.communication.interfaces import PAYLOAD_BYTES
 from drone_mesh.communication.wire.packet_types import Priority
 from drone_mesh.nrf24.errors import RadioError
-from drone_mesh.nrf24.gpio import CePin, IrqPin
+from drone_mesh.nrf24.pins import CePin, IrqPin, SpiDevice
 from drone_mesh.nrf24.settings import RadioSettings
-from drone_mesh.nrf24.spi import SpiDevice
 from drone_mesh.nrf24.transceiver import PipePayload, Transceiver
 
 __all__ = ["NRF24LowLevelInterface"]  # for users; see docs/architecture.md

@@ -10,7 +10,6 @@ from drone_mesh.channel.access_rules import AccessRules
 from drone_mesh.communication.interfaces import BROADCAST, MAX_NODE_ID, PAYLOAD_BYTES
 from drone_mesh.communication.timing import Medium
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.nrf24.airtime import NS_PER_S, SETTLING_NS, frame_bits
 from drone_mesh.nrf24.registers import (
     ADDRESS_BYTES,
     ARC,
@@ -19,13 +18,16 @@ from drone_mesh.nrf24.registers import (
     CRCO,
     EN_CRC,
     EN_DYN_ACK,
+    NS_PER_S,
     PIPES,
     PRIM_RX,
     PWR_UP,
     RF_DR_HIGH,
     RF_DR_LOW,
     RF_PWR,
+    SETTLING_NS,
     Register,
+    frame_bits,
 )
 
 BROADCAST_PIPE = 1

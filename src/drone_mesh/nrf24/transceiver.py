@@ -9,10 +9,9 @@ from drone_mesh.channel.radio import Try
 from drone_mesh.channel.runtime import Runtime
 from drone_mesh.channel.statistics import RadioStatistics
 from drone_mesh.communication.interfaces import PAYLOAD_BYTES
-from drone_mesh.nrf24.airtime import ard_s
 from drone_mesh.nrf24.errors import RadioError
-from drone_mesh.nrf24.gpio import CePin
 from drone_mesh.nrf24.link import ChipLink
+from drone_mesh.nrf24.pins import CePin, SpiDevice
 from drone_mesh.nrf24.registers import (
     ADDRESS_BYTES,
     ARC,
@@ -31,6 +30,7 @@ from drone_mesh.nrf24.registers import (
     TX_DS,
     Command,
     Register,
+    ard_s,
 )
 from drone_mesh.nrf24.settings import (
     BROADCAST_PIPE,
@@ -39,7 +39,6 @@ from drone_mesh.nrf24.settings import (
     DataRate,
     RadioSettings,
 )
-from drone_mesh.nrf24.spi import SpiDevice
 
 POWER_UP_S = 5e-3  # Tpd2stby is up to 4.5 ms, depending on the crystal [DS Table 16]
 CE_PULSE_S = 20e-6  # Thce is 10 us; a pulse sends one packet and does not keep the chip in TX

@@ -8,10 +8,9 @@ from typing import NamedTuple
 
 from drone_mesh.channel.runtime import Runtime
 from drone_mesh.communication.interfaces import PAYLOAD_BYTES
-from drone_mesh.nrf24.airtime import ard_s
 from drone_mesh.nrf24.errors import RadioError
-from drone_mesh.nrf24.gpio import CePin
 from drone_mesh.nrf24.link import ChipLink
+from drone_mesh.nrf24.pins import CePin, SpiDevice
 from drone_mesh.nrf24.registers import (
     ARC,
     ARC_CNT,
@@ -23,9 +22,9 @@ from drone_mesh.nrf24.registers import (
     TX_DS,
     Command,
     Register,
+    ard_s,
 )
 from drone_mesh.nrf24.settings import RadioSettings
-from drone_mesh.nrf24.spi import SpiDevice
 from drone_mesh.nrf24.transceiver import POWER_UP_S
 
 TEST_TYPE = 255  # type of the field tools' packets; no node processes it

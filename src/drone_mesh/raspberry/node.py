@@ -20,14 +20,12 @@ from drone_mesh.errors import ConfigurationError, LocationUnknown
 from drone_mesh.execution import MeshExecutor, Work
 from drone_mesh.nrf24.high_level import NRF24HighLevelInterface
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
-from drone_mesh.raspberry.event_history import EventHistory
-from drone_mesh.raspberry.mesh_report import mesh_report
-from drone_mesh.raspberry.node_changes import NodeChanges
-from drone_mesh.raspberry.node_status import node_status
+from drone_mesh.raspberry.node_events import EventHistory, NodeChanges
+from drone_mesh.raspberry.node_reports import mesh_report, node_status
 from drone_mesh.raspberry.options import Options
 from drone_mesh.users.desk import UsersDesk
+from drone_mesh.users.local_client import socket_path
 from drone_mesh.users.local_socket import LocalSocket
-from drone_mesh.users.socket_path import socket_path
 
 ALIVE_WITHIN_S = 20.0  # two check periods, shorter than WatchdogSec of the units
 

@@ -22,10 +22,17 @@ from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError, MeshError, naming_argument
 from drone_mesh.internet.http_settings import HttpSettings
 from drone_mesh.nrf24.settings import DATA_RATES, BroadcastMode, RadioSettings, TxPower
-from drone_mesh.raspberry.air_options import AirOptions, add_air_options, air_options
+from drone_mesh.raspberry.connection_options import (
+    AirOptions,
+    MqttOptions,
+    add_air_options,
+    add_http_options,
+    add_mqtt_options,
+    air_options,
+    http_options,
+    mqtt_options,
+)
 from drone_mesh.raspberry.flight_options import add_flight_options, flight_options
-from drone_mesh.raspberry.http_options import add_http_options, http_options
-from drone_mesh.raspberry.mqtt_options import MqttOptions, add_mqtt_options, mqtt_options
 from drone_mesh.raspberry.wiring_options import (
     Hardware,
     add_channel_options,

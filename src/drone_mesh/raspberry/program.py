@@ -22,13 +22,17 @@ from drone_mesh.internet.on_demand import (
 )
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
 from drone_mesh.raspberry.drone_check import check_drone
-from drone_mesh.raspberry.emulated_air import EmulatedAir
-from drone_mesh.raspberry.event_history import EventHistory
+from drone_mesh.raspberry.emulated_air import (
+    EmulatedAir,
+    joining_node,
+    node_with_drone,
+    serving_node,
+)
 from drone_mesh.raspberry.mesh_record import MeshRecord
 from drone_mesh.raspberry.node import MakeInternet, RadioNode
-from drone_mesh.raspberry.node_status import one_line
+from drone_mesh.raspberry.node_events import EventHistory
+from drone_mesh.raspberry.node_reports import one_line
 from drone_mesh.raspberry.options import CHECK_DRONE, Options, parse_gateway, parse_router
-from drone_mesh.raspberry.served_air import joining_node, node_with_drone, serving_node
 from drone_mesh.raspberry.service_manager import ServiceManager
 from drone_mesh.stopping import StopRequest, ends_as
 from drone_mesh.users.local_socket import warn_of_unreachable

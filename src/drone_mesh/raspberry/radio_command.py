@@ -21,13 +21,12 @@ from drone_mesh.nrf24.emulator.air import Air
 from drone_mesh.nrf24.emulator.chip import EmulatedChip
 from drone_mesh.nrf24.emulator.clock import WallClock
 from drone_mesh.nrf24.emulator.links import LogDistance
-from drone_mesh.nrf24.emulator.pcapng import LINKTYPE_PAYLOADS, CapturedPacket, PcapngWriter
-from drone_mesh.nrf24.gpio import CePin, IrqPin
+from drone_mesh.nrf24.emulator.trace import LINKTYPE_PAYLOADS, CapturedPacket, PcapngWriter
+from drone_mesh.nrf24.pins import CePin, IrqPin, SpiDevice
 from drone_mesh.nrf24.settings import DATA_RATES, RadioSettings
-from drone_mesh.nrf24.spi import SpiDevice
 from drone_mesh.raspberry import radio_tests, range_test
 from drone_mesh.raspberry.field_radio import FieldRadio
-from drone_mesh.raspberry.node_status import version
+from drone_mesh.raspberry.node_reports import version
 from drone_mesh.raspberry.wiring_options import (
     add_channel_options,
     add_wiring_options,

@@ -9,7 +9,7 @@ from drone_mesh.communication.interfaces import BROADCAST, MAX_NODE_ID
 from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.nrf24.errors import RadioError
-from drone_mesh.nrf24.gpio import IrqPin
+from drone_mesh.nrf24.pins import IrqPin
 from drone_mesh.nrf24.registers import Register
 from drone_mesh.raspberry.field_radio import TEST_TYPE, FieldRadio
 

@@ -13,7 +13,7 @@ from typing import Callable, Iterator, NamedTuple, Sequence
 
 from drone_mesh.communication.interfaces import PAYLOAD_BYTES
 from drone_mesh.communication.wire import messages
-from drone_mesh.nrf24.emulator.measured import measured_losses
+from drone_mesh.nrf24.emulator.links import measured_losses
 from drone_mesh.nrf24.errors import RadioError
 from drone_mesh.nrf24.settings import DataRate, RadioSettings, TxPower
 from drone_mesh.raspberry.field_radio import SWITCH_S, TEST_TYPE, FieldRadio

@@ -7,8 +7,8 @@ import os
 from typing import Sequence
 
 from drone_mesh.internet import DEFAULT_PORT
-from drone_mesh.raspberry.http_options import TOKEN_VARIABLE
-from drone_mesh.raspberry.node_status import table
+from drone_mesh.raspberry.connection_options import TOKEN_VARIABLE
+from drone_mesh.raspberry.node_reports import table
 from drone_mesh.stopping import ends_as
 from drone_mesh.web import LOOPBACK
 from drone_mesh.web.json_client import NoAnswer, ask_json

@@ -7,9 +7,18 @@ import contextlib
 from dataclasses import dataclass
 
 from drone_mesh.arguments import MOST, is_up_to, whole
-from drone_mesh.nrf24.gpio import CE_GPIO, IRQ_GPIO, CePin, GpiodCe, GpiodIrq, IrqPin
+from drone_mesh.nrf24.pins import (
+    CE_GPIO,
+    IRQ_GPIO,
+    SPI_HZ,
+    CePin,
+    GpiodCe,
+    GpiodIrq,
+    IrqPin,
+    SpiDevice,
+    open_spi,
+)
 from drone_mesh.nrf24.settings import DATA_RATES, DEFAULT_RATE, RadioSettings
-from drone_mesh.nrf24.spi import SPI_HZ, SpiDevice, open_spi
 
 HIGHEST_GPIO = 27  # of the 40-pin header
 SPI_HZ_RANGE = (10_000, 10_000_000)  # [DS 8.3.2]: 10 MHz at most

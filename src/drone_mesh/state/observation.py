@@ -7,7 +7,7 @@ from typing import Iterable
 
 import numpy as np
 
-from drone_mesh.air.box import Box
+from drone_mesh.air.obstacles import Box
 from drone_mesh.communication.control.router_states import RepairState
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.node.component import MeshnetworkComponent

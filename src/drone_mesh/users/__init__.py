@@ -3,6 +3,6 @@
 No ROS and no hardware.
 """
 
-from drone_mesh.users.mesh import ALL, GATEWAY, Mesh, MeshMessage
+from drone_mesh.users.local_client import ALL, GATEWAY, Mesh, MeshMessage
 
 __all__ = ["ALL", "GATEWAY", "Mesh", "MeshMessage"]

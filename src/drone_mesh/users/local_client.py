@@ -1,4 +1,7 @@
-"""LocalClient: sends a program's requests to a node of this machine; see local_socket."""
+"""LocalClient: a program's requests to a node of this machine; Mesh: its messages, a line each.
+
+local_socket answers them, at the paths that are here.
+"""
 
 from __future__ import annotations
 
@@ -9,12 +12,57 @@ import json
 import os
 import socket
 from pathlib import Path
-from typing import Any, Iterator
+from typing import Any, Iterator, Mapping, NamedTuple
 
 from drone_mesh.arguments import whole
+from drone_mesh.communication.data.ticket import TO_ALL, TO_GATEWAY
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.errors import MeshError
-from drone_mesh.users.socket_path import node_of, served_sockets, socket_folder, socket_path
+
+SYSTEM_FOLDER = Path("/run/drone_mesh")  # of the services: RuntimeDirectory=drone_mesh
+
+
+def socket_folder(environment: Mapping[str, str] = os.environ) -> Path:
+    """The folder for the sockets of nodes that this user starts."""
+    if environment.get("RUNTIME_DIRECTORY"):  # set by systemd
+        return Path(environment["RUNTIME_DIRECTORY"])
+    if environment.get("XDG_RUNTIME_DIR"):
+        return Path(environment["XDG_RUNTIME_DIR"]) / "drone_mesh"
+    return Path(f"/tmp/drone_mesh-{os.getuid()}")
+
+
+def socket_path(node_id: int) -> Path:
+    """The socket path of a node that this user starts."""
+    return socket_folder() / _name(node_id)
+
+
+def served_sockets() -> list[Path]:
+    """The sockets of running nodes, of this user and of the services, sorted by name."""
+    folders = (socket_folder(), SYSTEM_FOLDER)
+    found = {path for folder in folders for path in folder.glob(_name("*"))}
+    return sorted(path for path in found if is_served(path))
+
+
+def is_served(path: Path) -> bool:
+    """Whether a program answers at this socket; a killed one leaves its socket behind."""
+    with socket.socket(socket.AF_UNIX) as probe:
+        try:
+            probe.connect(str(path))
+        except PermissionError:
+            return True  # of another user: the request will report that
+        except OSError:
+            return False
+    return True
+
+
+def node_of(path: Path) -> str:
+    """The id of the node whose socket this is."""
+    return path.stem[len("node-") :]
+
+
+def _name(node_id: int | str) -> str:
+    return f"node-{node_id}.sock"
+
 
 NODE_VARIABLE = "DRONE_MESH_NODE"  # the id to use if a program does not name one
 CONNECT_WITHIN_S = 5.0
@@ -123,3 +171,41 @@ def _checked(line: bytes) -> dict[str, Any]:
     if "error" in answer:
         raise Refused(str(answer["error"]))
     return answer
+
+
+GATEWAY, ALL = TO_GATEWAY, TO_ALL
+
+
+class MeshMessage(NamedTuple):
+    """A message that arrived."""
+
+    node: int  # who sent it
+    type: int  # the port of the other interfaces, 0..255
+    data: bytes
+
+
+class Mesh:
+    """The node that runs on this machine, of raspberry_router or raspberry_gateway.
+
+    Needs no ROS; any number of programs may use one node, also after it was started again.
+    """
+
+    def __init__(self, node: int | None = None) -> None:
+        """`node`: its id; None: the only one that runs here. Raises MeshError."""
+        self._node = node_here(node)
+
+    def write(self, node: int, type: int, data: bytes, wait_s: float = 10.0) -> bool:
+        """Send up to 1,024 bytes to a node, to GATEWAY or to ALL; whether they arrived in `wait_s`.
+
+        The node keeps trying for 240 s. To ALL a message is sent once, and nobody confirms it.
+        Raises MeshError if the node does not run or refuses the message.
+        """
+        arrived, _ticket = self._node.send(
+            node, data, port=type, reliable=node != ALL, wait_s=wait_s
+        )
+        return arrived
+
+    def read(self, type: int | None = None) -> Iterator[MeshMessage]:
+        """The messages that arrive from now on, of one type or of all, until the node stops."""
+        for message in self._node.listen(type):
+            yield MeshMessage(message["sender"], message["port"], message["payload"])

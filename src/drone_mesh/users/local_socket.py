@@ -27,7 +27,7 @@ from typing import Any, Mapping
 from drone_mesh.drone.fleet import ids_in_words
 from drone_mesh.errors import ConfigurationError, MessageRefused
 from drone_mesh.users.desk import Sending, UsersDesk, check_wait, in_json
-from drone_mesh.users.socket_path import is_served
+from drone_mesh.users.local_client import is_served
 
 MOST_REQUEST_BYTES = 4096  # a message of 1,024 bytes in base64 takes 1,400
 MOST_CLIENTS = 32

@@ -6,7 +6,7 @@ from typing import Sequence
 
 import pybullet
 
-from drone_mesh.air.box import Box
+from drone_mesh.air.obstacles import Box
 from drone_mesh.drone.flight_path import Vector
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.world.body import GRAVITY_M_S2

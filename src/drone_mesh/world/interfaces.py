@@ -6,7 +6,7 @@ import abc
 from collections import deque
 from typing import Protocol, TypeVar
 
-from drone_mesh.air.box import Box
+from drone_mesh.air.obstacles import Box
 from drone_mesh.drone.flight_path import Vector
 
 _AnyWorld = TypeVar("_AnyWorld", bound="World")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 
-from drone_mesh.air.box import Box
+from drone_mesh.air.obstacles import Box
 from drone_mesh.drone.flight_path import Vector
 from drone_mesh.world.interfaces import World
 

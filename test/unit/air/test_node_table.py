@@ -8,9 +8,8 @@ import random
 
 import pytest
 
-from drone_mesh.air.box import Box
 from drone_mesh.air.node_table import AirError, Node, NodeTable
-from drone_mesh.air.obstacles import Obstacles
+from drone_mesh.air.obstacles import Box, Obstacles
 
 NOWHERE = (0.0, 0.0, 0.0)  # what an antenna gives as its position
 

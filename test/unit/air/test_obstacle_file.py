@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from drone_mesh.air.box import Box
 from drone_mesh.air.obstacle_file import MAX_BOXES, read_obstacles, rows_of_file
+from drone_mesh.air.obstacles import Box
 from drone_mesh.errors import ConfigurationError
 
 STREET = Path(__file__).parents[3] / "experiments" / "street.yaml"

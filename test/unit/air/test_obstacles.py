@@ -7,8 +7,7 @@ import random
 
 import pytest
 
-from drone_mesh.air.box import Box
-from drone_mesh.air.obstacles import BOX_CLEARANCE_M, Obstacles
+from drone_mesh.air.obstacles import BOX_CLEARANCE_M, Box, Obstacles
 
 WALL = Box(center=(5.0, 0.0, 1.5), size=(0.2, 4.0, 3.0))
 

@@ -15,7 +15,7 @@ from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.autopilots import ARDUPILOT, PX4
 from drone_mesh.drone.mavlink.engine import MavlinkEngine
 from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions
-from drone_mesh.drone.mavlink.lines import UdpLine
+from drone_mesh.drone.mavlink.link import UdpLine
 from drone_mesh.errors import GoalRefused, LocationUnknown
 
 pytestmark = pytest.mark.slow  # autopilots and links live in real time

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from mavlink_rig import ALL, ARDUPILOT, Rig, is_inside, lift
+from mavlink_rig import ARDUPILOT, Rig, lift
 from mavlink_vehicle.modes import Mode
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -116,18 +116,6 @@ def test_a_goal_outside_the_limits_is_refused(goal, why: str) -> None:
         rig.goal(*goal)
     rig.run(5.0)
     assert rig.commands() == []
-
-
-@pytest.mark.slow
-@BOTH
-def test_no_target_of_a_flight_lies_outside_the_limits(autopilot: Autopilot) -> None:
-    limits = FlightLimits(max_height_m=12.0, max_distance_m=50.0)
-    rig = Rig(autopilot, ALL, limits, node_id=5).ready()
-    for goal in ((49.0, 0.0, 12.0), (-30.0, 30.0, 2.0), (0.0, 0.0, 0.0)):
-        rig.goal(*goal, lands=goal[2] == 0.0)
-        rig.run_until("it is there", lambda: not rig.status().is_flying)
-    home = Location(0.0, 0.0, 0.0)
-    assert all(is_inside(target, limits, home) for target in rig.targets())
 
 
 def test_a_drone_that_its_pilot_flew_out_of_the_limits_is_not_led_further() -> None:

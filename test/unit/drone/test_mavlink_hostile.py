@@ -56,12 +56,9 @@ def _random_message(rng: random.Random) -> Message:
     if kind.msgname == "HEARTBEAT" and rng.random() < 0.8:  # of something that looks flyable
         body[0:4] = struct.pack("<I", rng.choice([0, 3, 4, 5, 6, 9, 6 << 16, 4 << 16 | 3 << 24]))
         body[4:9] = bytes((2, rng.choice([3, 12]), rng.choice([1, 129]), 4, 3))
-    fields = kind.unpacker.unpack(body)
     system, component = rng.choice([(1, 1), (1, 1), (1, 1), (255, 190), (2, 1)])
     codec = mavlink.MAVLink(None, system, component)
-    message = _decode(codec, kind, bytes(body))
-    assert len(fields) >= 1
-    return message
+    return _decode(codec, kind, bytes(body))
 
 
 def _decode(codec, kind, body: bytes) -> Message:
@@ -107,15 +104,6 @@ def test_without_permission_random_messages_and_goals_never_arm_or_take_off(seed
     rig = Rig(permissions=NONE)
     _hostile(rig, messages=MESSAGES // 8, seed=seed, goals=True)
     assert _flight_orders(rig) <= {mavlink.MAV_CMD_NAV_LAND}
-
-
-def test_a_vehicle_survives_random_messages_on_the_ground() -> None:
-    rig = Rig(PX4).ready()
-    rng = random.Random(9)
-    for _ in range(MESSAGES // 8):
-        rig.vehicle.on_message(_random_message(rng), rig.now_s)
-    rig.run(1.0)
-    assert rig.vehicle.body.place.distance_m(HOME) < 2e5
 
 
 def lose_the_link(autopilot: Autopilot, seed: int) -> Rig:

@@ -7,7 +7,7 @@ from typing import Iterator
 
 import pytest
 
-from drone_mesh.drone.mavlink.lines import open_line
+from drone_mesh.drone.mavlink.link import open_line
 from drone_mesh.errors import ConfigurationError
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from typing import Callable
 
 import pytest
 from mavlink_rig import ALL, ARDUPILOT, NONE, TARGET, Rig, lift
@@ -94,88 +93,36 @@ def test_without_permissions_it_flies_when_the_pilot_hands_it_a_hovering_drone(
     assert rig.commands() == []
 
 
-@BOTH
-def test_it_changes_the_mode_only_from_holding(autopilot: Autopilot) -> None:
-    take_back = Permissions(may_change_mode=True, orders_may_take_back_s=0.0)
-    rig = _in_the_air(autopilot, take_back)
-    rig.goal(10.0, 0.0, 8.0)
-    rig.reach(Phase.HOLDING)
-    assert set(rig.commands()) == {mavlink.MAV_CMD_DO_SET_MODE}
-
-
 # What ends a flight --------------------------------------------------------------------------
-
-
-def _pilot_takes_over(rig: Rig) -> None:
-    rig.vehicle.choose_mode(Mode.PILOT)
-
-
-def _autopilot_goes_home(rig: Rig) -> None:
-    rig.vehicle.choose_mode(Mode.RETURN)
-
-
-def _stick(rig: Rig) -> None:
-    rig.vehicle.faults.stick_us = 1700
-
-
-def _no_fix(rig: Rig) -> None:
-    rig.vehicle.faults.fix_type = 2
-
-
-def _estimate(rig: Rig) -> None:
-    rig.vehicle.faults.estimate_good = False
-
-
-def _stale(rig: Rig) -> None:
-    rig.vehicle.faults.positions_stop = True
-
-
-def _fence(rig: Rig) -> None:
-    rig.vehicle.faults.fence_breached = True
-
-
-def _battery(rig: Rig) -> None:
-    rig.vehicle.body.battery_percent = 29.0
-
-
-def _battery_unknown(rig: Rig) -> None:
-    rig.vehicle.faults.battery_known = False
-
-
-def _silence(rig: Rig) -> None:
-    rig.vehicle.faults.silent = True
-
-
-def _failsafe(rig: Rig) -> None:
-    rig.vehicle.in_failsafe = True
 
 
 @BOTH
 @pytest.mark.parametrize(
-    ("happens", "why"),
+    ("what", "value", "why"),
     [
-        (_pilot_takes_over, "(STABILIZE|POSCTL) was chosen: the pilot flies"),
-        (_autopilot_goes_home, "RTL was chosen: the pilot flies"),
-        (_stick, "the pilot moved the sticks"),
-        (_no_fix, "the GPS has no 3D fix"),
-        (_estimate, "does not trust its position estimate|reports a failsafe"),
-        (_stale, "no position for more than 2 s"),
-        (_fence, "outside the autopilot's fence|reports a failsafe"),
-        (_battery, "battery at 29 %, below --min-battery 30"),
-        (_battery_unknown, "the battery's charge is not reported"),
-        (_silence, "no report from the|no position|no heartbeat"),
-        (_failsafe, "the autopilot reports a failsafe"),
+        ("mode", Mode.PILOT, "(STABILIZE|POSCTL) was chosen: the pilot flies"),
+        ("mode", Mode.RETURN, "RTL was chosen: the pilot flies"),
+        ("stick_us", 1700, "the pilot moved the sticks"),
+        ("fix_type", 2, "the GPS has no 3D fix"),
+        ("estimate_good", False, "does not trust its position estimate|reports a failsafe"),
+        ("positions_stop", True, "no position for more than 2 s"),
+        ("fence_breached", True, "outside the autopilot's fence|reports a failsafe"),
+        ("battery_percent", 29.0, "battery at 29 %, below --min-battery 30"),
+        ("battery_known", False, "the battery's charge is not reported"),
+        ("silent", True, "no report from the|no position|no heartbeat"),
+        ("in_failsafe", True, "the autopilot reports a failsafe"),
     ],
 )
 def test_a_flight_ends_at_once_and_its_reason_is_logged(
-    autopilot: Autopilot,
-    happens: Callable[[Rig], None],
-    why: str,
-    caplog: pytest.LogCaptureFixture,
+    autopilot: Autopilot, what: str, value: object, why: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     rig = _on_its_way(autopilot)
-    where_m = rig.place.latitude
-    happens(rig)
+    vehicle, where_m = rig.vehicle, rig.place.latitude
+    if isinstance(value, Mode):
+        vehicle.choose_mode(value)
+    else:
+        owners = (vehicle.faults, vehicle.body, vehicle)
+        setattr(next(owner for owner in owners if hasattr(owner, what)), what, value)
     rig.run_until("it let go", lambda: not rig.status().is_flying, within_s=4.0)
     assert re.search(f"the flight ends: .*({why})", caplog.text)
     rig.run(1.0)
@@ -225,16 +172,6 @@ def test_the_target_of_a_ground_station_is_not_overruled_while_the_drone_holds()
     rig.reach(Phase.FLYING, within_s=1.0)
 
 
-def test_an_autopilot_that_refuses_to_arm_ends_the_flight() -> None:
-    rig = Rig()
-    rig.vehicle.faults.refuses_to_arm = True
-    rig.ready()
-    rig.goal(10.0, 0.0, 5.0)
-    rig.run_until("it gave up", lambda: not rig.status().is_flying, within_s=10.0)
-    assert not rig.vehicle.body.armed
-    assert rig.place.height == 0.0
-
-
 @BOTH
 def test_when_the_program_dies_in_flight_the_autopilot_lands_the_drone(
     autopilot: Autopilot,
@@ -278,18 +215,6 @@ def test_a_home_at_another_height_than_the_origin_is_doubted_once(
     doubts = [r.message for r in caplog.records if "--origin" in r.message]
     assert len(doubts) == (1 if words else 0)
     assert all(words in message for message in doubts)
-
-
-def test_a_plane_or_a_ground_station_is_not_taken_for_a_drone() -> None:
-    rig = Rig()
-    rig.vehicle.faults.silent = True
-    for kind, autopilot in (
-        (mavlink.MAV_TYPE_FIXED_WING, mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA),
-        (mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID),
-    ):
-        rig.up.send(mavlink.MAVLink_heartbeat_message(kind, autopilot, 0, 0, 0, 3))
-    rig.run(1.0)
-    assert rig.status().autopilot == ""
 
 
 def test_a_second_vehicle_on_the_line_is_ignored() -> None:

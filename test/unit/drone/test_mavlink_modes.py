@@ -119,6 +119,7 @@ def test_from_the_ground_only_a_drone_that_nobody_has_touched_is_taken(
         mavlink.MAV_TYPE_FIXED_WING,
         mavlink.MAV_TYPE_VTOL_TILTROTOR,
         mavlink.MAV_TYPE_VTOL_QUADROTOR,
+        mavlink.MAV_TYPE_GCS,
     ],
 )
 def test_a_plane_is_flown_in_no_mode_at_all(kind: int, mode: int) -> None:

@@ -95,53 +95,6 @@ def test_mavsdk_arms_takes_off_goes_somewhere_and_lands(mavsdk_ground_station) -
         server.close()
 
 
-def test_mavsdk_uploads_a_mission_that_the_vehicle_flies(mavsdk_ground_station) -> None:
-    from mavsdk.plugins.action.action import Action
-    from mavsdk.plugins.mission.mission import Mission, MissionItem, MissionPlan
-    from mavsdk.plugins.telemetry.telemetry import FlightMode, Telemetry
-
-    server, vehicle, port = serve(PX4)
-    try:
-        mavsdk_ground_station.add_any_connection(f"udpout://127.0.0.1:{port}")
-        system = mavsdk_ground_station.first_autopilot(PATIENCE_S)
-        action, mission, telemetry = Action(system), Mission(system), Telemetry(system)
-        wait_for("all is healthy", telemetry.health_all_ok)
-        places = [
-            ORIGIN.to_earth(Location(20.0, 0.0, 10.0)),
-            ORIGIN.to_earth(Location(20.0, 30.0, 12.0)),
-        ]
-        items = [
-            MissionItem(
-                place.latitude_deg,
-                place.longitude_deg,
-                place.altitude_m - ORIGIN.altitude_m,
-                speed_m_s=5.0,
-                is_fly_through=True,
-            )
-            for place in places
-        ]
-        mission.upload_mission(MissionPlan(items))
-        again = mission.download_mission().mission_items
-        assert [item.latitude_deg for item in again] == pytest.approx(
-            [place.latitude_deg for place in places], abs=1e-6
-        )
-        action.arm()
-        wait_for("armed", telemetry.armed)
-        mission.start_mission()
-        wait_for("it flies it", lambda: telemetry.flight_mode() == FlightMode.MISSION)
-        wait_for("it is over", mission.is_mission_finished)
-        assert vehicle.body.place.distance_m(Location(20.0, 30.0, 12.0)) < 0.2
-        end = pytest.approx((20.0, 30.0, -12.0), abs=0.2)
-
-        def here() -> tuple[float, float, float]:
-            position = telemetry.position_velocity_ned().position
-            return position.north_m, position.east_m, position.down_m
-
-        wait_for("it reports where it is from home", lambda: here() == end)
-    finally:
-        server.close()
-
-
 # MAVProxy, the ground station ----------------------------------------------------------------
 
 
@@ -201,44 +154,6 @@ def test_mavproxy_guides_arms_takes_off_and_reads_the_parameters(tmp_path: Path)
         proxy.command("takeoff 5", lambda: vehicle.body.place.height > 4.9)
         wait_for("it read the new mode", lambda: "Mode GUIDED" in proxy.said)
         assert "ARMED" in proxy.said
-    finally:
-        proxy.close()
-        server.close()
-
-
-def test_mavproxy_uploads_a_mission_that_the_vehicle_flies_and_downloads_it(
-    tmp_path: Path,
-) -> None:
-    server, vehicle, port = serve(ARDUPILOT)
-    proxy = MavProxy(port, "mode,arm,cmdlong,wp", tmp_path)
-    home = ORIGIN.to_earth(Location(0.0, 0.0, 0.0))
-    ends = [ORIGIN.to_earth(Location(20.0, 0.0, 10.0)), ORIGIN.to_earth(Location(20.0, 15.0, 12.0))]
-    # QGroundControl's format: number, current, frame (3: height above home), command, 4 parameters,
-    # place, whether to go on. Item 0 is home.
-    way_points = [(0, 16, home, home.altitude_m), (3, 22, ends[0], 10.0), (3, 16, ends[1], 12.0)]
-    lines = [
-        f"{number}\t{int(number == 0)}\t{frame}\t{command}\t0\t0\t0\t0\t"
-        f"{place.latitude_deg:.8f}\t{place.longitude_deg:.8f}\t{height:.6f}\t1"
-        for number, (frame, command, place, height) in enumerate(way_points)
-    ]
-    (tmp_path / "plan.txt").write_text("\n".join(["QGC WPL 110", *lines, ""]))
-    saved = tmp_path / "saved.txt"
-    try:
-        wait_for("it read the mode", lambda: "Mode LOITER" in proxy.said)
-        proxy.command("wp load plan.txt", lambda: "Loaded 3 waypoints" in proxy.said)
-        proxy.command("wp list", lambda: "Saved 3 waypoints" in proxy.said)
-        proxy.command("wp save saved.txt", saved.exists)
-        again = [line.split("\t") for line in saved.read_text().splitlines()[1:]]
-        assert [item[2:4] for item in again] == [["0", "16"], ["3", "22"], ["3", "16"]]
-        for item, end in zip(again[1:], ends):
-            assert float(item[8]) == pytest.approx(end.latitude_deg, abs=1e-6)
-            assert float(item[9]) == pytest.approx(end.longitude_deg, abs=1e-6)
-        proxy.command("mode GUIDED", lambda: vehicle.mode is Mode.FOLLOW)
-        proxy.command("arm throttle", lambda: vehicle.body.armed)
-        proxy.command("takeoff 5", lambda: vehicle.body.place.height > 4.9)
-        proxy.command("mode AUTO", lambda: "Mode AUTO" in proxy.said)
-        there = Location(20.0, 15.0, 12.0)
-        wait_for("it is at the end", lambda: vehicle.body.place.distance_m(there) < 0.2)
     finally:
         proxy.close()
         server.close()

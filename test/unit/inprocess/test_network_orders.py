@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from drone_mesh.air.box import Box
-from drone_mesh.air.obstacles import Obstacles
+from drone_mesh.air.obstacles import Box, Obstacles
 from drone_mesh.communication.interfaces import OrderState
 from drone_mesh.communication.seals.keys import KEY_BYTES, MeshKey
 from drone_mesh.communication.timing import MeshTiming

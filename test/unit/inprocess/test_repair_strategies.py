@@ -20,8 +20,8 @@ from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.network import ORACLE
 from drone_mesh.lab.metrics.harm import harm
 from drone_mesh.lab.sequence import run_sequence
-from drone_mesh.nrf24.airtime import NS_PER_S
 from drone_mesh.nrf24.emulator.space import Noise
+from drone_mesh.nrf24.registers import NS_PER_S
 from drone_mesh.nrf24.settings import RadioSettings
 
 FLYING = sorted(set(REPAIR_STRATEGIES) - {"stay"}) + [ORACLE]

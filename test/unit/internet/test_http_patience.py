@@ -12,8 +12,6 @@ import httpx
 import pytest
 
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.internet.http_internet import HttpInternet
-from drone_mesh.internet.http_settings import HttpSettings
 from drone_mesh.web import prompt_protocol
 from drone_mesh.web.tls import Certificate
 
@@ -134,8 +132,3 @@ def test_a_certificate_that_cannot_be_used_is_refused_by_its_name(tmp_path, cert
     certificate.key.write_text("no key", encoding="ascii")
     with pytest.raises(ConfigurationError, match="--key .*key.pem cannot be used"):
         Certificate(certificate.cert, certificate.key)
-
-
-def test_the_port_is_not_taken_without_a_token_on_an_address_for_others():
-    with pytest.raises(ConfigurationError, match="set a token"):
-        HttpInternet(lambda work: None, HttpSettings("0.0.0.0", port=0))

@@ -19,9 +19,7 @@ def test_an_address_names_the_broker(url, broker):
 @pytest.mark.parametrize(
     ("url", "password", "why"),
     [
-        ("broker", "", "use mqtt://HOST/"),
         ("http://broker/", "", "use mqtt://HOST/"),
-        ("mqtt://", "", "use mqtt://HOST/"),
         ("mqtt://broker:70000/", "", "invalid MQTT address"),
         ("mqtt://me:secret@broker/", "", "shows in the list of processes"),
         ("mqtt://broker/a/b", "", "invalid mesh name 'a/b'"),

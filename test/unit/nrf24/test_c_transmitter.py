@@ -65,14 +65,6 @@ def test_row_20_a_receiver_that_is_gone_costs_18_frames_and_the_payload_is_dropp
     assert sender.chip.tx_fifo.oldest is None
 
 
-def test_row_20_the_next_packet_for_a_receiver_that_is_gone_costs_6_frames(lab):
-    sender = lab.driver(5)
-    assert not sender.send(10, PAYLOAD)
-    frames = len(lab.trace.frames)
-    assert not sender.send(10, b"\x02" * 32)
-    assert len(lab.trace.frames) == frames + 3 * 2
-
-
 def test_row_21_nothing_is_sent_until_max_rt_is_cleared_then_the_same_packet(lab):
     ptx = lab.wires("ptx").become_ptx()
     ptx.load()
@@ -110,14 +102,6 @@ def test_row_23_two_lost_acknowledgements_cost_two_retransmits_and_no_copy(lab):
     assert ptx.send() == 0x20
     assert ptx.byte(Register.OBSERVE_TX) == 0x02
     assert prx.unload_all() == [(2, PAYLOAD)]
-
-
-def test_row_23_the_driver_gets_through_when_two_acknowledgements_are_lost(lab):
-    sender, receiver = lab.driver(5), lab.driver(10, 100.0)
-    lose_first(lab, 2, answers=True)
-    assert sender.send(10, PAYLOAD)
-    assert (sender.statistics().retries, sender.statistics().tries) == (1, 1)
-    assert receiver.receive(0.1) == [(2, PAYLOAD)]
 
 
 def test_row_23_a_second_try_of_the_driver_cannot_arrive_twice(lab):
@@ -197,16 +181,6 @@ def test_row_29_a_toggle_of_ce_sends_the_same_packet_number_again(lab):
         lab.wait_us(10_000)
         ptx.write(Register.STATUS, 0x10)
     assert pids(lab, "ptx") == [1, 1]
-
-
-def test_row_30_a_payload_written_in_standby_ii_is_sent_without_touching_ce(lab):
-    ptx, prx = lab.pair()
-    ptx.chip.ce.value = True
-    lab.wait_us(1_000)
-    ptx.load()
-    lab.wait_us(5_000)
-    assert ptx.status == 0x2E
-    assert prx.unload_all() == [(2, PAYLOAD)]
 
 
 def test_packets_with_the_same_bytes_are_all_delivered_whatever_was_sent_between(lab):

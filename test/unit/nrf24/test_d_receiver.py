@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pytest
 from chip_lab import ADDRESS, BROADCAST_ADDRESS, PAYLOAD, us
-from test_c_transmitter import lose_first
 
 from drone_mesh.nrf24.emulator.chip_core import State
 from drone_mesh.nrf24.registers import Register
@@ -123,14 +122,6 @@ def test_row_37_the_same_bytes_written_twice_are_delivered_twice(lab):
     ptx.send()
     ptx.send()
     assert prx.unload_all() == [(2, PAYLOAD)] * 2
-
-
-def test_row_37_a_retransmit_after_a_lost_acknowledgement_is_delivered_once(lab):
-    ptx, prx = lab.pair()
-    lose_first(lab, 1, answers=True)
-    assert ptx.send() == 0x20
-    assert len(lab.frames_from("ptx")) == 2
-    assert prx.unload_all() == [(2, PAYLOAD)]
 
 
 def test_row_38_equal_pid_and_crc_from_another_sender_is_dropped_and_yet_acknowledged(lab):

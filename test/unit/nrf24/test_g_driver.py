@@ -12,9 +12,9 @@ from chip_lab import PAYLOAD, Wires
 
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.nrf24.errors import HardwareUnavailable, RadioError
+from drone_mesh.nrf24.pins import open_spi
 from drone_mesh.nrf24.registers import Register
 from drone_mesh.nrf24.settings import DataRate, RadioSettings, TxPower
-from drone_mesh.nrf24.spi import open_spi
 
 
 def registers_of(lab, driver, *registers):

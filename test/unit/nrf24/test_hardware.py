@@ -8,9 +8,9 @@ from collections import deque
 
 import pytest
 
-from drone_mesh.nrf24 import gpio
+from drone_mesh.nrf24 import pins
 from drone_mesh.nrf24.errors import HardwareUnavailable
-from drone_mesh.nrf24.spi import open_spi
+from drone_mesh.nrf24.pins import open_spi
 
 
 class FakeSpiDev:
@@ -61,13 +61,13 @@ def test_a_missing_spidev_package_is_named(monkeypatch):
 def test_a_missing_gpiod_package_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "gpiod", None)
     with pytest.raises(HardwareUnavailable, match="pip install 'gpiod>=2'"):
-        gpio.GpiodCe()
+        pins.GpiodCe()
 
 
 def test_the_older_gpiod_under_the_same_name_is_recognised(monkeypatch):
     monkeypatch.setitem(sys.modules, "gpiod", types.SimpleNamespace(Chip=object))
     with pytest.raises(HardwareUnavailable, match="older than version 2"):
-        gpio.GpiodCe()
+        pins.GpiodCe()
 
 
 class FakeLines:
@@ -129,8 +129,8 @@ def header(monkeypatch, tmp_path):
 
     monkeypatch.setattr(gpiod, "Chip", Chip)
     monkeypatch.setattr(gpiod, "request_lines", request_lines)
-    find = gpio.find_header
-    monkeypatch.setattr(gpio, "find_header", lambda: find(tmp_path))
+    find = pins.find_header
+    monkeypatch.setattr(pins, "find_header", lambda: find(tmp_path))
     return types.SimpleNamespace(
         gpiod=gpiod, labels=labels, requests=requests, folder=tmp_path, find=find
     )
@@ -148,7 +148,7 @@ def test_on_a_machine_without_the_header_the_error_lists_the_names_searched(head
 
 def test_ce_is_an_output_that_is_low_from_the_start_and_at_the_end(header):
     value = header.gpiod.line.Value
-    ce = gpio.GpiodCe()
+    ce = pins.GpiodCe()
     (path, pin, settings, lines) = header.requests[0]
     assert (path, pin) == (str(header.folder / "gpiochip4"), 25)
     assert settings.direction is header.gpiod.line.Direction.OUTPUT
@@ -162,7 +162,7 @@ def test_ce_is_an_output_that_is_low_from_the_start_and_at_the_end(header):
 
 def test_irq_is_believed_by_its_level_and_an_old_edge_does_not_end_the_wait(header):
     value = header.gpiod.line.Value
-    irq = gpio.GpiodIrq()
+    irq = pins.GpiodIrq()
     (_path, pin, settings, lines) = header.requests[0]
     assert pin == 24
     assert settings.edge_detection is header.gpiod.line.Edge.FALLING
@@ -180,4 +180,4 @@ def test_a_pin_that_is_in_use_is_named(header, monkeypatch):
 
     monkeypatch.setattr(header.gpiod, "request_lines", refuse)
     with pytest.raises(HardwareUnavailable, match="cannot use GPIO25.*Device or resource busy"):
-        gpio.GpiodCe()
+        pins.GpiodCe()

@@ -14,8 +14,9 @@ from drone_mesh.nrf24.emulator.links import (
     LossCurve,
     bit_error_rate,
     free_space_dbm,
+    measured_curve,
+    measured_losses,
 )
-from drone_mesh.nrf24.emulator.measured import measured_curve, measured_losses
 
 # share of 1000 packets that were lost, mean of 9 runs, worked out from the file with awk
 MEASURED = {

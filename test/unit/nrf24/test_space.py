@@ -11,9 +11,8 @@ from chip_lab import Lab
 
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.nrf24.emulator.air import RPD_DBM
-from drone_mesh.nrf24.emulator.fading import Fading
 from drone_mesh.nrf24.emulator.links import LogDistance
-from drone_mesh.nrf24.emulator.space import Noise
+from drone_mesh.nrf24.emulator.space import Fading, Noise
 from drone_mesh.nrf24.settings import RadioSettings
 
 HERE, THERE = (0.0, 0.0, 0.0), (6.0, 0.0, 0.0)

@@ -21,7 +21,7 @@ from drone_mesh.communication.wire.messages import (
 from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.drone.location import Location
 from drone_mesh.nrf24.emulator.frames import Frame, FrameFormat
-from drone_mesh.nrf24.emulator.pcapng import (
+from drone_mesh.nrf24.emulator.trace import (
     LINKTYPE_PAYLOADS,
     CapturedPacket,
     PcapngWriter,

@@ -151,15 +151,6 @@ def test_a_line_that_a_power_failure_cut_is_left_out_and_another_file_is_refused
             read_trace(file)
 
 
-def test_a_place_that_is_not_three_numbers_is_named_with_its_line(tmp_path: Path) -> None:
-    file = tmp_path / "flight.jsonl"
-    write(file, answer(1.0, 1.0, 2.0, 3.0), answer(2.0, 1.0, 2.0))
-    with pytest.raises(
-        ConfigurationError, match=r"line 2: node 3: place \[1.0, 2.0\] must be three"
-    ):
-        read_trace(file)
-
-
 def test_an_answer_becomes_a_state_and_its_events() -> None:
     event = {"number": 1, "t": 2.5, "node": 3, "kind": "took off", "peers": [], "detail": ""}
     mesh, _more = real_mesh(answer(4.0, 10.0, 20.0, 5.0, events=[event]))

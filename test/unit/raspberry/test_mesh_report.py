@@ -13,8 +13,8 @@ from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
 from drone_mesh.inprocess import Network
-from drone_mesh.raspberry.event_history import EventHistory
-from drone_mesh.raspberry.mesh_report import mesh_report
+from drone_mesh.raspberry.node_events import EventHistory
+from drone_mesh.raspberry.node_reports import mesh_report
 from drone_mesh.state.condition import Condition, condition_of
 
 ORIGIN = Origin(52.0907, 5.1214, 3.0)

@@ -6,7 +6,7 @@ import pytest
 
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.inprocess import Network
-from drone_mesh.raspberry.node_changes import NodeChanges
+from drone_mesh.raspberry.node_events import NodeChanges
 
 
 class Watched:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from drone_mesh.raspberry.emulated_air import EmulatedAir
+from drone_mesh.raspberry.emulated_air import EmulatedAir, serving_node
 from drone_mesh.raspberry.options import parse_gateway
 from drone_mesh.raspberry.program import without_internet
-from drone_mesh.raspberry.served_air import serving_node
 
 
 @pytest.mark.parametrize(("address", "warns"), [("0", False), ("0.0.0.0:0", True)])

@@ -22,7 +22,7 @@ from drone_mesh.internet.on_demand import http_internet
 from drone_mesh.nrf24.emulator.chip_core import State
 from drone_mesh.raspberry.emulated_air import EmulatedAir
 from drone_mesh.raspberry.node import RadioNode
-from drone_mesh.raspberry.node_status import one_line, table
+from drone_mesh.raspberry.node_reports import one_line, table
 from drone_mesh.raspberry.options import parse_gateway
 from drone_mesh.raspberry.program import without_internet
 from drone_mesh.raspberry.service_manager import ServiceManager

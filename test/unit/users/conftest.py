@@ -3,8 +3,8 @@
 import pytest
 from users_rig import UsersRig
 
+from drone_mesh.users.local_client import socket_path
 from drone_mesh.users.local_socket import LocalSocket
-from drone_mesh.users.socket_path import socket_path
 
 
 @pytest.fixture(autouse=True)

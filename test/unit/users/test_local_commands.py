@@ -15,9 +15,8 @@ import pytest
 
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.users import commands, local_socket
-from drone_mesh.users.local_client import LocalClient
+from drone_mesh.users.local_client import LocalClient, socket_path
 from drone_mesh.users.local_socket import LocalSocket, warn_of_unreachable
-from drone_mesh.users.socket_path import socket_path
 
 
 def test_ping_prints_hops_time_and_loss(rig, capsys):

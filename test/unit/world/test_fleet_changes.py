@@ -6,8 +6,7 @@ import math
 
 import pytest
 
-from drone_mesh.air.box import Box
-from drone_mesh.air.obstacles import Obstacles
+from drone_mesh.air.obstacles import Box, Obstacles
 from drone_mesh.drone.fleet import plan_fleet
 from drone_mesh.drone.roles import Role
 from drone_mesh.errors import FleetRefused

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from drone_mesh.air.box import Box
-from drone_mesh.air.obstacles import Obstacles
+from drone_mesh.air.obstacles import Box, Obstacles
 from drone_mesh.drone.fleet import plan_fleet
 from drone_mesh.drone.flight_path import FlightPath
 from drone_mesh.drone.location import Location

@@ -13,12 +13,11 @@ import random
 from dataclasses import dataclass
 from typing import Callable, Protocol, Sequence
 
-from drone_mesh.nrf24.airtime import NS_PER_S
 from drone_mesh.nrf24.emulator.clock import EmulatorClock
-from drone_mesh.nrf24.emulator.fading import Position
 from drone_mesh.nrf24.emulator.frames import Frame
 from drone_mesh.nrf24.emulator.links import Hop, LinkModel
-from drone_mesh.nrf24.emulator.space import Space
+from drone_mesh.nrf24.emulator.space import Position, Space
+from drone_mesh.nrf24.registers import NS_PER_S
 
 CAPTURE_DB = {250_000: 12.0, 1_000_000: 9.0, 2_000_000: 7.0}  # co-channel C/I [DS 5.7]
 RPD_DBM = -64.0  # [DS 6.4]

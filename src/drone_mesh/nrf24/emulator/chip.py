@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from typing import Sequence
 
-from drone_mesh.nrf24.airtime import CE_PULSE_MIN_NS, CE_TO_CSN_NS, SETTLING_NS
 from drone_mesh.nrf24.emulator.air import RPD_DBM, Air
 from drone_mesh.nrf24.emulator.chip_core import (
     ANSWERING,
@@ -20,10 +19,10 @@ from drone_mesh.nrf24.emulator.chip_core import (
     State,
 )
 from drone_mesh.nrf24.emulator.commands import CommandDecoder
-from drone_mesh.nrf24.emulator.fading import Position
 from drone_mesh.nrf24.emulator.frames import Frame
-from drone_mesh.nrf24.emulator.receiver import Receiver
-from drone_mesh.nrf24.emulator.transmitter import Transmitter
+from drone_mesh.nrf24.emulator.shockburst import Receiver, Transmitter
+from drone_mesh.nrf24.emulator.space import Position
+from drone_mesh.nrf24.registers import CE_PULSE_MIN_NS, CE_TO_CSN_NS, SETTLING_NS
 
 _FASTEST_HZ = 10_000_000  # of SPI [DS 8.3.2]
 _BITS_PER_NS = 8 * 1_000_000_000

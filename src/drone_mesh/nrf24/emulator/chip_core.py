@@ -12,14 +12,19 @@ import enum
 from dataclasses import dataclass
 from typing import Callable
 
-from drone_mesh.nrf24.airtime import POWER_UP_NS, PREAMBLE_BITS, SETTLING_NS
 from drone_mesh.nrf24.emulator.air import RPD_DBM, Air, Transmission
 from drone_mesh.nrf24.emulator.clock import EmulatorClock
-from drone_mesh.nrf24.emulator.fading import Position
 from drone_mesh.nrf24.emulator.fifos import RxFifo, TxFifo
 from drone_mesh.nrf24.emulator.frames import Frame
 from drone_mesh.nrf24.emulator.register_bank import RegisterBank
-from drone_mesh.nrf24.registers import RX_FIFO_IS_EMPTY, RX_P_NO
+from drone_mesh.nrf24.emulator.space import Position
+from drone_mesh.nrf24.registers import (
+    POWER_UP_NS,
+    PREAMBLE_BITS,
+    RX_FIFO_IS_EMPTY,
+    RX_P_NO,
+    SETTLING_NS,
+)
 
 
 class EmulatedCe:

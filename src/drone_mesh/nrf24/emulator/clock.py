@@ -16,7 +16,7 @@ import time
 from typing import Any, Callable, ContextManager, Iterator
 
 from drone_mesh.channel.runtime import Runtime, SystemRuntime
-from drone_mesh.nrf24.airtime import NS_PER_S
+from drone_mesh.nrf24.registers import NS_PER_S
 
 logger = logging.getLogger(__name__)
 

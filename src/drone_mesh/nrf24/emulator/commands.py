@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from drone_mesh.nrf24.emulator.chip_core import ANSWERING, SENDING, ChipCore, State
 from drone_mesh.nrf24.emulator.fifos import TxPayload
-from drone_mesh.nrf24.emulator.transmitter import Transmitter
+from drone_mesh.nrf24.emulator.shockburst import Transmitter
 from drone_mesh.nrf24.registers import (
     ARC_CNT,
     MAX_PAYLOAD_BYTES,

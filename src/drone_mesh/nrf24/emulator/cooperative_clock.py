@@ -22,8 +22,8 @@ from typing import Any, Callable, ContextManager
 import greenlet
 
 from drone_mesh.channel.runtime import Runtime, Signal, Task
-from drone_mesh.nrf24.airtime import NS_PER_S
 from drone_mesh.nrf24.emulator.clock import EmulatorClock
+from drone_mesh.nrf24.registers import NS_PER_S
 
 __all__ = ["CooperativeClock"]  # for users; see docs/architecture.md
 

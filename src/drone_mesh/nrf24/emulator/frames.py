@@ -14,7 +14,7 @@ import binascii
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from drone_mesh.nrf24.airtime import PCF_BITS, PREAMBLE_BITS
+from drone_mesh.nrf24.registers import PCF_BITS, PREAMBLE_BITS
 
 STATIC_LENGTH_FIELD = 0x33  # the length field that silicon sends while DPL is off
 _CRC8_POLYNOMIAL = 0x07  # x^8 + x^2 + x + 1, initial value 0xFF

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from drone_mesh.nrf24.airtime import ARD_STEP_NS
 from drone_mesh.nrf24.emulator.frames import FrameFormat
 from drone_mesh.nrf24.registers import (
     ARC,
     ARD,
+    ARD_STEP_NS,
     AW,
     CRCO,
     DPL,

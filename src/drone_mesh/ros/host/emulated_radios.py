@@ -12,13 +12,13 @@ import rospy
 from drone_mesh.communication.interfaces import IMeshDebugInfo, IMeshNetwork
 from drone_mesh.execution import ExecutorSlot
 from drone_mesh.msg import NRF24
-from drone_mesh.nrf24.airtime import NS_PER_S
 from drone_mesh.nrf24.emulator.air import Air
 from drone_mesh.nrf24.emulator.chip import EmulatedChip
 from drone_mesh.nrf24.emulator.clock import WallClock
 from drone_mesh.nrf24.emulator.links import LogDistance
 from drone_mesh.nrf24.high_level import NRF24HighLevelInterface
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
+from drone_mesh.nrf24.registers import NS_PER_S
 from drone_mesh.nrf24.settings import DataRate, RadioSettings
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.packet_samples import PacketSamples
