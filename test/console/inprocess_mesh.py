@@ -17,8 +17,8 @@ from drone_mesh.formations.missions import Mission
 from drone_mesh.formations.preview import FormationPreview, preview
 from drone_mesh.inprocess.network import Network
 from drone_mesh.mobility.pilot import along
-from drone_mesh.state.events import EventBatcher
 from drone_mesh.state.model import EventRecord, MeshStatus
+from drone_mesh.state.observation import EventBatcher
 from drone_mesh.state.packets import PacketSampler
 
 STEP_S = 0.05  # wall time between two steps of the clock

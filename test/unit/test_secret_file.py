@@ -9,7 +9,7 @@ import pytest
 
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.secret_file import read_secret
-from drone_mesh.web.tls import Certificate
+from drone_mesh.web.listening import Certificate
 
 
 @pytest.fixture

@@ -21,7 +21,7 @@ from typing import Any, Iterable, Mapping, Sequence
 from drone_mesh.console.history import History
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.state.alarms import AlarmBook
-from drone_mesh.state.condition import condition_of
+from drone_mesh.state.condition import Trouble, condition_of, find_trouble, summarise
 from drone_mesh.state.links import LinkForecast, LostLinks, known_links, links_by_use
 from drone_mesh.state.model import (
     EventRecord,
@@ -35,10 +35,8 @@ from drone_mesh.state.model import (
 )
 from drone_mesh.state.orders import OrderWatch
 from drone_mesh.state.outages import MeshSample, take_sample
-from drone_mesh.state.trouble import Trouble, find_trouble, summarise
-from drone_mesh.view.fan import fan_out
 from drone_mesh.view.palette import node_colour_name
-from drone_mesh.view.scene import shape_named
+from drone_mesh.view.scene import fan_out, shape_named
 
 EVENTS_KEPT = 1000  # more than a person scrolls back
 EVENTS_PER_FRAME = 300  # of a burst of thousands only the newest are read

@@ -13,12 +13,16 @@ from typing import Mapping, Sequence
 from drone_mesh.arguments import whole
 from drone_mesh.console import DEFAULT_PORT
 from drone_mesh.console.frame_store import FrameStore
-from drone_mesh.console.gateway_client import GatewayClient, GatewayControls
+from drone_mesh.console.gateway_client import (
+    GatewayClient,
+    GatewayControls,
+    events_of,
+    origin_of,
+    real_mesh,
+)
 from drone_mesh.console.history import History
 from drone_mesh.console.memory import ConsoleMemory, memory_of
-from drone_mesh.console.page_token import PageToken
-from drone_mesh.console.real_mesh import events_of, origin_of, real_mesh
-from drone_mesh.console.runner import ConsoleRunner
+from drone_mesh.console.runner import ConsoleRunner, PageToken
 from drone_mesh.console.server import ConsoleServer
 from drone_mesh.console.tiles import open_tiles
 from drone_mesh.errors import ConfigurationError

@@ -7,10 +7,9 @@ from typing import Iterable, Mapping
 from drone_mesh.communication.events.observer import MeshEvent
 from drone_mesh.drone.roles import Role
 from drone_mesh.inprocess.node import InProcessNode
-from drone_mesh.state.events import EventBatcher
+from drone_mesh.state.links import route_to_gateway
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
-from drone_mesh.state.observation import describe_component, path_ahead
-from drone_mesh.state.routes import route_to_gateway
+from drone_mesh.state.observation import EventBatcher, describe_component, path_ahead
 
 
 def mesh_status(

@@ -32,8 +32,7 @@ from drone_mesh.internet.numbers import DecimalDigits, WholeDigits
 from drone_mesh.internet.orders import order_requests
 from drone_mesh.internet.status import ReadStatus, status_request
 from drone_mesh.users.desk import UsersDesk
-from drone_mesh.web.access import Access
-from drone_mesh.web.allowance import Allowance
+from drone_mesh.web.access import Access, Allowance
 
 MOST_ORDERS_AT_ONCE = 300  # a whole fleet
 ORDER_PERIOD_S = 0.05  # wall: of further orders; a full channel carries fewer

@@ -10,7 +10,7 @@ from drone_mesh.web import LOOPBACK
 from drone_mesh.web.access import Access, access_for, own_names
 
 if TYPE_CHECKING:  # it loads ssl, which only HTTPS needs
-    from drone_mesh.web.tls import Certificate
+    from drone_mesh.web.listening import Certificate
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,7 @@ from drone_mesh.internet.mqtt_topics import PASSWORD_VARIABLE, Broker, parse_bro
 from drone_mesh.secret_file import read_secret
 from drone_mesh.web import LOOPBACK
 from drone_mesh.web.access import access_for
-from drone_mesh.web.listening import MAX_PORT
-from drone_mesh.web.tls import Certificate
+from drone_mesh.web.listening import MAX_PORT, Certificate
 
 
 class AirAddress(NamedTuple):

@@ -7,9 +7,8 @@ from typing import Mapping
 
 from drone_mesh.communication.wire.packet_types import PacketKind
 from drone_mesh.drone.roles import Role
-from drone_mesh.state.condition import Condition
+from drone_mesh.state.condition import Condition, Severity
 from drone_mesh.state.links import LinkUse
-from drone_mesh.state.trouble import Severity
 
 Colour = str  # "#rrggbb"
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import enum
 import math
 from dataclasses import dataclass
-from typing import Iterable, Sequence
+from typing import Iterable, Sequence, Tuple
 
 import numpy as np
 
 from drone_mesh.drone.flight_path import Vector
 from drone_mesh.drone.roles import Role
-from drone_mesh.state.condition import Condition, condition_of
+from drone_mesh.state.condition import Condition, condition_of, find_trouble, summarise
 from drone_mesh.state.links import Link, LinkUse, links_by_use, shortest
 from drone_mesh.state.model import (
     MeshStatus,
@@ -20,15 +20,65 @@ from drone_mesh.state.model import (
     position_is_known,
     waypoints,
 )
-from drone_mesh.state.roster import DroneView
-from drone_mesh.state.trouble import find_trouble, summarise
-from drone_mesh.view.fan import Slot, fan_offset, fan_out
+from drone_mesh.state.observation import DroneView
 from drone_mesh.view.palette import LIGHT, Colour
 
+COINCIDENT_M = 0.25  # closer than this, two drones of 0.2 m look like one
 MOST_LINKS = 600  # per use: more cannot be told apart
 DRONE_WIDTH_M = max(Role.ROUTER.size_m)
 HALF_DIAGONAL_M = DRONE_WIDTH_M / math.sqrt(2)
 WIDEST_OF_CROWDING = 0.3  # greatest drawn width of a drone, as a share of the drones' distance
+
+Slot = Tuple[int, int]  # number of the node in its group, from 0; size of the group
+
+
+def fan_out(nodes: Sequence[NodeStatus]) -> dict[int, Slot]:
+    """The slot of each node that shares its position, as seen from above, with others."""
+    groups: dict[tuple[int, int], list[NodeStatus]] = {}
+    for node in nodes:
+        if position_is_known(node):
+            _group_near(groups, node).append(node)
+    return {
+        node.id: (number, len(group))
+        for group in groups.values()
+        if len(group) > 1
+        for number, node in enumerate(group)
+    }
+
+
+def fan_offset(slot: Slot, radius: float) -> tuple[float, float]:
+    """The offset, right and up, at which discs of this radius in one group do not touch."""
+    number, size = slot
+    angle = math.pi / 2 - 2 * math.pi * number / size
+    distance = 1.15 * radius / math.sin(math.pi / size)
+    return (distance * math.cos(angle), distance * math.sin(angle))
+
+
+def fanned_positions(
+    nodes: Sequence[NodeStatus], radius_m: float
+) -> dict[int, tuple[float, float, float]]:
+    """Where to draw each node, in metres, if it fills a circle of this radius from above."""
+    slots = fan_out(nodes)
+    positions = {}
+    for node in nodes:
+        x, y, z = node.position
+        right, up = fan_offset(slots[node.id], radius_m) if node.id in slots else (0.0, 0.0)
+        positions[node.id] = (x + right, y + up, z)
+    return positions
+
+
+def _group_near(
+    groups: dict[tuple[int, int], list[NodeStatus]], node: NodeStatus
+) -> list[NodeStatus]:
+    """The group whose first node is near; a new one if there is none. One group per cell."""
+    x, y = node.position[0], node.position[1]
+    column, row = math.floor(x / COINCIDENT_M), math.floor(y / COINCIDENT_M)
+    for dx in (0, -1, 1):
+        for dy in (0, -1, 1):
+            group = groups.get((column + dx, row + dy))
+            if group and math.dist(group[0].position[:2], (x, y)) < COINCIDENT_M:
+                return group
+    return groups.setdefault((column, row), [])
 
 
 class Shape(enum.Enum):

@@ -6,9 +6,8 @@ from typing import Sequence
 
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.drone.roles import Role
-from drone_mesh.state.condition import Condition, condition_of
+from drone_mesh.state.condition import Condition, Trouble, condition_of, find_trouble, summarise
 from drone_mesh.state.model import MeshStatus, NodeStatus, position_is_known
-from drone_mesh.state.trouble import Trouble, find_trouble, summarise
 from drone_mesh.view.palette import ansi
 
 _BOLD, _PLAIN = "\x1b[1m", "\x1b[0m"

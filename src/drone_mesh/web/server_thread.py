@@ -1,4 +1,4 @@
-"""ServerThread: an HTTP server (uvicorn) in a thread of its own."""
+"""ServerThread: an HTTP server (uvicorn) in its own thread, with limits for silent clients."""
 
 from __future__ import annotations
 
@@ -8,16 +8,71 @@ import threading
 from typing import TYPE_CHECKING, Any, Callable
 
 import uvicorn
+from uvicorn.protocols.http.h11_impl import H11Protocol
 
-from drone_mesh.web.listening import listen
-from drone_mesh.web.prompt_protocol import PromptProtocol
-from drone_mesh.web.tls import Certificate
+from drone_mesh.web.listening import Certificate, listen
 
 if TYPE_CHECKING:
     from starlette.types import ASGIApp
 
 MAX_HEAD_BYTES = 8192  # all headers of a request together
 LAST_ANSWERS_WITHIN_S = 1  # for requests that are in progress when the server stops
+HEAD_WITHIN_S = 5.0  # from connecting, or the first byte, to the end of the headers
+MOST_SILENT = 32  # connections without a request; the oldest makes room for a new one
+
+
+class PromptProtocol(H11Protocol):
+    """Closes a connection whose request does not arrive in time, and no others.
+
+    Silent connections cannot lock other clients out: there are always fewer of them than uvicorn's
+    `limit_concurrency` allows. Belongs to the server's event loop.
+    """
+
+    def __init__(self, *args: Any, **settings: Any) -> None:
+        super().__init__(*args, **settings)
+        self._head_timer: asyncio.TimerHandle | None = None
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        super().connection_made(transport)
+        self._wait_for_head()
+        waiting = [c for c in self.connections if isinstance(c, PromptProtocol) and c.is_waiting]
+        if len(waiting) > MOST_SILENT:
+            min(waiting, key=PromptProtocol.due_s).give_up()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._head_is_there()
+        super().connection_lost(exc)
+
+    def data_received(self, data: bytes) -> None:
+        super().data_received(data)
+        speaks_websocket = self.transport.get_protocol() is not self
+        is_answered = self.cycle is not None and not self.cycle.response_complete
+        if speaks_websocket or is_answered:
+            self._head_is_there()
+        elif not self.is_waiting and not self.transport.is_closing():
+            self._wait_for_head()
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether no request has arrived that still needs an answer."""
+        return self._head_timer is not None
+
+    def due_s(self) -> float:
+        """When its time runs out, in the loop's time."""
+        return self._head_timer.when() if self._head_timer is not None else 0.0
+
+    def give_up(self) -> None:
+        """Close the connection."""
+        self._head_is_there()
+        self.transport.abort()
+
+    def _wait_for_head(self) -> None:
+        self._head_timer = self.loop.call_later(HEAD_WITHIN_S, self.give_up)
+
+    def _head_is_there(self) -> None:
+        if self._head_timer is not None:
+            self._head_timer.cancel()
+            self._head_timer = None
 
 
 class ServerThread:

@@ -13,11 +13,10 @@ import pytest
 
 from drone_mesh.console.controls import OrderRefused
 from drone_mesh.console.frame_store import FrameStore
-from drone_mesh.console.gateway_client import GatewayClient, GatewayControls
+from drone_mesh.console.gateway_client import GatewayClient, GatewayControls, origin_of
 from drone_mesh.console.gateway_command import GatewayFeed, main
 from drone_mesh.console.history import History
 from drone_mesh.console.memory import ConsoleMemory
-from drone_mesh.console.real_mesh import origin_of
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.web.json_client import NoAnswer

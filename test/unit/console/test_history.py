@@ -6,7 +6,7 @@ import json
 
 from drone_mesh.console.frame_store import FrameStore
 from drone_mesh.console.history import History
-from drone_mesh.console.player import Player
+from drone_mesh.console.page import Player
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus, ObstacleStatus
 
 

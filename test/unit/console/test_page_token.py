@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from drone_mesh.console.page_token import PageToken
+from drone_mesh.console.runner import PageToken
 
 TOKEN = "0123456789abcdef"
 

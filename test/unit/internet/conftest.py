@@ -12,7 +12,7 @@ from drone_mesh.execution import MeshExecutor
 from drone_mesh.inprocess import Network
 from drone_mesh.internet.http_internet import HttpInternet
 from drone_mesh.internet.http_settings import HttpSettings
-from drone_mesh.web.tls import Certificate
+from drone_mesh.web.listening import Certificate
 
 TOKEN = "0123456789abcdef0123"
 

@@ -12,8 +12,8 @@ import httpx
 import pytest
 
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.web import prompt_protocol
-from drone_mesh.web.tls import Certificate
+from drone_mesh.web import server_thread
+from drone_mesh.web.listening import Certificate
 
 pytestmark = pytest.mark.slow
 
@@ -50,7 +50,7 @@ def test_two_hundred_silent_connections_do_not_keep_others_out(make_mesh):
 
 @pytest.mark.parametrize("begun", [b"", GET, GET + b"X: 1\r\n"])
 def test_a_request_whose_head_does_not_end_is_given_up(make_mesh, monkeypatch, begun):
-    monkeypatch.setattr(prompt_protocol, "HEAD_WITHIN_S", 0.3)
+    monkeypatch.setattr(server_thread, "HEAD_WITHIN_S", 0.3)
     mesh = make_mesh()
     with connect(mesh) as connection:
         connection.sendall(begun)
@@ -58,7 +58,7 @@ def test_a_request_whose_head_does_not_end_is_given_up(make_mesh, monkeypatch, b
 
 
 def test_a_second_request_on_a_connection_has_to_end_too(make_mesh, monkeypatch):
-    monkeypatch.setattr(prompt_protocol, "HEAD_WITHIN_S", 0.3)
+    monkeypatch.setattr(server_thread, "HEAD_WITHIN_S", 0.3)
     mesh = make_mesh()
     with connect(mesh) as connection:
         connection.sendall(GET + b"\r\n")

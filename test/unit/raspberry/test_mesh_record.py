@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from drone_mesh.console.real_mesh import events_of, real_mesh
+from drone_mesh.console.gateway_client import events_of, real_mesh
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.mobility.gateway_record import answers
 from drone_mesh.mobility.trace_files import read_trace

@@ -8,7 +8,7 @@ import pytest
 
 from drone_mesh.communication.events.observer import MeshEvent, MeshEventKind
 from drone_mesh.communication.timing import MeshTiming
-from drone_mesh.console.real_mesh import events_of, real_mesh
+from drone_mesh.console.gateway_client import events_of, real_mesh
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from drone_mesh.communication.events.observer import MeshEvent, MeshEventKind
-from drone_mesh.state.events import EventBatcher
+from drone_mesh.state.observation import EventBatcher
 
 FOUND, LOST = MeshEventKind.NEIGHBOUR_FOUND, MeshEventKind.NEIGHBOUR_LOST
 

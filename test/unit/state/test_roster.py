@@ -6,7 +6,7 @@ import math
 
 from drone_mesh.drone.roles import Role
 from drone_mesh.state.model import NodeStatus
-from drone_mesh.state.roster import DroneView, MeshRoster
+from drone_mesh.state.observation import DroneView, MeshRoster
 
 
 def gateway_and_router() -> list[NodeStatus]:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.drone.roles import Role
+from drone_mesh.state.links import reaches_gateway, route_to_gateway
 from drone_mesh.state.model import NodeStatus
-from drone_mesh.state.routes import reaches_gateway, route_to_gateway
 
 
 def mesh(*next_hops: tuple[int, int], off: tuple[int, ...] = ()) -> dict[int, NodeStatus]:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from drone_mesh.drone.roles import Role
-from drone_mesh.state.condition import Condition, condition_of
-from drone_mesh.state.model import NodeStatus
-from drone_mesh.state.trouble import (
+from drone_mesh.state.condition import (
+    Condition,
     Severity,
     all_connected,
+    condition_of,
     find_trouble,
     summarise,
 )
+from drone_mesh.state.model import NodeStatus
 
 GATEWAY = NodeStatus(0, Role.GATEWAY, connected=True, next_hop=0, route=bytes([0]))
 

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from drone_mesh.state.model import NodeStatus
-from drone_mesh.view.fan import COINCIDENT_M, fan_offset, fan_out, fanned_positions
+from drone_mesh.view.scene import COINCIDENT_M, fan_offset, fan_out, fanned_positions
 
 
 def at(*positions: tuple[float, float]) -> list[NodeStatus]:

@@ -76,4 +76,4 @@ def test_no_view_has_colours_of_its_own():
         if path.is_file() and path.name not in ("palette.py", "icon.svg")
         if (found := re.findall(COLOUR, path.read_text("utf-8")))
     }
-    assert typed == {"sketch.py": ["#ffffff"]}
+    assert typed == {}

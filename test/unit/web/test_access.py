@@ -9,12 +9,13 @@ import pytest
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.web.access import (
     FREE_GUESSES,
+    MOST_CLIENTS,
     Access,
     AccessDenied,
+    Allowance,
     TooManyGuesses,
     access_for,
 )
-from drone_mesh.web.allowance import MOST_CLIENTS, Allowance
 
 TOKEN = "0123456789abcdef"
 HERE = "127.0.0.1"

@@ -10,7 +10,7 @@ from starlette.routing import WebSocketRoute
 from starlette.websockets import WebSocket
 from websockets.sync.client import connect
 
-from drone_mesh.web import prompt_protocol
+from drone_mesh.web import server_thread
 from drone_mesh.web.server_thread import ServerThread
 
 PATIENCE_S = 0.2
@@ -23,7 +23,7 @@ async def echo(socket: WebSocket) -> None:
 
 @pytest.mark.slow
 def test_a_websocket_may_be_silent_for_longer_than_a_request(monkeypatch):
-    monkeypatch.setattr(prompt_protocol, "HEAD_WITHIN_S", PATIENCE_S)
+    monkeypatch.setattr(server_thread, "HEAD_WITHIN_S", PATIENCE_S)
     app = Starlette(routes=[WebSocketRoute("/ws", echo)])
     server = ServerThread(app, "127.0.0.1", 0, name="echo", ws="auto")
     server.start()

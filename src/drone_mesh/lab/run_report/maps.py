@@ -16,8 +16,8 @@ from drone_mesh.lab.run_report.story import RunStory
 from drone_mesh.state.condition import Condition, condition_of
 from drone_mesh.state.links import Link, LinkUse, links_by_use, shortest
 from drone_mesh.state.model import MeshStatus, footprint, position_is_known
-from drone_mesh.view.fan import fan_offset, fan_out
 from drone_mesh.view.palette import LIGHT
+from drone_mesh.view.scene import fan_offset, fan_out
 
 MOST_LINKS = 2000  # per use: a picture of a crowd has no room for more
 LINK_WIDTH = {LinkUse.KNOWN: 0.8, LinkUse.ROUTE: 2.2, LinkUse.LOST: 0.8}  # points

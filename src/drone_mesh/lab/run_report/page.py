@@ -16,7 +16,7 @@ from drone_mesh.lab.run_report.tables import (
     repair_rows,
     repairs_left,
 )
-from drone_mesh.state.trouble import find_trouble, summarise
+from drone_mesh.state.condition import find_trouble, summarise
 from drone_mesh.view.palette import DARK, LIGHT, css_variables
 
 ROWS_SHOWN = 40  # a longer table of outages is folded

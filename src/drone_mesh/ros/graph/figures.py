@@ -11,6 +11,11 @@ from drone_mesh.ros.graph.periodic import Periodic
 HARDWARE_ID = "drone_mesh"
 PERIOD_S = 1.0  # wall: diagnostics go on while simulated time stands still
 
+# Names of figures that several processes or their readers share.
+DELIVERED = "delivered"  # packets handed to a node, counting each receiver of a broadcast
+LOST_IN_RANGE = "lost in range"  # packets for a node that is on, in range and has listened before
+WORST_LAG = "worst timer lag"  # s, simulated: the longest delay of a timer since the last report
+
 
 class FiguresPublisher(Periodic):
     """Publishes measurements once a second, in a thread of its own.

@@ -15,7 +15,7 @@ from drone_mesh.ros.graph.conversions import event_msg, ros_time
 from drone_mesh.ros.graph.periodic import Periodic
 from drone_mesh.ros.graph.run import Run, run_headers
 from drone_mesh.ros.host.node_snapshots import NodeSnapshots, Worker
-from drone_mesh.state.events import EventBatcher
+from drone_mesh.state.observation import EventBatcher
 
 REPORT_PERIOD_S = 0.5  # wall time; an event is seen soon
 REPORT_PERIOD_PER_NODE_S = 0.004  # 254 nodes with 200 neighbours each, once a second

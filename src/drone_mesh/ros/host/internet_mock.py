@@ -16,7 +16,7 @@ from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import location_of
 from drone_mesh.ros.graph.logs import ThrottledLog
 from drone_mesh.srv import PowerSwitch, PowerSwitchRequest, PowerSwitchResponse
-from drone_mesh.web.allowance import Allowance
+from drone_mesh.web.access import Allowance
 
 _QUEUE = 512  # answers that may wait for a slow DroneManager: two whole fleets
 

@@ -10,7 +10,7 @@ from typing import Callable, Mapping
 from drone_mesh.drone.roles import Role
 from drone_mesh.errors import MeshError
 from drone_mesh.execution import ExecutorSlot, MeshExecutor
-from drone_mesh.ros.graph.figures import FiguresPublisher
+from drone_mesh.ros.graph.figures import LOST_IN_RANGE, WORST_LAG, FiguresPublisher
 from drone_mesh.ros.graph.waiting import comes_true
 from drone_mesh.ros.host.announcements import PlaceOf
 from drone_mesh.ros.host.flown_drones import GroundedDrones
@@ -20,7 +20,6 @@ from drone_mesh.ros.host.radios import Radios
 from drone_mesh.ros.host.silent_engines import SilentEngines
 from drone_mesh.ros.host.virtual_nrf24 import VirtualRadios
 from drone_mesh.ros.host.virtual_raspberry_pi import VIRTUAL_RASPBERRY_PIS, VirtualRaspberryPi
-from drone_mesh.state.figures import LOST_IN_RANGE, WORST_LAG
 
 RADIOS_TIMEOUT_S = 10.0  # wall seconds to wait for a simulator before starting nodes
 

@@ -20,12 +20,11 @@ from drone_mesh.msg import NRF24, DroneInfo
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import start_node
 from drone_mesh.ros.graph.direct_publisher import DirectPublisher
-from drone_mesh.ros.graph.figures import FiguresPublisher
+from drone_mesh.ros.graph.figures import DELIVERED, LOST_IN_RANGE, FiguresPublisher
 from drone_mesh.ros.graph.logs import ThrottledLog, show_library_logs_on_rosout
 from drone_mesh.ros.graph.master_watch import MasterWatch
 from drone_mesh.ros.graph.packet_samples import PacketSamples
 from drone_mesh.ros.graph.parameters import configured_obstacles, factory_configuration, or_exit
-from drone_mesh.state.figures import DELIVERED, LOST_IN_RANGE
 
 STUCK_RECEIVER_S = 0.2  # a receiver that does not read for this long is disconnected
 

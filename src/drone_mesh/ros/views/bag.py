@@ -15,7 +15,7 @@ from typing import Any, Callable, Iterable, Iterator, Sequence, TypeVar
 import rosbag
 
 from drone_mesh.console.dots import RecordedDots, make_dots
-from drone_mesh.console.real_mesh import events_of, origin_of, real_mesh
+from drone_mesh.console.gateway_client import events_of, origin_of, real_mesh
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.errors import MeshError
 from drone_mesh.mobility.gateway_record import FIRST_BYTE, answers

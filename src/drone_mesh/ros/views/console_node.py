@@ -18,8 +18,7 @@ from drone_mesh.console.frame_store import FrameStore
 from drone_mesh.console.history import History
 from drone_mesh.console.memory import ConsoleMemory, memory_of
 from drone_mesh.console.orders import LayoutOffer, places_of
-from drone_mesh.console.page_token import PageToken
-from drone_mesh.console.runner import ConsoleRunner
+from drone_mesh.console.runner import ConsoleRunner, PageToken
 from drone_mesh.console.server import ConsoleServer
 from drone_mesh.console.tiles import open_tiles
 from drone_mesh.errors import ConfigurationError, naming_argument

@@ -23,7 +23,6 @@ from drone_mesh.state.links import (
     shortest,
 )
 from drone_mesh.state.model import NodeStatus, ObstacleStatus, position_is_known, waypoints
-from drone_mesh.view.fan import fanned_positions
 from drone_mesh.view.palette import DARK, Colour, rgb  # rviz has a dark background
 from drone_mesh.view.quadrocopter import (
     BLADE_WIDTH_M,
@@ -34,7 +33,7 @@ from drone_mesh.view.quadrocopter import (
     lamp_file,
     turned_rad,
 )
-from drone_mesh.view.scene import Shape, shape_named
+from drone_mesh.view.scene import Shape, fanned_positions, shape_named
 
 MOST_LINKS = 1500  # per use: 254 drones 1 m apart have 18,000 links
 TIMES_LARGER = 4.0  # how much larger than life drones are drawn

@@ -26,8 +26,8 @@ from drone_mesh.ros.views.state_source import (
     parse_with_bag,
     state_in_bag,
 )
+from drone_mesh.state.condition import all_connected, find_trouble
 from drone_mesh.state.model import MeshStatus
-from drone_mesh.state.trouble import all_connected, find_trouble
 from drone_mesh.view.table import mesh_table
 
 WATCH_PERIOD_S = 1.0

@@ -8,8 +8,8 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from drone_mesh.ros.graph.conversions import ros_time
 from drone_mesh.ros.graph.figures import HARDWARE_ID
+from drone_mesh.state.condition import Trouble, find_trouble, summarise
 from drone_mesh.state.model import MeshStatus, NodeStatus, channel_in_words, data_in_words
-from drone_mesh.state.trouble import Trouble, find_trouble, summarise
 
 
 def diagnostics_msg(mesh: MeshStatus) -> DiagnosticArray:

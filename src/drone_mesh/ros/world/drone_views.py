@@ -6,8 +6,7 @@ import math
 from dataclasses import replace
 from typing import Iterable
 
-from drone_mesh.state.observation import describe_drone
-from drone_mesh.state.roster import DroneView
+from drone_mesh.state.observation import DroneView, describe_drone
 from drone_mesh.world.factory import VirtualDrone
 
 

@@ -17,7 +17,7 @@ from drone_mesh.ros.graph.periodic import Periodic
 from drone_mesh.ros.graph.run import Run, is_left_behind, run_headers
 from drone_mesh.ros.world.diagnostics import diagnostics_msg
 from drone_mesh.state.model import EventRecord, MeshStatus
-from drone_mesh.state.roster import DroneView, MeshRoster
+from drone_mesh.state.observation import DroneView, MeshRoster
 
 WATCHED_PERIOD_S = 0.2  # wall time between two states with a subscriber: flights look smooth
 UNWATCHED_PERIOD_S = 1.0  # and without one: the greatest age of the latched state
