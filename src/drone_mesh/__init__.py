@@ -5,9 +5,8 @@ package (docs/architecture.md, "What users may import").
 """
 
 from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE
-from drone_mesh.communication.repair.actions import Step
-from drone_mesh.communication.repair.interfaces import IRepairStrategy
-from drone_mesh.communication.repair.strategies.thesis import Thesis
+from drone_mesh.communication.repair.interfaces import IRepairStrategy, Step
+from drone_mesh.communication.repair.strategies import Thesis
 from drone_mesh.communication.routing.child_table_tree import ChildTableTree
 from drone_mesh.communication.routing.interfaces import IRoutingTechnique
 from drone_mesh.communication.timing import MeshTiming

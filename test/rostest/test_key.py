@@ -13,8 +13,7 @@ import rospy
 import rostest
 from rostest_support import WALL_LIMIT_S, MeshWatch, call, wait_for
 
-from drone_mesh.communication.seals.key_file import write_key_file
-from drone_mesh.communication.seals.keys import MeshKey
+from drone_mesh.communication.seals.keys import MeshKey, write_key_file
 from drone_mesh.msg import NRF24
 from drone_mesh.ros.graph import names
 from drone_mesh.srv import RequestDroneFlight

@@ -14,8 +14,7 @@ from typing import Callable, Iterator
 import pytest
 
 from drone_mesh.air.obstacle_file import read_obstacles
-from drone_mesh.communication.seals.key_file import read_key_file
-from drone_mesh.communication.seals.keys import KEY_BYTES
+from drone_mesh.communication.seals.keys import KEY_BYTES, read_key_file
 from drone_mesh.configuration import load_configuration
 from drone_mesh.console import tiles
 from drone_mesh.drone.geodesy import Origin

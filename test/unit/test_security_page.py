@@ -9,13 +9,14 @@ from pathlib import Path
 import pytest
 from proofs import attacks, claims, damage
 
-from drone_mesh.communication.beacon import proofs, trickle
+from drone_mesh.communication.beacon.connection import AGAIN_S, PERIOD_S
+from drone_mesh.communication.beacon.times import JITTER
 from drone_mesh.communication.control import control_plane
 from drone_mesh.communication.data import packets as data
 from drone_mesh.communication.events import complaints
 from drone_mesh.communication.heartbeats import detours, node_search
 from drone_mesh.communication.interfaces import BROADCAST, MAX_NODE_ID, PAYLOAD_BYTES
-from drone_mesh.communication.repair import bid_credit
+from drone_mesh.communication.repair import election
 from drone_mesh.communication.seals import end_to_end, keys, message_seal, replay, seal
 from drone_mesh.communication.seals import sealed_antenna as antenna
 from drone_mesh.communication.timing import LIMIT_PERIOD_S, REPEATS, STRANGERS, MeshTiming
@@ -33,7 +34,7 @@ WORDS = ("no", "one", "two", "three")
 
 SENTENCES = [
     f"limited to three check periods ({antenna.FRESH_PERIODS * CHECK_S:.0f} s)",
-    f"after {WORDS[bid_credit.WINNERS_WITHOUT_FLIGHT]} winners that do not fly",
+    f"after {WORDS[election.WINNERS_WITHOUT_FLIGHT]} winners that do not fly",
     f"at most once in {complaints.COMPLAINT_PERIOD_S:g} s per kind",
     f"in {guarded_app.REFUSAL_LOG_PERIOD_S:g} s. In the simulation",
     f"makes a mesh key of {8 * keys.KEY_BYTES} random bits",
@@ -78,9 +79,9 @@ SENTENCES = [
     f"at that one of {('four', 'five')[len(damage.PLACES) - 4]} places",
     f"Meanwhile the owner orders {len(claims.ORDERED)} drones away by {claims.ORDERED_M:g} m and "
     f"sends each drone a message, one in {claims.MESSAGE_PERIOD_S:g} s.",
-    f"a heartbeat within {proofs.AGAIN_S:g} s after it connects",
-    f"again after {proofs.AGAIN_S:g} to {2 * proofs.AGAIN_S:g} s until the gateway",
-    f"every {proofs.PERIOD_S * (1 - trickle.JITTER):g} to {proofs.PERIOD_S:g} s. After a restart",
+    f"a heartbeat within {AGAIN_S:g} s after it connects",
+    f"again after {AGAIN_S:g} to {2 * AGAIN_S:g} s until the gateway",
+    f"every {PERIOD_S * (1 - JITTER):g} to {PERIOD_S:g} s. After a restart",
     f"more than {damage.LURED_M:g} m from their place, or more than {damage.OFF_ORDER_M:g} m from",
     f"| {STRANGERS} losses in {LIMIT_PERIOD_S:g} s; until the {LIMIT_PERIOD_S:g} s are over",
     f"| {REPEATS} announcements in {LIMIT_PERIOD_S:g} s;",

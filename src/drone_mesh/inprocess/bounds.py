@@ -6,8 +6,7 @@ from typing import Callable, Iterable, Mapping
 
 from drone_mesh.air.graph import hops_from
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.repair.actions import Step
-from drone_mesh.communication.repair.interfaces import IRepairStrategy
+from drone_mesh.communication.repair.interfaces import IRepairStrategy, Step
 from drone_mesh.communication.routing.child_table_tree import ChildTableTree
 from drone_mesh.drone.location import Location
 from drone_mesh.inprocess.clock import Clock

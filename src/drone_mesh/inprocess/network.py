@@ -9,9 +9,8 @@ from typing import Callable, Iterable, Mapping
 
 from drone_mesh.air.graph import hops_from
 from drone_mesh.communication.control.delivery import ITechnique
-from drone_mesh.communication.data.echo import OnEchoAnswer
-from drone_mesh.communication.data.ticket import Ticket
-from drone_mesh.communication.data.transport import ReceivedMessage
+from drone_mesh.communication.data.outgoing import Ticket
+from drone_mesh.communication.data.transport import OnEchoAnswer, ReceivedMessage
 from drone_mesh.communication.events.observer import MeshEvent
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.node.assembly import Security, assemble_node

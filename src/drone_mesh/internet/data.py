@@ -16,8 +16,8 @@ from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 from typing_extensions import Annotated
 
+from drone_mesh.communication.data.outgoing import TO_ALL, TicketState
 from drone_mesh.communication.data.packets import MAX_DATA_PORT
-from drone_mesh.communication.data.ticket import TO_ALL, TicketState
 from drone_mesh.communication.data.transport import ReceivedMessage
 from drone_mesh.errors import MessageRefused, QueueFull
 from drone_mesh.internet.guarded_app import UNDONE, Refusal

@@ -22,7 +22,7 @@ from paho.mqtt.enums import CallbackAPIVersion
 from paho.mqtt.properties import Properties
 from paho.mqtt.reasoncodes import ReasonCode
 
-from drone_mesh.communication.data.ticket import Ticket
+from drone_mesh.communication.data.outgoing import Ticket
 from drone_mesh.communication.data.transport import ReceivedMessage
 from drone_mesh.communication.events.observer import MeshEvent
 from drone_mesh.communication.interfaces import (

@@ -19,8 +19,8 @@ from typing import NamedTuple
 from urllib.parse import urlsplit
 
 from drone_mesh.arguments import is_up_to
+from drone_mesh.communication.data.outgoing import TO_ALL
 from drone_mesh.communication.data.packets import MAX_DATA_PORT
-from drone_mesh.communication.data.ticket import TO_ALL
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.errors import ConfigurationError
 

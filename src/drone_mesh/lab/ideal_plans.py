@@ -9,7 +9,7 @@ import functools
 from typing import AbstractSet, Callable, Dict, Mapping
 
 from drone_mesh.air.graph import Graph, within
-from drone_mesh.communication.repair.strategies.inward import MOVES
+from drone_mesh.communication.repair.strategies import MOVES
 from drone_mesh.drone.location import Location
 
 Places = Dict[int, Location]

@@ -10,8 +10,8 @@ import contextlib
 import random
 from dataclasses import dataclass
 
-from drone_mesh.communication.data.echo import EchoAnswer
-from drone_mesh.communication.data.ticket import TO_GATEWAY
+from drone_mesh.communication.data.outgoing import TO_GATEWAY
+from drone_mesh.communication.data.transport import EchoAnswer
 from drone_mesh.errors import MeshError
 from drone_mesh.inprocess import Network
 from drone_mesh.lab.network_sample import gateways_of, physical_graph

@@ -8,7 +8,7 @@ import random
 from dataclasses import dataclass
 from typing import Callable, ContextManager, Iterable, Iterator, NamedTuple, Sequence
 
-from drone_mesh.communication.data.ticket import Ticket
+from drone_mesh.communication.data.outgoing import Ticket
 from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.errors import QueueFull
 from drone_mesh.inprocess import Network

@@ -9,8 +9,7 @@ from typing import Sequence
 
 from drone_mesh.arguments import whole
 from drone_mesh.communication.interfaces import MAX_NODE_ID
-from drone_mesh.communication.seals.key_file import read_key_file, write_key_file
-from drone_mesh.communication.seals.keys import KEY_BYTES, MeshKey
+from drone_mesh.communication.seals.keys import KEY_BYTES, MeshKey, read_key_file, write_key_file
 from drone_mesh.errors import ConfigurationError, naming_argument
 from drone_mesh.stopping import ends_as
 

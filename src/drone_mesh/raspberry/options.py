@@ -12,9 +12,8 @@ from drone_mesh.arguments import decimal, whole
 from drone_mesh.channel.antenna import DEBUG_PERIOD_S
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.communication.node.node_configuration import ROUTING_TECHNIQUES, NodeConfiguration
-from drone_mesh.communication.repair.named_strategies import REPAIR_STRATEGIES
-from drone_mesh.communication.seals.key_file import read_key_file
-from drone_mesh.communication.seals.keys import MeshKey, NodeKeys
+from drone_mesh.communication.repair.strategies import REPAIR_STRATEGIES
+from drone_mesh.communication.seals.keys import MeshKey, NodeKeys, read_key_file
 from drone_mesh.communication.timing import MIN_REPORT_PERIOD_S
 from drone_mesh.drone.engines import FlightOptions
 from drone_mesh.drone.goal import check_goal

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any, Callable, Optional, Sequence, Tuple
 
 from drone_mesh.arguments import MOST, decimal, whole
+from drone_mesh.communication.data.outgoing import TO_ALL, TO_GATEWAY
 from drone_mesh.communication.data.packets import MAX_DATA_PORT, MAX_MESSAGE_BYTES, check_size
-from drone_mesh.communication.data.ticket import TO_ALL, TO_GATEWAY
 from drone_mesh.communication.events.observer import in_hops
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.stopping import ends_as

@@ -9,9 +9,8 @@ from collections import deque
 from concurrent import futures
 from typing import Callable
 
-from drone_mesh.communication.data.echo import EchoAnswer
-from drone_mesh.communication.data.ticket import Ticket, TicketState
-from drone_mesh.communication.data.transport import ReceivedMessage, Receiver, Transport
+from drone_mesh.communication.data.outgoing import Ticket, TicketState
+from drone_mesh.communication.data.transport import EchoAnswer, ReceivedMessage, Receiver, Transport
 from drone_mesh.errors import MessageRefused, QueueFull
 from drone_mesh.execution import Submit
 

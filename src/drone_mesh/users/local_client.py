@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, Iterator, Mapping, NamedTuple
 
 from drone_mesh.arguments import whole
-from drone_mesh.communication.data.ticket import TO_ALL, TO_GATEWAY
+from drone_mesh.communication.data.outgoing import TO_ALL, TO_GATEWAY
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.errors import MeshError
 

@@ -9,7 +9,7 @@ import random
 import pytest
 
 from drone_mesh.communication.beacon.packets import Beacon
-from drone_mesh.communication.data.ticket import TicketState
+from drone_mesh.communication.data.outgoing import TicketState
 from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.communication.seals.keys import MeshKey
 from drone_mesh.communication.timing import MeshTiming

@@ -1,7 +1,7 @@
 import data_cases
 import pytest
 
-from drone_mesh.communication.data.ticket import TicketState
+from drone_mesh.communication.data.outgoing import TicketState
 from drone_mesh.inprocess import Network
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from drone_mesh.communication.data.ticket import TicketState
+from drone_mesh.communication.data.outgoing import TicketState
 from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.communication.node.node_configuration import ROUTING_TECHNIQUES
 from drone_mesh.communication.wire.packet_types import MessageType

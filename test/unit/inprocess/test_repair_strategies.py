@@ -8,11 +8,11 @@ import pytest
 from scenarios import LAYOUTS, events, fleet, flown, layout, line, outage, run_until
 
 from drone_mesh.communication.repair.interfaces import IRepairStrategy
-from drone_mesh.communication.repair.named_strategies import (
+from drone_mesh.communication.repair.strategies import (
     REPAIR_STRATEGIES,
+    Stay,
     create_repair_strategy,
 )
-from drone_mesh.communication.repair.strategies.stay import Stay
 from drone_mesh.communication.routing.child_table_tree import ChildTableTree
 from drone_mesh.communication.wire.messages import GoToLocationMessage
 from drone_mesh.errors import ConfigurationError
@@ -195,7 +195,7 @@ def test_with_field_the_drones_move_towards_the_gateway_leg_by_leg():
 
 
 def test_a_users_own_strategy_is_created_by_its_module_and_class():
-    network = Network(repair="drone_mesh.communication.repair.strategies.stay:Stay")
+    network = Network(repair="drone_mesh.communication.repair.strategies:Stay")
     network.add_router(1, 0.0, 0.0)
     assert isinstance(create_repair_strategy("stay"), IRepairStrategy)
 

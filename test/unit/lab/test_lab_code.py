@@ -24,7 +24,7 @@ metrics: [packets]
 compare: {over: repair, baseline: stay}
 """
 STRATEGY = "from edited_helper import Stay\n\n\nclass Mine(Stay):\n    pass\n"
-HELPER = "from drone_mesh.communication.repair.strategies.stay import Stay\n"
+HELPER = "from drone_mesh.communication.repair.strategies import Stay\n"
 
 
 @pytest.fixture

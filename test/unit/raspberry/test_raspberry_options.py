@@ -8,8 +8,7 @@ import pytest
 
 from drone_mesh.communication.node.node_configuration import NodeConfiguration
 from drone_mesh.communication.repair.options import LostPlace, RepairOptions
-from drone_mesh.communication.seals.key_file import write_key_file
-from drone_mesh.communication.seals.keys import MeshKey
+from drone_mesh.communication.seals.keys import MeshKey, write_key_file
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone import Location
 from drone_mesh.drone.engines import FlightOptions
@@ -188,7 +187,8 @@ def test_emulated_nodes_need_no_id():
             "technique 'gossip': use one of babel, batman, beacon, child_table_tree",
         ),
         ("--id 3 --repair hope", "unknown repair strategy 'hope': use one of field, follow, home"),
-        ("--id 3 --clearance 0", "invalid clearance 0.0: must be above 0 metres"),
+        ("--id 3 --clearance 0", "invalid clearance 0.0: expected metres, above 0, at most 100"),
+        ("--id 3 --range nan", "invalid range nan: expected metres, above 0, at most 10000"),
         ("--id 3 --latitude 5", "--latitude and --longitude: give both, or neither"),
         ("--id 3 --latitude 5001 --longitude 0", "latitude 5001 m is outside -5000..5000 m"),
         ("--id 3 --latitude 0 --longitude inf", "longitude inf is not a finite number"),

@@ -60,7 +60,7 @@ def test_an_echo_is_no_longer_waited_for_when_its_node_stops(rig):
 
 def test_an_echo_without_an_answer_names_the_neighbour_with_another_key(rig):
     network = rig.network
-    network.nodes[2].component.data._echoes.asked = lambda _creator, _body: None
+    network.nodes[2].component.data._send_packet = lambda *_packet: False
     assert rig.desks[0].echo(2, 0.01) is None
     reason = "a neighbour, node 9, sends packets without a seal: it has no key"
     network.nodes[0].component.complaints.foreign(1, reason, b"", network.now_s())

@@ -1,37 +1,43 @@
-"""Connection: what the router of a node with beacons is told about its gateway."""
+"""The gateway of a node with beacons: whether it is reached, and what proves that."""
 
 from __future__ import annotations
 
 import math
+import random
+from dataclasses import dataclass
 
-from drone_mesh.communication.beacon.own_motion import OwnMotion
+from drone_mesh.communication.beacon.courier import Courier
+from drone_mesh.communication.beacon.own_beacons import OwnMotion
 from drone_mesh.communication.beacon.packets import newer
 from drone_mesh.communication.beacon.routes import PROVEN_S, BeaconRoutes
+from drone_mesh.communication.beacon.times import JITTER
 from drone_mesh.communication.control.control_plane import IControlHost
-from drone_mesh.communication.control.places import KnownPlaces
+from drone_mesh.communication.control.places import KnownPlaces, PlaceRequests
 from drone_mesh.communication.control.router_states import RepairState, RouterEvent, RouterStates
+from drone_mesh.communication.events.complaints import Complaints
 from drone_mesh.communication.events.observer import MeshEventKind, Reporter, in_hops
-from drone_mesh.communication.interfaces import NO_ROUTE, IWirelessCommunication
+from drone_mesh.communication.interfaces import NO_ROUTE, IMeshSeals, IWirelessCommunication
+from drone_mesh.communication.wire import messages
 
 CHECK_S = 1.0  # how often a router without a gateway considers its repair
+ASKS_S = 10.0  # at most so often for the place of a gateway that moves
+PERIOD_S = 60.0  # a router and its gateway tell each other the nonces of their seals
+AGAIN_S = 5.0  # until the gateway has answered twice
 
 
+@dataclass(eq=False)
 class Connection:
     """Whether this router is connected, and where its next hop is, told when that changes."""
 
-    def __init__(
-        self,
-        host: IControlHost,
-        states: RouterStates,
-        routes: BeaconRoutes,
-        motion: OwnMotion,
-        places: KnownPlaces,
-        antenna: IWirelessCommunication,
-        report: Reporter,
-    ) -> None:
-        self._host, self._states = host, states
-        self._places, self._antenna, self._report = places, antenna, report
-        self._routes, self._motion = routes, motion
+    _host: IControlHost
+    _states: RouterStates
+    _routes: BeaconRoutes
+    _motion: OwnMotion
+    _places: KnownPlaces
+    _antenna: IWirelessCommunication
+    _report: Reporter
+
+    def __post_init__(self) -> None:
         self._check_s = -math.inf
         self._was_connected = False
         self._told = False  # the repair, of this connection
@@ -116,3 +122,83 @@ class Connection:
         if self._routes.offline:
             return False  # its gateway is in reach and has no internet: a flight repairs nothing
         return self._antenna.on() and self._host.may_connect(NO_ROUTE, False)
+
+
+@dataclass(eq=False)
+class Proofs:
+    """What a node with a key exchanges with its gateway because beacons prove nothing.
+
+    Heartbeats tell the nonces that seals of orders and reports need (docs/security.md, "End-to-end
+    seal"); nothing else in a mesh with beacons depends on them. The gateway is asked for its place.
+    """
+
+    _node_id: int
+    _is_gateway: bool
+    _routes: BeaconRoutes
+    _courier: Courier
+    _requests: PlaceRequests
+    _places: KnownPlaces
+    _seals: IMeshSeals
+    _complaints: Complaints
+    _rng: random.Random
+
+    def __post_init__(self) -> None:
+        self.has_key = self._seals.has_key
+        self.due_s = math.inf  # the next heartbeat
+        self._asked_s, self._ask_s = -math.inf, math.inf  # for the place of the gateway: last, next
+        self._proven: int | None = None  # the gateway that answered the last one
+
+    def begin(self) -> None:
+        """Begin anew for another gateway, at a random moment: many nodes find it at once."""
+        if self.has_key and not self._routes.is_root:
+            self.due_s = self._routes.now_s + AGAIN_S * self._rng.random()
+
+    def connected(self) -> None:
+        """A gateway is reached."""
+        if self.due_s == math.inf:
+            self.begin()
+
+    def ask_soon(self) -> None:
+        """A beacon tells another place of the gateway than it told itself."""
+        now_s = self._routes.now_s
+        if self._ask_s == math.inf and now_s - self._asked_s >= ASKS_S:
+            self._ask_s = now_s + AGAIN_S * self._rng.random()  # others hear the same
+
+    @property
+    def next_s(self) -> float:
+        """When to call `on_time` next."""
+        return min(self.due_s, self._ask_s)
+
+    def _ask(self) -> None:
+        self._asked_s, self._ask_s = self._routes.now_s, math.inf
+        self._requests.ask(self._routes.gateway)
+
+    def on_time(self) -> None:
+        """Do what is due."""
+        now_s = self._routes.now_s
+        if now_s >= self._ask_s:
+            self._ask()
+        if now_s < self.due_s:
+            return
+        me, gateway = self._node_id, self._routes.gateway
+        if self._routes.parent == NO_ROUTE:
+            self.due_s = math.inf
+            return
+        self.due_s = now_s + AGAIN_S * (1.0 + self._rng.random())
+        self._routes.tried[gateway] += not self._seals.may_be_gateway(gateway)
+        self._courier.send_own(messages.heartbeat(me, me, gateway, gateway, True, gateway))
+        if self._places.asks_gateway:
+            self._ask()
+
+    def heard(self, payload: bytes, creator: int) -> None:
+        """A node tells this gateway its nonce, or the gateway answers."""
+        now_s, me = self._routes.now_s, self._node_id
+        if not self.has_key:
+            self._complaints.dropped("a heartbeat of another technique", payload, now_s)
+        elif messages.preferred_gateway(payload) != creator:  # gateways do not answer each other
+            if self._is_gateway:
+                self._courier.send_own(messages.heartbeat(me, me, creator, creator, True, me))
+        elif creator == self._routes.gateway:
+            if self._proven == creator:  # its second answer: by now it has a proof of this node
+                self.due_s = now_s + PERIOD_S * (1.0 - JITTER * self._rng.random())
+            self._proven = creator

@@ -8,6 +8,7 @@ until the plane finds one, or gives it up.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, field
 from typing import Callable, Hashable
 
 from drone_mesh.communication.control.delivery import IDelivery
@@ -24,56 +25,39 @@ REMEMBERED_S = 3.0  # longer than a packet is held
 SAME_S = 0.5  # a packet that comes again from the same neighbour within it is a copy
 
 
+@dataclass(eq=False)
 class Transit:
     """One packet on its way through this node."""
 
-    __slots__ = (
-        "addressee", "came_from", "creator", "failed_s", "kind", "payload", "seen_s", "sent_s",
-        "tries",
-    )  # fmt: skip
+    payload: bytes  # as it came, or as this node made it
+    came_from: int  # the neighbour; NO_ROUTE: this node made it
+    seen_s: float
+    sent_s: dict[int, float] = field(default_factory=dict)  # neighbours that have it, since when
+    failed_s: dict[int, float] = field(default_factory=dict)  # that did not take it, and when
+    tries: int = 0
 
-    def __init__(self, payload: bytes, came_from: int, now_s: float) -> None:
-        self.payload = payload  # as it came, or as this node made it
-        self.creator, _from, self.kind, _to, self.addressee = messages.header(payload)
-        self.came_from = came_from  # the neighbour; NO_ROUTE: this node made it
-        self.seen_s = now_s
-        self.sent_s: dict[int, float] = {}  # neighbours that have it, and since when
-        self.tries = 0
-        self.failed_s: dict[int, float] = {}  # neighbours that did not take it, and when
+    def __post_init__(self) -> None:
+        self.creator, _from, self.kind, _to, self.addressee = messages.header(self.payload)
 
 
 Verdict = Callable[[Transit], int]
 
 
+@dataclass(eq=False)
 class Courier(IDelivery):
     """The packets of one node. Called only by its control plane and its parts."""
 
-    def __init__(
-        self,
-        node_id: int,
-        antenna: IWirelessCommunication,
-        deadlines: Deadlines,
-        attempts: int,
-        verdict: Verdict,
-        on_sent: Callable[[int], None],
-        on_failed: Callable[[int], None],
-        on_returned: Callable[[int, int], None],
-        without_proof: Callable[[bytes], bytes],
-    ) -> None:
-        """`attempts`: of a packet for one neighbour.
+    _node_id: int
+    _antenna: IWirelessCommunication
+    _deadlines: Deadlines
+    _attempts: int  # of a packet for one neighbour
+    _verdict: Verdict
+    _on_sent: Callable[[int], None]  # a neighbour took a packet
+    _on_failed: Callable[[int], None]  # or did not
+    _on_returned: Callable[[int, int], None]  # it sent one back, for this addressee
+    _without_proof: Callable[[bytes], bytes]  # see IMeshSeals
 
-        `on_sent`, `on_failed`: a neighbour took a packet, or did not; `on_returned`: it sent one
-        back, for this addressee; `without_proof`: see IMeshSeals.
-        """
-        self._node_id = node_id
-        self._antenna = antenna
-        self._deadlines = deadlines
-        self._attempts = attempts
-        self._verdict = verdict
-        self._on_sent = on_sent
-        self._on_failed = on_failed
-        self._on_returned = on_returned
-        self._without_proof = without_proof
+    def __post_init__(self) -> None:
         self._held: list[Transit] = []
         # Two tables used in turn, so that old packets are forgotten without a search for them.
         self._known: dict[Hashable, Transit] = {}
@@ -143,12 +127,10 @@ class Courier(IDelivery):
         """Send a packet on, hold it or drop it (False)."""
         while transit.tries < MOST_HOPS_TRIED:
             to = self._verdict(transit)
-            if to == HOLD:
-                if len(self._held) >= MOST_HELD:
-                    return False
+            if to == HOLD and len(self._held) < MOST_HELD:
                 self._held.append(transit)
                 return True
-            if to == DROP:
+            if to in (HOLD, DROP):
                 return False
             if transit.came_from == NO_ROUTE:
                 onward: bytes | None = messages.readdressed(transit.payload, to)

@@ -4,19 +4,14 @@ from __future__ import annotations
 
 import math
 
-from drone_mesh.communication.beacon.connection import Connection
+from drone_mesh.communication.beacon.connection import Connection, Proofs
 from drone_mesh.communication.beacon.courier import Courier, QueuedCourier
-from drone_mesh.communication.beacon.losses import LUCKY
-from drone_mesh.communication.beacon.nodes_below import NodesBelow
-from drone_mesh.communication.beacon.own_beacons import OwnBeacons
-from drone_mesh.communication.beacon.own_motion import OwnMotion
+from drone_mesh.communication.beacon.neighbour import LUCKY
+from drone_mesh.communication.beacon.own_beacons import NodesBelow, OwnBeacons, OwnMotion
 from drone_mesh.communication.beacon.packets import Beacon, Found, Search, names_gateway
-from drone_mesh.communication.beacon.parent_watch import ParentWatch
-from drone_mesh.communication.beacon.proofs import Proofs
 from drone_mesh.communication.beacon.routes import BeaconRoutes
-from drone_mesh.communication.beacon.search import Searches
-from drone_mesh.communication.beacon.trickle import Trickle
-from drone_mesh.communication.beacon.verdicts import Verdicts
+from drone_mesh.communication.beacon.times import ParentWatch, Trickle
+from drone_mesh.communication.beacon.verdicts import Searches, Verdicts
 from drone_mesh.communication.control.control_plane import (
     ControlledNode,
     IControlPlane,

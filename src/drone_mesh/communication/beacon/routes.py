@@ -10,8 +10,7 @@ from collections import Counter
 from operator import attrgetter, itemgetter
 from typing import Callable, Iterator, NamedTuple, Tuple
 
-from drone_mesh.communication.beacon.losses import WRONG, Losses
-from drone_mesh.communication.beacon.neighbour import Neighbour
+from drone_mesh.communication.beacon.neighbour import WRONG, Losses, Neighbour
 from drone_mesh.communication.beacon.packets import (
     ANCESTORS,
     NO_ANCESTORS,

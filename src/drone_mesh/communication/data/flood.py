@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from drone_mesh.communication.data import packets
-from drone_mesh.communication.data.ticket import TO_ALL
+from drone_mesh.communication.data.outgoing import TO_ALL
 from drone_mesh.communication.interfaces import IWirelessCommunication
 from drone_mesh.communication.timing import Deadlines
 from drone_mesh.communication.wire import messages

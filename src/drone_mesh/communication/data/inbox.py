@@ -1,23 +1,178 @@
-"""Inbox: the messages from one sender."""
+"""Inbox: the messages from one sender, put together from their fragments."""
 
 from __future__ import annotations
 
 import math
 from collections import OrderedDict
-from typing import Callable
+from dataclasses import dataclass, field
+from typing import Callable, NamedTuple, Optional
 
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.ordering import PortOrder
-from drone_mesh.communication.data.packets import COMPLETE, Ack, Poll
-from drone_mesh.communication.data.reassembly import Open, Reassembly, Whole
+from drone_mesh.communication.data.packets import COMPLETE, Ack, Head, Poll, Whole
 from drone_mesh.communication.timing import Medium
 
+EXPIRES_S = 60.0  # an incomplete message is dropped after this time without fragments
+MOST_PARTIAL = 24  # incomplete messages of one sender, which has at most 16 under way
+_LIVE = 64  # numbers: older messages are no longer under way
+DONE_S = 300.0  # longer than a sender retries (LIFETIME_S of outgoing.py)
+SILENCE_S = 5.0  # in less, a sender does not use 192 numbers that all get lost
 ACK_DELAY_S = 0.02  # complete messages are acknowledged after a pause of this time
 ACK_LATEST_S = 0.2  # or after this time without a pause
 ACK_AT = 96  # after this many fragments of complete messages an ACK leaves at once
 REPEAT_S = 0.3  # least time between unsolicited repetitions of an ACK
 MOST_PORTS = 64  # per sender: the order is kept for the ports used last
 FORMER_SESSION_S = 30.0  # longer than a packet can take to arrive
+
+
+Open = Callable[[bytes, bytes], Optional[bytes]]
+"""Turns the place and the sealed bytes of a message into its content; None: not authentic."""
+
+
+class _Done(NamedTuple):
+    """A message that was complete. Its number comes again after 256 messages.
+
+    After a silence of its sender a fragment 0 or a POLL tells whether the numbers still stand.
+    """
+
+    fingerprint: tuple[int, ...]
+    since_s: float
+    is_certain: bool = True
+
+
+@dataclass
+class _Partial:
+    touched_s: float
+    head: Head | None = None
+    bodies: dict[int, bytes] = field(default_factory=dict)
+    has: int = 0  # the fragments that have arrived, as bits
+
+
+class Reassembly:
+    """Reassembles the messages of one sender. Memory: MOST_PARTIAL messages at most."""
+
+    def __init__(self, room: int, open_message: Open) -> None:
+        """`room`: bytes of a body."""
+        self._room = room
+        self._open = open_message
+        self._partial: OrderedDict[int, _Partial] = OrderedDict()  # by number, oldest first
+        self._done: OrderedDict[int, _Done] = OrderedDict()  # the latest complete ones, by number
+        self._heard_s = -math.inf
+
+    def add(self, index: int, body: bytes, now_s: float) -> Whole | None:
+        """Add a fragment; returns the message if it is complete.
+
+        Drops a message that is damaged or not authentic.
+        """
+        number = body[0]
+        head = packets.head_of(body) if index == 0 else None
+        partial = self._partial.get(number)
+        known = None if partial is None else partial.head
+        is_other = head and known and known.fingerprint != head.fingerprint
+        if partial is None or is_other:  # the number belongs to another message now
+            self._partial.pop(number, None)
+            while len(self._partial) >= MOST_PARTIAL:
+                self._partial.popitem(last=False)
+            partial = self._partial[number] = _Partial(now_s)
+        partial.touched_s = now_s
+        head = partial.head = head or partial.head
+        partial.bodies[index] = body
+        partial.has |= 1 << index
+        if head is None:
+            return None
+        count = packets.count_of(head.length, self._room)
+        if partial.has & (1 << count) - 1 != (1 << count) - 1:
+            return None
+        del self._partial[number]
+        bodies = [partial.bodies[n] for n in range(count)]
+        sealed = packets.joined(bodies, head.length, self._room)
+        place = head.session, head.port, head.order
+        if packets.checksum(*place, sealed) != head.checksum:
+            return None
+        payload = self._open(packets.place_of(*place), sealed)
+        if payload is None or len(payload) > packets.MAX_MESSAGE_BYTES:
+            return None
+        self._done.pop(number, None)
+        self._done[number] = _Done(head.fingerprint, now_s)
+        while len(self._done) > _LIVE:
+            self._done.popitem(last=False)
+        return Whole(head, payload)
+
+    def __len__(self) -> int:
+        """The number of incomplete messages."""
+        return len(self._partial)
+
+    def is_done(self, index: int, body: bytes) -> bool:
+        """Whether a fragment belongs to a complete message, so that it is a duplicate.
+
+        Call `heard` before.
+        """
+        number = body[0]
+        done = self._done.get(number)
+        if done is None:
+            return False
+        if index > 0:
+            return done.is_certain
+        if packets.head_of(body).fingerprint != done.fingerprint:
+            del self._done[number]
+            return False
+        self._numbers_stand()
+        self._partial.pop(number, None)
+        return True
+
+    def asked_about(self, number: int, checksum: int) -> None:
+        """The sender asks for its message with this checksum. Call `heard` before."""
+        done = self._done.get(number)
+        if done is not None and done.fingerprint[-1] != checksum:
+            del self._done[number]
+        elif done is not None:
+            self._numbers_stand()
+
+    def _numbers_stand(self) -> None:
+        """The numbers have not gone round since the latest messages were complete."""
+        for number, done in self._done.items():
+            if not done.is_certain:
+                self._done[number] = done._replace(is_certain=True)
+
+    def heard(self, number: int, now_s: float) -> None:
+        """The sender uses this number: forget messages that it cannot have under way any more."""
+        for other in [n for n in self._partial if _LIVE <= (number - n) & 255 < 192]:
+            del self._partial[other]
+        was_silent = now_s - self._heard_s >= SILENCE_S
+        self._heard_s = now_s
+        for other, done in list(self._done.items()):
+            if was_silent:
+                self._done[other] = done._replace(is_certain=False)
+            if _LIVE <= (number - other) & 255 < 192 or now_s - done.since_s >= DONE_S:
+                del self._done[other]
+
+    def has(self, number: int) -> int:
+        """The fragments of a message that have arrived, as bits; COMPLETE for a complete one."""
+        done = self._done.get(number)
+        if done is not None and done.is_certain:
+            return COMPLETE
+        partial = self._partial.get(number)
+        return partial.has if partial is not None else 0
+
+    def lacks_only_earlier(self, number: int, index: int) -> bool:
+        """Whether `index` is the last fragment of a message and others of it are missing."""
+        partial = self._partial.get(number)
+        if partial is None or partial.head is None:
+            return False
+        return index == packets.count_of(partial.head.length, self._room) - 1
+
+    def newest_done(self) -> tuple[int, int]:
+        """Number of the latest complete message, and the complete ones up to it as bits."""
+        certain = [number for number, done in self._done.items() if done.is_certain]
+        newest = certain[-1] if certain else 0
+        places = ((newest - number) & 255 for number in certain)
+        return newest, sum(1 << back for back in places if back < packets.DONE_BITS)
+
+    def expire(self, now_s: float) -> None:
+        """Drop messages without recent fragments."""
+        for number, partial in list(self._partial.items()):
+            if now_s - partial.touched_s >= EXPIRES_S:
+                del self._partial[number]
 
 
 class Inbox:
@@ -54,8 +209,9 @@ class Inbox:
         held: list[Whole] = []
         if index == 0:
             session = packets.head_of(body).session
-            if self._is_late(session, now_s):
-                return []
+            former, ended_s = self._former
+            if session == former and now_s - ended_s < FORMER_SESSION_S:
+                return []  # it is late
             if session != self._session:
                 held = self._start_over(session, now_s)
         return held + self._accept(index, body, now_s)
@@ -74,7 +230,6 @@ class Inbox:
             if reassembly.lacks_only_earlier(number, index):
                 self._repeat_ack(number, now_s)
             return []
-        reassembly.done(whole.head, now_s)
         if whole.head.reliable and self._acknowledge is not None:
             self._completed(whole, index, now_s)
         return self._order(whole).add(whole, now_s)
@@ -99,7 +254,11 @@ class Inbox:
         assert self._acknowledge is not None  # otherwise none becomes due
         asked = self._asked or Poll(self._session, packets.NO_ANSWER, self._complete)
         self._asked, self._unacknowledged, self.ack_due_s = None, 0, math.inf
-        self._acknowledge(self._ack(asked.number, asked.nonce, asked.session))
+        has = newest = done = 0
+        if asked.session == self._session:
+            newest, done = self._reassembly.newest_done()
+            has = self._reassembly.has(asked.number)
+        self._acknowledge(Ack(asked.session, asked.nonce, asked.number, has, newest, done))
 
     def on_time(self, now_s: float) -> list[Whole]:
         """Return the messages that have waited too long for missing earlier ones."""
@@ -109,11 +268,6 @@ class Inbox:
             if order.holds:
                 overdue += order.overdue(now_s)
         return overdue
-
-    def _is_late(self, session: int, now_s: float) -> bool:
-        """Whether a message belongs to the session before the sender's current one."""
-        former, ended_s = self._former
-        return session == former and now_s - ended_s < FORMER_SESSION_S
 
     def _start_over(self, session: int, now_s: float) -> list[Whole]:
         """The sender has restarted: returns the messages that waited for earlier ones."""
@@ -128,8 +282,7 @@ class Inbox:
 
     def _order(self, whole: Whole) -> PortOrder:
         key = (whole.head.port, whole.head.reliable)
-        order = self._ports.pop(key, None) or PortOrder()
-        self._ports[key] = order
+        self._ports[key] = order = self._ports.pop(key, None) or PortOrder()
         if len(self._ports) > MOST_PORTS:
             oldest = next(iter(self._ports))
             idle = (one for one, its in self._ports.items() if one != key and not its.holds)
@@ -152,11 +305,3 @@ class Inbox:
             self._repeated_s = now_s
             self._asked = self._asked or Poll(self._session, packets.NO_ANSWER, number)
             self.ack_due_s = min(self.ack_due_s, now_s)
-
-    def _ack(self, number: int, nonce: int, session: int) -> Ack:
-        if session != self._session:
-            return Ack(session, nonce, number, 0, 0, 0)
-        newest, done = self._reassembly.newest_done()
-        has = self._reassembly.has(number)
-        assert has <= COMPLETE
-        return Ack(session, nonce, number, has, newest, done)

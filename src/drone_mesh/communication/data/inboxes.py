@@ -1,26 +1,23 @@
-"""Inboxes: the messages to this node, by sender."""
+"""Inboxes: the messages to this node by sender, and whose turn it is to get an ACK."""
 
 from __future__ import annotations
 
 import functools
 import math
 from collections import OrderedDict
-from typing import Callable
+from dataclasses import dataclass
+from operator import attrgetter
+from typing import Callable, Iterable
 
 from drone_mesh.communication.data import packets
-from drone_mesh.communication.data.ack_turns import AckTurns
-from drone_mesh.communication.data.echo import SendPacket
 from drone_mesh.communication.data.inbox import Inbox
-from drone_mesh.communication.data.packets import Ack, Poll
-from drone_mesh.communication.data.reassembly import Whole
-from drone_mesh.communication.data.ticket import TO_ALL
-from drone_mesh.communication.interfaces import (
-    MAX_NODE_ID,
-    IMeshSeals,
-    IWirelessCommunication,
-)
-from drone_mesh.communication.timing import Deadlines
+from drone_mesh.communication.data.outgoing import TO_ALL
+from drone_mesh.communication.data.packets import Ack, Poll, SendPacket, Whole
+from drone_mesh.communication.interfaces import MAX_NODE_ID, IMeshSeals, IWirelessCommunication
+from drone_mesh.communication.timing import FAST_HOP_S, Deadlines, Medium
 
+# At 250 kbit/s and per check period of patience: up to 1 s, a first timeout (RFC 6298).
+TURN_S = 0.4
 TIDY_PERIOD_S = 5.0  # how often old fragments are dropped
 MOST_INBOXES = 2 * MAX_NODE_ID  # every other node, with its messages to this one and to all
 
@@ -28,30 +25,54 @@ OnArrived = Callable[[int, bool, Whole], None]
 """A message is complete: its sender, whether it was sent to all nodes, and the message."""
 
 
+class AckTurns:
+    """The order of the ACKs of one node: on a busy channel its senders take turns.
+
+    A sender behind relays sends a few messages and waits for an ACK. Many senders congest a channel
+    also with one message each, and each sees only its own failures: what they decide alone is
+    unstable and unfair. Their receiver sees them all. It answers one of them at a time, in the
+    order in which their ACKs became due, and the next one after the messages that this answer
+    brought, or, if none come, after a pause. So the ACKs admit senders (receiver-driven transport;
+    Montazeri et al., Homa, 2018), and each has the same share, whatever its number of hops.
+    """
+
+    def __init__(self, medium: Medium, patience: Callable[[], float]) -> None:
+        """`patience`: see IWirelessCommunication; 0 on a quiet channel, where no ACK waits."""
+        self._turn_s = TURN_S * (medium.hop_s / FAST_HOP_S)
+        self._patience = patience
+        self._latest: Inbox | None = None  # acknowledged last
+        self._ends_s = -math.inf  # at the latest
+
+    def next_s(self, inboxes: Iterable[Inbox]) -> float:
+        """When the next ACK leaves; infinity if none is due."""
+        due_s = min([inbox.ack_due_s for inbox in inboxes], default=math.inf)
+        if self._latest is None:
+            return due_s
+        return max(due_s, min(self._ends_s, self._latest.ack_due_s))
+
+    def acknowledge(self, inboxes: Iterable[Inbox], now_s: float) -> None:
+        """Send the ACK that has been due for longest."""
+        self._latest = min(inboxes, key=attrgetter("ack_due_s"))
+        self._latest.acknowledge()
+        self._ends_s = now_s + self._turn_s * self._patience()
+
+
+@dataclass(eq=False)
 class Inboxes:
     """The inboxes of one node: one per sender, and another one for its messages to all nodes."""
 
-    def __init__(
-        self,
-        node_id: int,
-        antenna: IWirelessCommunication,
-        seals: IMeshSeals,
-        deadlines: Deadlines,
-        room: int,
-        send_packet: SendPacket,
-        on_arrived: OnArrived,
-    ) -> None:
-        """`room`: bytes of a body."""
-        self._node_id = node_id
-        self._medium = antenna.medium
-        self._seals = seals
-        self._deadlines = deadlines
-        self._room = room
-        self._send_packet = send_packet
-        self._on_arrived = on_arrived
+    _node_id: int
+    _antenna: IWirelessCommunication
+    _seals: IMeshSeals
+    _deadlines: Deadlines
+    _room: int  # bytes of a body
+    _send_packet: SendPacket
+    _on_arrived: OnArrived
+
+    def __post_init__(self) -> None:
         self._inboxes: OrderedDict[tuple[int, bool], Inbox] = OrderedDict()  # last used last
         self._tidy_s = math.inf
-        self._turns = AckTurns(antenna.medium, antenna.patience)
+        self._turns = AckTurns(self._antenna.medium, self._antenna.patience)
 
     @property
     def due_s(self) -> float:
@@ -92,17 +113,16 @@ class Inboxes:
 
     def _inbox(self, sender: int, to_all: bool) -> Inbox:
         key = (sender, to_all)
-        inbox = self._inboxes.get(key)
-        if inbox is None:
+        if key not in self._inboxes:
             while len(self._inboxes) >= MOST_INBOXES:
                 self._inboxes.popitem(last=False)
             acknowledge = None if to_all else functools.partial(self._acknowledge, sender)
             receiver = TO_ALL if to_all else self._node_id
             open_message = functools.partial(self._seals.open_message, sender, receiver)
-            inbox = Inbox(self._room, acknowledge, open_message, self._medium)
-            self._inboxes[key] = inbox
+            medium = self._antenna.medium
+            self._inboxes[key] = Inbox(self._room, acknowledge, open_message, medium)
         self._inboxes.move_to_end(key)
-        return inbox
+        return self._inboxes[key]
 
     def _acknowledge(self, sender: int, ack: Ack) -> None:
         body = packets.ack_body(ack)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 
-from drone_mesh.communication.data.packets import MOST_BEHIND
-from drone_mesh.communication.data.reassembly import Whole
+from drone_mesh.communication.data.packets import MOST_BEHIND, Whole
 
 HOLD_S = 300.0  # longer than a sender retries (LIFETIME_S of outgoing.py)
 _HALF = 1 << 15

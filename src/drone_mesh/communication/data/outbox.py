@@ -15,12 +15,17 @@ from collections import deque
 from typing import Callable, Iterator
 
 from drone_mesh.communication.data import packets
-from drone_mesh.communication.data.fragmentation import Fragmentation, Seal
-from drone_mesh.communication.data.outgoing import LIFETIME_S, DataPacket, OutgoingMessage
-from drone_mesh.communication.data.pacing import CongestionWindow, RoundTrip
+from drone_mesh.communication.data.outgoing import (
+    LIFETIME_S,
+    DataPacket,
+    Fragmentation,
+    OutgoingMessage,
+    Seal,
+    TicketState,
+    destination_in_words,
+)
+from drone_mesh.communication.data.pacing import CongestionWindow, RoundTrip, Train
 from drone_mesh.communication.data.packets import COMPLETE, NO_ANSWER, Ack, Poll
-from drone_mesh.communication.data.ticket import TicketState, destination_in_words
-from drone_mesh.communication.data.train import Train
 
 MOST_DOUBLED = 6  # with a search of half a second, to about half a minute
 
@@ -44,7 +49,7 @@ class Outbox:
         self.to = to
         self._ended = ended
         self._hint = hint
-        self._waiting: deque[OutgoingMessage] = deque()
+        self.waiting: deque[OutgoingMessage] = deque()  # for their first fragment to leave
         self._open: dict[int, OutgoingMessage] = {}  # under way, by number, oldest first
         self._fragmentation = Fragmentation(session, room, seal, self._open)
         self._window = CongestionWindow()
@@ -57,21 +62,17 @@ class Outbox:
         self.not_before_s = -math.inf  # no route: time of the next attempt
 
     def __len__(self) -> int:
-        return len(self._waiting) + len(self._open)
+        return len(self.waiting) + len(self._open)
 
     def __iter__(self) -> Iterator[OutgoingMessage]:
         """All messages, oldest first."""
         yield from self._open.values()
-        yield from self._waiting
+        yield from self.waiting
 
     @property
     def is_idle(self) -> bool:
         """Whether it has nothing to send, now or later."""
-        return not len(self) and not (self._train and self._train.is_open)
-
-    def add(self, message: OutgoingMessage) -> None:
-        """Add a message for this destination."""
-        self._waiting.append(message)
+        return not (self.waiting or self._open or (self._train and self._train.is_open))
 
     def set_relayed(self, relayed: bool) -> None:
         """Set whether there are relays on the same channel on the way to the destination."""
@@ -82,63 +83,55 @@ class Outbox:
 
     def next_packet(self, now_s: float) -> DataPacket | None:
         """The next packet to send; call `on_sent` once it was sent."""
-        train = self._train
-        if train is None:
-            poll = self._timely_poll(now_s)
-            return poll if poll is not None or self._unanswered else self._fragment()
-        if train.waits:
+        train, opened = self._train, self._open.values()
+        if train is not None and train.waits:
             if now_s < train.waits_until_s:
                 return None
-            if any(message.in_flight for message in self._open.values()):
-                return self._end_of_train()
+            if self._in_flight():
+                return self._asking(self._latest, ends_train=True)
             train.end(arrived=False)
-        poll = self._timely_poll(now_s)
-        if poll is not None or self._unanswered:
-            return poll
-        if train.is_full and self._has_more():
-            return self._end_of_train()
-        return self._fragment() or self._mark_of_end(train)
-
-    def _timely_poll(self, now_s: float) -> DataPacket | None:
-        """A POLL for a message whose ACK is late."""
-        unanswered = self._unanswered
-        for message in [unanswered] if unanswered else self._open.values():
+        # Nothing else is sent while a POLL remains without an answer.
+        unanswered = next((message for message in opened if message.asks > 1), None)
+        for message in [unanswered] if unanswered else opened:
             if message.asks and now_s >= message.asked_s + self._timeout_s(message):
-                return self._poll(message)
-        return None
+                if message.asks > 1:
+                    self._window.on_silence()
+                    message.ticket.reason = f"no acknowledgement yet{self._hint()}"
+                return self._asking(message)
+        if unanswered:
+            return None
+        if train is None:
+            return self._fragment(self._in_flight(), self._window.size)
+        if train.is_full and (self._may_open() or any(message.to_send for message in opened)):
+            return self._asking(self._latest, ends_train=True)
+        fragment = self._fragment(0, math.inf)
+        if fragment is not None or not train.is_open:
+            return fragment
+        return _question(self._latest, NO_ANSWER, ends_train=True)  # relays need not wait for more
 
-    @property
-    def _unanswered(self) -> OutgoingMessage | None:
-        """The message whose POLL remained without an answer: nothing else is sent meanwhile."""
-        return next((message for message in self._open.values() if message.asks > 1), None)
-
-    def _fragment(self) -> DataPacket | None:
+    def _fragment(self, in_flight: int, window: float) -> DataPacket | None:
         """The next fragment; a POLL if the window is full."""
-        in_flight, window = 0, math.inf
-        if self._train is None:
-            in_flight, window = self._in_flight(), self._window.size
         for message in self._open.values():
             if message.to_send and message.asked_s == math.inf:
                 if not message.ticket.reliable or in_flight < window:
                     return self._first_to_send(message)
                 if message.in_flight:
-                    return self._poll(message)  # which fragments arrived?
-        if in_flight < window and self._may_open():
-            return self._opened()
-        return None
-
-    def _has_more(self) -> bool:
-        return self._may_open() or any(message.to_send for message in self._open.values())
+                    return self._asking(message)  # which fragments arrived?
+        if in_flight >= window or not self._may_open():
+            return None
+        message = self.waiting.popleft()
+        self._open[self._fragmentation.begin(message).number] = message
+        return self._first_to_send(message)
 
     def _in_flight(self) -> int:
         return sum(message.in_flight for message in self._open.values())
 
     def on_sent(self, packet: DataPacket, now_s: float) -> None:
         """The packet was sent."""
-        message = packet.message
+        message, train = packet.message, self._train
         if packet.ends_train:
-            assert self._train is not None
-            self._train.end_left(packets.poll_of(packet.body).nonce, now_s)
+            assert train is not None
+            train.end_left(packets.poll_of(packet.body).nonce, now_s)
             return
         if packet.kind == packets.POLL:
             self._interrupted()
@@ -146,20 +139,20 @@ class Outbox:
             return
         self._latest = message
         message.ticket.reason = ""
-        if self._train is not None:
-            self._train.fragment_left(packet.kind)
+        if train is not None:
+            train.fragment_left(packet.kind)
         index = message.to_send.popleft()
         message.sent |= 1 << index
         if message.to_send:
             return
         message.whole = True
-        if message.ticket.reliable:
-            message.asked_s = message.left_s = now_s
-            message.asks = 1
-            if message.ticket.state is TicketState.QUEUED:
-                message.ticket.set_state(TicketState.SENT)
-        else:
+        if not message.ticket.reliable:
             self._close(message, TicketState.SENT)
+            return
+        message.asked_s = message.left_s = now_s
+        message.asks = 1
+        if message.ticket.state is TicketState.QUEUED:
+            message.ticket.set_state(TicketState.SENT)
 
     def answered(self, ack: Ack, now_s: float) -> None:
         """Process an ACK of the receiver."""
@@ -194,19 +187,18 @@ class Outbox:
 
     def due_s(self, now_s: float) -> float:
         """When to check this outbox next; infinity while nothing waits in it."""
-        due_s = math.inf
         if self.is_idle:
-            return due_s
-        waits = self._train is not None and self._train.waits
-        if self._train is not None and waits:
-            due_s = self._train.waits_until_s
-        for message in self._open.values():
-            if message.asked_s < math.inf and not waits:
-                due_s = min(due_s, message.asked_s + self._timeout_s(message))
-            due_s = min(due_s, message.expires_s)
-        if self._waiting:
-            due_s = min(due_s, self._waiting[0].expires_s)
-        return self.not_before_s if now_s < self.not_before_s else due_s
+            return math.inf
+        if now_s < self.not_before_s:
+            return self.not_before_s
+        times_s = [message.expires_s for message in self._open.values()]
+        times_s += [message.expires_s for message in [*self.waiting][:1]]
+        if self._train is not None and self._train.waits:
+            times_s.append(self._train.waits_until_s)
+        else:
+            asked = (message for message in self._open.values() if message.asked_s < math.inf)
+            times_s += [message.asked_s + self._timeout_s(message) for message in asked]
+        return min(times_s, default=math.inf)
 
     def expire(self, now_s: float, has_route: bool) -> None:
         """Give up messages that waited for too long."""
@@ -215,11 +207,8 @@ class Outbox:
                 has_way = has_route and not self._misses
                 what = "no acknowledgement from" if has_way else "no route to"
                 where = destination_in_words(self.to)
-                self.give_up(message, f"{what} {where} for {LIFETIME_S:.0f} s{self._hint()}")
-
-    def give_up(self, message: OutgoingMessage, reason: str) -> None:
-        """Stop sending this message."""
-        self._close(message, TicketState.GIVEN_UP, reason)
+                reason = f"{what} {where} for {LIFETIME_S:.0f} s{self._hint()}"
+                self._close(message, TicketState.GIVEN_UP, reason)
 
     def missing(self, reason: str, search_s: float, now_s: float) -> None:
         """A node on the way has no route to the receiver, and may search for it for so long.
@@ -240,7 +229,7 @@ class Outbox:
         """Nothing can be sent now: reliable messages wait, the others are given up."""
         for message in list(self):
             if not message.ticket.reliable:
-                self.give_up(message, reason)
+                self._close(message, TicketState.GIVEN_UP, reason)
         self.waits_because(reason)
 
     def waits_because(self, reason: str) -> None:
@@ -262,58 +251,34 @@ class Outbox:
 
     def take(self, to: int) -> list[OutgoingMessage]:
         """Remove the messages addressed to `to`, and return them as if nothing had been sent."""
-        messages = [message for message in self if message.ticket.to == to]
-        for message in messages:
+        taken = [message for message in self if message.ticket.to == to]
+        for message in taken:
             self._remove(message)
-            message.begin()
-        if messages:
             self._train = None
-        return messages
+        return [OutgoingMessage(one.ticket, one.payload, one.expires_s) for one in taken]
 
     # One message ------------------------------------------------------------------------------
 
     def _may_open(self) -> bool:
         train = self._train
-        if not self._waiting or (train is not None and len(self._open) >= train.most_messages):
+        if not self.waiting or (train is not None and len(self._open) >= train.most_messages):
             return False
-        return self._fragmentation.may_open(self._waiting[0].ticket)
-
-    def _opened(self) -> DataPacket:
-        message = self._waiting.popleft()
-        self._open[self._fragmentation.begin(message).number] = message
-        return self._first_to_send(message)
+        return self._fragmentation.may_open(self.waiting[0].ticket)
 
     def _first_to_send(self, message: OutgoingMessage) -> DataPacket:
         index = message.to_send[0]
         body = self._fragmentation.body(message, index)
         return DataPacket(packets.FRAGMENTS[index], body, message)
 
-    def _poll(self, message: OutgoingMessage) -> DataPacket:
-        if message.asks >= 2:
-            self._window.on_silence()
-            message.ticket.reason = f"no acknowledgement yet{self._hint()}"
-        return self._asking(message)
-
-    def _end_of_train(self) -> DataPacket:
-        assert self._latest is not None
-        return self._asking(self._latest)._replace(ends_train=True)
-
     def _interrupted(self) -> None:
         """Close the current train, so that relays need not wait for more of it."""
         if self._train is not None:
             self._train.is_open = False
 
-    def _mark_of_end(self, train: Train) -> DataPacket | None:
-        """The packet that tells relays that a train ended before it was full, if it did."""
-        if not train.is_open:
-            return None
-        assert self._latest is not None
-        return _poll(self._latest, NO_ANSWER)._replace(ends_train=True)
-
-    def _asking(self, message: OutgoingMessage) -> DataPacket:
-        self._nonce = self._nonce % 0xFF + 1
-        message.nonce = self._nonce
-        return _poll(message, self._nonce)
+    def _asking(self, message: OutgoingMessage | None, ends_train: bool = False) -> DataPacket:
+        assert message is not None
+        message.nonce = self._nonce = self._nonce % 0xFF + 1
+        return _question(message, message.nonce, ends_train)
 
     def _partly(self, message: OutgoingMessage, ack: Ack, now_s: float) -> None:
         if ack.nonce != message.nonce:
@@ -352,18 +317,17 @@ class Outbox:
 
     def _remove(self, message: OutgoingMessage) -> None:
         if message.head is None:
-            self._waiting.remove(message)
+            self.waiting.remove(message)
         else:
             del self._open[message.head.number]
-
-    # Timeouts ---------------------------------------------------------------------------------
 
     def _timeout_s(self, message: OutgoingMessage) -> float:
         return self._round_trip.timeout_s(max(0, message.asks - 1))
 
 
-def _poll(message: OutgoingMessage, nonce: int) -> DataPacket:
-    head = message.head
+def _question(message: OutgoingMessage | None, nonce: int, ends_train: bool) -> DataPacket:
+    head = None if message is None else message.head
+    assert message is not None
     assert head is not None
     poll = Poll(head.session, nonce, head.number, head.checksum)
-    return DataPacket(packets.POLL, packets.poll_body(poll), message)
+    return DataPacket(packets.POLL, packets.poll_body(poll), message, ends_train)

@@ -11,19 +11,19 @@ import functools
 import math
 import random
 from collections import OrderedDict
+from dataclasses import dataclass
 from typing import Callable
 
 from drone_mesh.communication.control.control_plane import IControlPlane
-from drone_mesh.communication.data.echo import SendPacket
 from drone_mesh.communication.data.outbox import Outbox
-from drone_mesh.communication.data.outgoing import OutgoingMessage
-from drone_mesh.communication.data.packets import Ack
-from drone_mesh.communication.data.ticket import (
+from drone_mesh.communication.data.outgoing import (
     TO_ALL,
     TO_GATEWAY,
+    OutgoingMessage,
     TicketState,
     destination_in_words,
 )
+from drone_mesh.communication.data.packets import Ack, SendPacket
 from drone_mesh.communication.interfaces import NO_ROUTE, IMeshSeals, IWirelessCommunication
 from drone_mesh.communication.timing import Deadlines
 
@@ -32,40 +32,25 @@ FOUND_WITHIN_S = 0.5  # a gateway's search passes through 100 nodes
 ROUTE_PERIOD_S = 0.5  # how often an outbox without a route looks for one
 
 
+@dataclass(eq=False)
 class Outboxes:
     """The outboxes of one node, by destination."""
 
-    def __init__(
-        self,
-        node_id: int,
-        control: IControlPlane,
-        antenna: IWirelessCommunication,
-        seals: IMeshSeals,
-        deadlines: Deadlines,
-        rng: random.Random,
-        room: int,
-        send_packet: SendPacket,
-        to_self: Callable[[OutgoingMessage], None],
-        ended: Callable[[TicketState], None],
-        hint: Callable[[], str],
-    ) -> None:
-        """`rng`, `room`, `ended` and `hint` as for Transport and Outbox.
+    _node_id: int
+    _control: IControlPlane
+    _antenna: IWirelessCommunication
+    _seals: IMeshSeals
+    _deadlines: Deadlines
+    _rng: random.Random  # draws the number of the session, with the first message
+    _room: int  # bytes of a body
+    _send_packet: SendPacket
+    _to_self: Callable[[OutgoingMessage], None]  # for the gateway, and this node is one
+    _ended: Callable[[TicketState], None]  # called with the last state of each message
+    _hint: Callable[[], str]  # a possible reason why messages do not arrive
 
-        `to_self` delivers a message for the gateway of a node that is its own gateway.
-        """
-        self._node_id = node_id
-        self._control = control
-        self._antenna = antenna
-        self._medium = antenna.medium
-        self._seals = seals
-        self._deadlines = deadlines
-        self._rng = rng
+    def __post_init__(self) -> None:
+        self._medium = self._antenna.medium
         self._was_lost = False
-        self._room = room
-        self._send_packet = send_packet
-        self._to_self = to_self
-        self._ended = ended
-        self._hint = hint
         self._session: int | None = None
         self._outboxes: OrderedDict[int, Outbox] = OrderedDict()  # the next one to send is first
         self._for_gateway: list[OutgoingMessage] = []  # wait until there is one
@@ -79,7 +64,7 @@ class Outboxes:
         if message.ticket.to == TO_GATEWAY:
             self._for_gateway.append(message)
         else:
-            self._outbox(message.ticket.to).add(message)
+            self._outbox(message.ticket.to).waiting.append(message)
 
     def answered(self, by: int, ack: Ack) -> None:
         """Process an ACK of a receiver."""
@@ -96,12 +81,12 @@ class Outboxes:
 
     def send(self) -> float:
         """Send what may be sent now; returns when to call it again, or infinity."""
-        now_s, antenna = self._deadlines.now_s, self._antenna
+        now_s = self._deadlines.now_s
         if not self._for_gateway and all(box.is_idle for box in self._outboxes.values()):
             return math.inf
         self._follow_gateway()
         self._yield_to_repair()
-        left = min(BURST, antenna.data_room())
+        left = min(BURST, self._antenna.data_room())
         idle = 0
         while left > 0 and idle < len(self._outboxes):
             to, outbox = next(iter(self._outboxes.items()))
@@ -178,9 +163,15 @@ class Outboxes:
 
     def _follow_gateway(self) -> None:
         """Move messages for the gateway to the one that this node uses now."""
-        gateway = self._control.gateway
+        gateway, now_s = self._control.gateway, self._deadlines.now_s
         if gateway == NO_ROUTE:
-            self._give_up_without_gateway()
+            for message in list(self._for_gateway):
+                ticket = message.ticket
+                ticket.reason = reason = self.unreachable(TO_GATEWAY)
+                if now_s >= message.expires_s or not ticket.reliable:
+                    self._for_gateway.remove(message)
+                    ticket.set_state(TicketState.GIVEN_UP, reason)
+                    self._ended(TicketState.GIVEN_UP)
             return
         waiting, self._for_gateway = self._for_gateway, []
         for to, outbox in self._outboxes.items():
@@ -190,24 +181,13 @@ class Outboxes:
             if gateway == self._node_id:
                 self._to_self(message)
             else:
-                self._outbox(gateway).add(message)
-
-    def _give_up_without_gateway(self) -> None:
-        now_s = self._deadlines.now_s
-        reason = self.unreachable(TO_GATEWAY)
-        for message in list(self._for_gateway):
-            message.ticket.reason = reason
-            if now_s >= message.expires_s or not message.ticket.reliable:
-                self._for_gateway.remove(message)
-                message.ticket.set_state(TicketState.GIVEN_UP, reason)
-                self._ended(TicketState.GIVEN_UP)
+                self._outbox(gateway).waiting.append(message)
 
     def _outbox(self, to: int) -> Outbox:
         if self._session is None:
             self._session = self._rng.randrange(1 << 16)
-        outbox = self._outboxes.get(to)
-        if outbox is None:
+        if to not in self._outboxes:
             seal = functools.partial(self._seals.seal_message, self._node_id, to)
             outbox = Outbox(to, self._session, self._room, self._ended, seal, self._hint)
             self._outboxes[to] = outbox
-        return outbox
+        return self._outboxes[to]

@@ -10,7 +10,7 @@ from __future__ import annotations
 import binascii
 import math
 import struct
-from typing import NamedTuple
+from typing import Callable, NamedTuple
 
 from drone_mesh.communication.wire.messages import (
     BODY_BYTES,
@@ -42,6 +42,9 @@ _ACK = struct.Struct("<HBBQBI")
 _POLL = struct.Struct("<HBBH")
 _TOKEN = struct.Struct("<H")
 
+SendPacket = Callable[[int, int, bytes], bool]
+"""Sends a packet with a type and a body to a node; False: it could not be sent."""
+
 
 def check_size(payload: bytes) -> None:
     """Raise MessageRefused if a user's message is too large."""
@@ -68,6 +71,13 @@ class Head(NamedTuple):
     def fingerprint(self) -> tuple[int, ...]:
         """The parts that are equal in each transmission of the same message."""
         return (*self[:5], *self[6:])
+
+
+class Whole(NamedTuple):
+    """A complete message."""
+
+    head: Head
+    payload: bytes
 
 
 class Ack(NamedTuple):

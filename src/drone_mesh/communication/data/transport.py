@@ -14,13 +14,18 @@ from typing import Callable, NamedTuple
 from drone_mesh.communication.control.control_plane import IControlPlane
 from drone_mesh.communication.control.node_part import due, receives
 from drone_mesh.communication.data import packets
-from drone_mesh.communication.data.echo import Echoes, OnEchoAnswer
 from drone_mesh.communication.data.flood import Flood
 from drone_mesh.communication.data.inboxes import Inboxes
 from drone_mesh.communication.data.outboxes import Outboxes
-from drone_mesh.communication.data.outgoing import OutgoingMessage
-from drone_mesh.communication.data.reassembly import Whole
-from drone_mesh.communication.data.ticket import TO_ALL, TO_GATEWAY, Ticket, TicketState
+from drone_mesh.communication.data.outgoing import (
+    LIFETIME_S,
+    TO_ALL,
+    TO_GATEWAY,
+    OutgoingMessage,
+    Ticket,
+    TicketState,
+)
+from drone_mesh.communication.data.packets import Whole
 from drone_mesh.communication.events.complaints import Complaints
 from drone_mesh.communication.interfaces import MAX_NODE_ID, IMeshSeals, IWirelessCommunication
 from drone_mesh.communication.timing import Deadlines, Due
@@ -29,6 +34,25 @@ from drone_mesh.communication.wire.packet_types import DATA_TYPES
 from drone_mesh.errors import MessageRefused, PacketError, QueueFull
 
 MOST_QUEUED = 64  # messages waiting or under way, in total
+MOST_AWAITED = 64  # answers to echoes; the oldest is given up
+
+
+class EchoAnswer(NamedTuple):
+    """The round trip of a packet to a node, and the nodes that it passed."""
+
+    node: int  # the node that answered
+    token: int  # of the echo
+    round_trip_s: float
+    route: tuple[int, ...]  # the nodes that forwarded the echo, in order
+
+    @property
+    def hops(self) -> int:
+        """Links to that node."""
+        return len(self.route) + 1
+
+
+OnEchoAnswer = Callable[[EchoAnswer], None]
+"""Called in the component's thread; must not call back into the component."""
 
 
 class ReceivedMessage(NamedTuple):
@@ -98,7 +122,9 @@ class Transport:
             node_id, antenna, seals, deadlines, room, self._send_packet, self._arrived
         )
         self._flood = Flood(node_id, antenna, deadlines)
-        self._echoes = Echoes(self._send_packet, room)
+        self._room = room
+        self._echo_token = 0
+        self._awaited: dict[int, tuple[int, float, OnEchoAnswer]] = {}  # by token
         self._receivers: list[Receiver] = []
         self._numbered = 0
         self._figures = DataFigures()
@@ -118,19 +144,19 @@ class Transport:
         reliable = reliable and to != TO_ALL
         self._numbered += 1
         ticket = Ticket(self._numbered, to, port, len(payload), reliable)
-        self._figures = self._figures._replace(
-            messages_sent=self._figures.messages_sent + 1,
-            bytes_sent=self._figures.bytes_sent + len(payload),
+        figures = self._figures
+        self._figures = figures._replace(
+            messages_sent=figures.messages_sent + 1,
+            bytes_sent=figures.bytes_sent + len(payload),
             sent_s=now_s,
         )
-        me = self._node_id
-        if to == me or (to == TO_GATEWAY and self._control.gateway == me):
-            self._work()  # earlier ones may wait for a gateway, which this node is by now
-            self._deliver(ReceivedMessage(me, port, payload, False, reliable, now_s))
-            ticket.set_state(TicketState.DELIVERED)
-            return ticket
-        self._outboxes.add(OutgoingMessage(ticket, payload, now_s))
-        self._work()
+        message, me = OutgoingMessage(ticket, payload, now_s + LIFETIME_S), self._node_id
+        is_own = to == me or (to == TO_GATEWAY and self._control.gateway == me)
+        if not is_own:
+            self._outboxes.add(message)
+        self._work()  # earlier ones may wait for a gateway, which this node is by now
+        if is_own:
+            self._to_self(message)
         return ticket
 
     def on_received(self, receiver: Receiver) -> None:
@@ -142,7 +168,14 @@ class Transport:
         self._deadlines.now_s = now_s
         if not 0 <= to <= MAX_NODE_ID or to == self._node_id:
             raise MessageRefused(f"invalid node {to}: must be another node, 0..{MAX_NODE_ID}")
-        return self._echoes.send(to, on_answer, now_s)
+        token = self._echo_token = (self._echo_token + 1) & 0xFFFF
+        while len(self._awaited) >= MOST_AWAITED:
+            del self._awaited[next(iter(self._awaited))]
+        self._awaited[token] = to, now_s, on_answer
+        if self._send_packet(packets.ECHO, to, packets.echo_body(token)):
+            return token
+        self._awaited.pop(token, None)
+        return None
 
     def unreachable(self, to: int) -> str:
         """Why nothing can be sent to `to` now, in words."""
@@ -180,9 +213,14 @@ class Transport:
             elif kind == packets.POLL:
                 self._inboxes.poll(creator, packets.poll_of(body))
             elif kind == packets.ECHO:
-                self._echoes.asked(creator, body)
+                answer = packets.echo_body(*packets.echo_of(body), self._room)
+                self._send_packet(packets.ECHO_ANSWER, creator, answer)
             elif kind == packets.ECHO_ANSWER:
-                self._echoes.answered(creator, body, now_s)
+                token, route = packets.echo_of(body)
+                to, sent_s, on_answer = self._awaited.get(token, (-1, 0.0, None))
+                if to == creator and on_answer is not None:  # otherwise it is unexpected
+                    del self._awaited[token]
+                    on_answer(EchoAnswer(creator, token, now_s - sent_s, route))
             else:
                 self._complaints.dropped("data of an unknown type", payload, now_s)
         except PacketError as error:
@@ -244,26 +282,22 @@ class Transport:
             self._figures = figures._replace(messages_given_up=figures.messages_given_up + 1)
 
     def _to_self(self, message: OutgoingMessage) -> None:
-        ticket, me = message.ticket, self._node_id
-        self._deliver(
-            ReceivedMessage(
-                me, ticket.port, message.payload, False, ticket.reliable, self._deadlines.now_s
-            )
-        )
+        ticket = message.ticket
+        self._deliver(self._node_id, ticket.port, message.payload, False, ticket.reliable)
         ticket.set_state(TicketState.DELIVERED)
         self._ended(TicketState.DELIVERED)
 
     def _arrived(self, sender: int, to_all: bool, whole: Whole) -> None:
-        port, reliable = whole.head.port, whole.head.reliable
-        self._deliver(
-            ReceivedMessage(sender, port, whole.payload, to_all, reliable, self._deadlines.now_s)
-        )
+        self._deliver(sender, whole.head.port, whole.payload, to_all, whole.head.reliable)
 
-    def _deliver(self, message: ReceivedMessage) -> None:
-        self._figures = self._figures._replace(
-            messages_received=self._figures.messages_received + 1,
-            bytes_received=self._figures.bytes_received + len(message.payload),
-            received_s=message.received_s,
+    def _deliver(
+        self, sender: int, port: int, payload: bytes, to_all: bool, reliable: bool
+    ) -> None:
+        now_s, figures = self._deadlines.now_s, self._figures
+        self._figures = figures._replace(
+            messages_received=figures.messages_received + 1,
+            bytes_received=figures.bytes_received + len(payload),
+            received_s=now_s,
         )
         for receiver in self._receivers:
-            receiver(message)
+            receiver(ReceivedMessage(sender, port, payload, to_all, reliable, now_s))

@@ -19,7 +19,7 @@ from drone_mesh.communication.node.node_configuration import (
     create_routing_technique,
 )
 from drone_mesh.communication.node.router import MeshnetworkRouter
-from drone_mesh.communication.repair.named_strategies import create_repair_strategy
+from drone_mesh.communication.repair.strategies import create_repair_strategy
 from drone_mesh.communication.seals.keys import Keys
 from drone_mesh.communication.seals.sealed_antenna import SealedAntenna
 from drone_mesh.drone.interfaces import IDroneEngine

@@ -9,8 +9,8 @@ from drone_mesh.by_name import create_by_name
 from drone_mesh.communication.beacon.plane import BeaconTechnique
 from drone_mesh.communication.control.delivery import ITechnique
 from drone_mesh.communication.repair.interfaces import IRepairStrategy
-from drone_mesh.communication.repair.named_strategies import create_repair_strategy
 from drone_mesh.communication.repair.options import DEFAULT_REPAIR, RepairOptions
+from drone_mesh.communication.repair.strategies import create_repair_strategy
 from drone_mesh.communication.routing.child_table_tree import ChildTableTree, SteadyTree
 from drone_mesh.communication.routing.techniques.babel import Babel
 from drone_mesh.communication.routing.techniques.batman import Batman

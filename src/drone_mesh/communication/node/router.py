@@ -18,7 +18,7 @@ from drone_mesh.communication.node.whereabouts import RouterWhereabouts
 from drone_mesh.communication.repair.connection_repair import ConnectionRepair
 from drone_mesh.communication.repair.interfaces import IRepairStrategy
 from drone_mesh.communication.repair.status import RepairStatus
-from drone_mesh.communication.repair.strategies.thesis import Thesis
+from drone_mesh.communication.repair.strategies import Thesis
 from drone_mesh.drone.interfaces import IDroneEngine
 
 if TYPE_CHECKING:

@@ -13,14 +13,25 @@ from drone_mesh.communication.control.node_part import receives
 from drone_mesh.communication.control.router_states import RepairState, RouterEvent
 from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.repair.actions import JAMMED, RADIO_FAILED, RepairActions, Step
 from drone_mesh.communication.repair.election import NO_BID, TOOK_OFF, TOOK_OFF_HOME
-from drone_mesh.communication.repair.heights import above_ground, at_whole_metres
-from drone_mesh.communication.repair.interfaces import IRepairStrategy
+from drone_mesh.communication.repair.interfaces import (
+    JAMMED,
+    RADIO_FAILED,
+    IRepairStrategy,
+    RepairActions,
+    Step,
+)
 from drone_mesh.communication.repair.repair_flight import ASK_AGAIN_S, ASK_SEALED_S, RepairFlight
-from drone_mesh.communication.repair.spots import PITCH, Landing, own_spot, spot_beside_rivals
+from drone_mesh.communication.repair.spots import (
+    PITCH,
+    Landing,
+    TakenPlaces,
+    above_ground,
+    at_whole_metres,
+    own_spot,
+    spot_beside_rivals,
+)
 from drone_mesh.communication.repair.status import NO_CHECK_YET, NOTHING_TO_REPAIR, RepairStatus
-from drone_mesh.communication.repair.taken_places import TakenPlaces
 from drone_mesh.communication.wire.messages import GatewayPlace, MovementNegotiationMessage
 from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.drone.location import Location

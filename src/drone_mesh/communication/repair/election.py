@@ -1,17 +1,24 @@
-"""Elects the drone that flies, in a group without a gateway (docs/repair.md, "Negotiation")."""
+"""The election of the drone of a group that flies: bids, whom to believe, and who took off.
+
+docs/repair.md, "Negotiation".
+"""
 
 from __future__ import annotations
 
 import math
-from typing import AbstractSet, NamedTuple
+from collections import Counter
+from typing import AbstractSet
 
+from drone_mesh.communication.interfaces import MAX_NODE_ID, NO_ROUTE
 from drone_mesh.communication.wire.messages import MovementNegotiationMessage
+from drone_mesh.drone.location import Location
 
 NO_BID = -1.0  # the score of a node that does not fly
 MAX_SCORE_M = 1e9  # beyond every possible place, and it fits a float32
 TOOK_OFF = 2e9  # sent in place of a score: the winner takes off
 TOOK_OFF_HOME = 3e9  # the same, and it flies to the gateway's place
 HOME_FAILED = 4e9  # sent in place of NO_BID: no gateway answered at the gateway's place
+WINNERS_WITHOUT_FLIGHT = 3  # a winner may also fail to fly for honest reasons
 
 
 def as_on_the_air(score: float) -> float:
@@ -19,13 +26,6 @@ def as_on_the_air(score: float) -> float:
     return MovementNegotiationMessage.from_payload(
         MovementNegotiationMessage(0, 0, 0, 0, score).to_payload()
     ).cost
-
-
-class Bid(NamedTuple):
-    """The bid of a node to fly."""
-
-    score: float  # metres to the gateway's place; negative: does not fly
-    heard_s: float
 
 
 class Election:
@@ -38,7 +38,12 @@ class Election:
     def __init__(self, patience_s: float) -> None:
         """`patience_s`: how long to wait for a bid, and how long a bid remains valid."""
         self._patience_s = patience_s
-        self._bids: dict[int, Bid] = {}
+        self.clear()
+
+    def clear(self) -> None:
+        """Empty the list and stop waiting."""
+        # By node: when its bid was heard, and the score: negative, if it does not fly.
+        self._bids: dict[int, tuple[float, float]] = {}
         self._passed_over: set[int] = set()
         self._started_s = self._settled_s = math.inf
 
@@ -55,14 +60,13 @@ class Election:
 
         Returns whether it is the best bid in the list, and new.
         """
-        for other in [n for n, bid in self._bids.items() if now_s - bid.heard_s > self._patience_s]:
-            del self._bids[other]
+        patience_s = self._patience_s
+        self._bids = {n: bid for n, bid in self._bids.items() if now_s - bid[0] <= patience_s}
         if node in self._passed_over:
             return False
-        before = self._bids.get(node)
-        self._bids[node] = Bid(score, now_s)
-        is_news = before is None or before.score != score
-        return is_news and score >= 0 and self.winner() == node
+        _heard_s, before = self._bids.get(node, (now_s, math.nan))
+        self._bids[node] = now_s, score
+        return before != score and score >= 0 and self.winner() == node
 
     def knows(self, node: int) -> bool:
         """Whether `node` has bid."""
@@ -76,7 +80,7 @@ class Election:
 
     def winner(self) -> int | None:
         """Highest score, of equal scores the lowest id; None without a bid of 0 or more."""
-        able = [(-bid.score, node) for node, bid in self._bids.items() if bid.score >= 0]
+        able = [(-score, node) for node, (_heard_s, score) in self._bids.items() if score >= 0]
         return min(able)[1] if able else None
 
     def pass_over(self, node: int) -> None:
@@ -84,8 +88,89 @@ class Election:
         self._passed_over.add(node)
         self._bids.clear()
 
+
+class BidCredit:
+    """The neighbours that a router trusts to relay bids.
+
+    A key proves that a bid comes from the mesh, not that its creator exists or intends to fly: a
+    captured node can relay bids of any number of others.
+    """
+
+    def __init__(self) -> None:
+        self.clear()
+
     def clear(self) -> None:
-        """Empty the list and stop waiting."""
-        self._bids.clear()
-        self._passed_over.clear()
-        self._started_s = self._settled_s = math.inf
+        """The router is connected: trust all neighbours again."""
+        self._brought_by: dict[int, int] = {}  # creator of a bid -> neighbour that relayed it
+        self._without_flight: Counter[int] = Counter()  # by neighbour: winners that did not fly
+
+    def believes(self, node: int, score: float, from_: int, most: float) -> bool:
+        """Whether to count a bid of `node` relayed by `from_`; `most`: see highest_plausible."""
+        if score > most or self._without_flight[from_] >= WINNERS_WITHOUT_FLIGHT:
+            return False
+        self._brought_by[node] = from_
+        return True
+
+    def did_not_fly(self, winner: int) -> None:
+        """The winner did not take off."""
+        self._without_flight[self._brought_by.get(winner, NO_ROUTE)] += 1
+
+
+def highest_plausible(own: Location | None, gateway: Location | None, range_m: float) -> float:
+    """The highest bid that a node of the group can have, in metres.
+
+    The group is connected, so none of its nodes is farther away than a chain of all ids.
+    """
+    if own is None or gateway is None:
+        return float("inf")
+    return own.distance_m(gateway) + MAX_NODE_ID * range_m
+
+
+class FlightNews:
+    """Which drones took off, and where they looked for the gateway."""
+
+    drone_flew = False  # one of the group, since the connection was lost
+
+    def __init__(self) -> None:
+        self._quiet_until_s = -math.inf
+        self._tries: dict[Location, float] = {}  # gateway's place -> when another may fly there
+        self._failures: set[tuple[int, Location | None]] = set()  # that were reported
+        self._failed_s: dict[int, float] = {}  # node -> when it reported a failed flight there
+
+    def took_off(self, quiet_until_s: float) -> None:
+        """A drone takes off: the others wait for its outcome until `quiet_until_s`."""
+        self.drone_flew = True
+        self._quiet_until_s = quiet_until_s
+
+    def is_quiet(self, now_s: float) -> bool:
+        """Whether the group waits for a drone in flight."""
+        return now_s < self._quiet_until_s
+
+    def tries(self, place: Location | None, now_s: float, keep_s: float) -> None:
+        """A drone looks or looked for the gateway at `place`; no other flies there for `keep_s`."""
+        self._tries = {tried: at_s for tried, at_s in self._tries.items() if now_s < at_s}
+        if place is not None:
+            until_s = now_s + keep_s
+            self._tries[place] = max(until_s, self._tries.get(place, until_s))
+
+    def is_tried(self, place: Location, now_s: float, near_m: float) -> bool:
+        """Whether a drone has been so close to `place` that a gateway there would have answered."""
+        return any(
+            now_s < until_s and place.distance_m(tried) < near_m
+            for tried, until_s in self._tries.items()
+        )
+
+    def failed(
+        self, node: int, place: Location | None, now_s: float, keep_s: float, again_s: float
+    ) -> bool:
+        """`node` found no gateway at `place`; returns whether it says so first within `again_s`.
+
+        What it repeats in later rounds does not keep others away from the place for longer.
+        """
+        if now_s < self._failed_s.get(node, -math.inf) + again_s:
+            return False
+        self._failed_s[node] = now_s
+        if (node, place) not in self._failures:
+            self._failures.add((node, place))
+            self.tries(place, now_s, keep_s)
+        return True

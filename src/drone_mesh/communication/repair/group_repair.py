@@ -11,17 +11,18 @@ import math
 from drone_mesh.communication.control.router_states import RepairState, RouterEvent
 from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.repair.actions import RepairActions, Step
-from drone_mesh.communication.repair.bid_credit import BidCredit, highest_plausible
 from drone_mesh.communication.repair.election import (
     HOME_FAILED,
     NO_BID,
     TOOK_OFF,
     TOOK_OFF_HOME,
+    BidCredit,
     Election,
+    FlightNews,
     as_on_the_air,
+    highest_plausible,
 )
-from drone_mesh.communication.repair.flight_news import FlightNews
+from drone_mesh.communication.repair.interfaces import RepairActions, Step
 from drone_mesh.communication.repair.lone_repair import LoneRepair
 from drone_mesh.communication.repair.spots import NEAR, PITCH
 from drone_mesh.drone.location import Location
@@ -103,7 +104,7 @@ class GroupRepair(LoneRepair):
         super().on_gateway_found()
         self._election.clear()
         self._rounds_without_flier = 0
-        self._news.clear()
+        self._news = FlightNews()
         self._credit.clear()
 
     def on_stopped(self) -> None:
@@ -148,7 +149,8 @@ class GroupRepair(LoneRepair):
             return None, f"cannot fly: {why_not}"
         reason = "knows no place to fly to"
         is_first_choice = True
-        steps = mesh.steps
+        steps, now_s = mesh.steps, mesh.now_s
+        near_m = max(mesh.range_m / 2, 2 * PITCH * mesh.clearance_m)  # a gateway would answer there
         for step in steps:
             if step.owner == NO_ROUTE and len(steps) > 1 and not (alone and self._was_everywhere):
                 continue
@@ -161,17 +163,12 @@ class GroupRepair(LoneRepair):
             occupant = NO_ROUTE if alone else self._occupant(step)
             if occupant != NO_ROUTE:
                 reason = f"the place of {step.owner} is occupied by {occupant}"
-            elif step.home and not alone and self._is_tried(step.place):
+            elif step.home and not alone and self._news.is_tried(step.place, now_s, near_m):
                 reason = "another drone flew to the gateway without success"
             elif is_first_choice or self._rounds_without_flier >= ROUNDS_WITHOUT_FLIER:
                 return step, ""
             is_first_choice = False
         return None, reason
-
-    def _is_tried(self, place: Location) -> bool:
-        """Whether another drone has been so close that a gateway would have answered it."""
-        near_m = max(self.mesh.range_m / 2, 2 * PITCH * self.mesh.clearance_m)
-        return self._news.is_tried(place, self.mesh.now_s, near_m)
 
     def _occupant(self, step: Step) -> int:
         """A reachable node at the goal of `step`, or the owner of that place; else NO_ROUTE."""
@@ -242,12 +239,12 @@ class GroupRepair(LoneRepair):
             self._decide()
 
     def _negotiate(self) -> None:
+        mesh = self.mesh
         step, self.reason = self._next_step(alone=False)
         self.own_bid = NO_BID if step is None else self._score(step)
         self.bids_for = NO_ROUTE if step is None else step.owner
-        detail = f"score {self.own_bid:.2f}"
-        self.mesh.report(MeshEventKind.NEGOTIATION_STARTED, detail=detail)
-        self.mesh.happened(RouterEvent.BID)
+        mesh.report(MeshEventKind.NEGOTIATION_STARTED, detail=f"score {self.own_bid:.2f}")
+        mesh.happened(RouterEvent.BID)
         self._begin_election()
 
     def _begin_election(self) -> None:
@@ -256,11 +253,11 @@ class GroupRepair(LoneRepair):
         settled_s = max(mesh.now_s, self._asked_s + self._places_within_s)
         settled_s += mesh.medium.stretched(SETTLE_S)
         self._election.start(mesh.node_id, score, mesh.now_s, settled_s)
-        tried = self._was_home() if score < 0 else None
-        if tried is None:
-            mesh.bid(score)
+        tried = [step.place for step in mesh.steps if step.home and mesh.was_at(step)]
+        if score < 0 and tried:
+            mesh.bid(HOME_FAILED, about=tried[0])
         else:
-            mesh.bid(HOME_FAILED, about=tried)
+            mesh.bid(score)
         self._decide()
 
     def _decide(self) -> None:
@@ -306,16 +303,10 @@ class GroupRepair(LoneRepair):
     def _on_home_failed(self, node: int, from_: int, about: Location | None) -> None:
         """A drone found no gateway at the gateway's place: no other of the group flies there."""
         mesh = self.mesh
-        if mesh.connected or not self._news.is_new_failure(node, mesh.now_s, TAKE_OFF_WITHIN_S):
-            return
+        where, again_s = about or mesh.gateway_place, TAKE_OFF_WITHIN_S
         rounds_s = HOME_FAILED_ROUNDS * (mesh.connection_lost_after_s + mesh.check_period_s)
-        self._news.failed(node, about or mesh.gateway_place, mesh.now_s, rounds_s)
-        mesh.bid(HOME_FAILED, node, but_not_to=from_, about=about)
-
-    def _was_home(self) -> Location | None:
-        """The gateway's place, if this drone has been there since it was last connected."""
-        mesh = self.mesh
-        return next((s.place for s in mesh.steps if s.home and mesh.was_at(s)), None)
+        if not mesh.connected and self._news.failed(node, where, mesh.now_s, rounds_s, again_s):
+            mesh.bid(HOME_FAILED, node, but_not_to=from_, about=about)
 
     def _pass_over_winner(self) -> None:
         """The winner did not take off: the next best bid wins."""

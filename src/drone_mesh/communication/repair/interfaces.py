@@ -1,4 +1,4 @@
-"""The interface of a repair strategy: what its router reports to it.
+"""What a repair strategy and its router expect of each other.
 
 A strategy is driven like the rest of the mesh software: without a clock, thread or randomness of
 its own. docs/strategies.md shows how to write one.
@@ -9,11 +9,251 @@ its own. docs/strategies.md shows how to write one.
 from __future__ import annotations
 
 import abc
+import math
+from collections import deque
+from dataclasses import dataclass
+from typing import Mapping, NamedTuple
 
-from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.repair.actions import RepairActions
+from drone_mesh.communication.control.control_plane import IControlPlane
+from drone_mesh.communication.control.pilot import Pilot
+from drone_mesh.communication.control.places import KnownPlaces, PlaceRequests
+from drone_mesh.communication.control.router_states import RepairState, RouterEvent, RouterStates
+from drone_mesh.communication.events.observer import MeshEventKind, Reporter
+from drone_mesh.communication.interfaces import NO_ROUTE, IWirelessCommunication
+from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.repair.election import NO_BID
+from drone_mesh.communication.repair.options import RepairOptions
+from drone_mesh.communication.repair.spots import NEAR, PITCH, may_be_flown_to
+from drone_mesh.communication.timing import Deadlines, Due, MeshTiming
+from drone_mesh.communication.wire.messages import (
+    GatewayPlace,
+    MovementNegotiationMessage,
+    addressed,
+)
+from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
+
+RADIO_FAILED = "its radio does not work"
+JAMMED = "its channel is jammed"
+TRIED_SPOTS = 4  # more take all spots around a place, so that the drone drifts away
+
+
+class Step(NamedTuple):
+    """A possible flight of a drone."""
+
+    place: Location
+    owner: int = NO_ROUTE  # the node at that place; NO_ROUTE: none; own id: a return
+    home: bool = False  # whether it is the gateway's place
+
+
+class NeighbourView(NamedTuple):
+    """What a router knows about a neighbour."""
+
+    place: Location | None  # where it is, or its destination; None: not reported
+    age_s: float  # age of the place; infinity if unknown
+    hops: int  # to its gateway, as last reported; 255: it has none
+
+
+@dataclass(eq=False)
+class RepairActions(abc.ABC):
+    """A strategy's view of its router, and its possible actions. Places in metres, x east.
+
+    ConnectionRepair adds what changes the course of a repair.
+    """
+
+    node_id: int
+    _states: RouterStates
+    _control: IControlPlane
+    _options: RepairOptions
+    _timing: MeshTiming
+    _deadlines: Deadlines
+    _antenna: IWirelessCommunication
+    _engine: IDroneEngine
+    _pilot: Pilot
+    _requests: PlaceRequests
+    _neighbours: Neighbours
+    _places: KnownPlaces
+    _report: Reporter
+
+    def __post_init__(self) -> None:
+        self.medium = self._antenna.medium
+        self.range_m = self._options.range_m  # of the radio, as far as known
+        self.clearance_m = self._options.clearance_m  # least distance between drones at rest
+        self.check_period_s = self._timing.check_period_s
+        # The time without a gateway until the emergency
+        self.connection_lost_after_s = self._timing.connection_lost_after_s
+        # For so long a bid counts, and the bids of neighbours are awaited
+        self.bids_within_s = self._control.bids_within_s
+        self._tried_goals: list[Location] = []  # goals of this drone since it was last connected
+        self._tried_spots: deque[Location] = deque(maxlen=TRIED_SPOTS)  # where it landed for these
+
+    # Views -----------------------------------------------------------------------------------
+
+    @property
+    def now_s(self) -> float:
+        """The time, in seconds of the core's clock."""
+        return self._deadlines.now_s
+
+    @property
+    def connected(self) -> bool:
+        """Whether a gateway answers."""
+        return self._states.connected
+
+    @property
+    def state(self) -> RepairState:
+        """The current repair state."""
+        return self._states.repair
+
+    @property
+    def silent(self) -> bool:
+        """Whether all neighbours (2 or more) fell silent together, so the medium may be down."""
+        return self._neighbours.silent
+
+    def hears_power(self) -> bool | None:
+        """Whether there is power in the channel of its radio now; None: it cannot measure it."""
+        return self._antenna.hears_power()
+
+    def neighbours(self) -> Mapping[int, NeighbourView]:
+        """The nodes in direct reach."""
+        return {node: self._view(node) for node in self._control.routes.get_set_of_children()}
+
+    def is_unheard(self) -> bool:
+        """Whether this node hears others but none of them hears it."""
+        return bool(self._neighbours.deaf()) and not self.neighbours()
+
+    def reachable(self) -> Mapping[int, NeighbourView]:
+        """All nodes with a route to them and a reported place."""
+        places = self._neighbours.places()
+        return {node: self._view(node) for node in places if self.reaches(node)}
+
+    def reaches(self, node: int) -> bool:
+        """Whether there is a route to `node`."""
+        return self._control.routes.get_direction_to_node(node) != NO_ROUTE
+
+    @property
+    def lost_next_hop(self) -> int:
+        """The next hop to the gateway before the connection was lost; NO_ROUTE: unknown."""
+        return self._places.good_id
+
+    @property
+    def steps(self) -> list[Step]:
+        """The flights back: to the lost next hop, the gateway, and where it was connected last.
+
+        The last one has the owner NO_ROUTE; it is for a drone that has no other.
+        """
+        places, gateway = self._places, self._control.gateway
+        candidates = [
+            (places.good, places.good_id),
+            (places.gateway, gateway),
+            (places.connected_at, NO_ROUTE),
+        ]
+        return [
+            Step(place, owner, home=owner == gateway != NO_ROUTE)
+            for place, owner in candidates
+            if place is not None and may_be_flown_to(place)
+        ]
+
+    @property
+    def gateway_place(self) -> Location | None:
+        """The last reported place of the preferred gateway."""
+        return self._places.gateway
+
+    def own_place(self) -> Location | None:
+        """The position of this drone; None: unknown."""
+        return self._pilot.location()
+
+    def why_not_fly(self) -> str:
+        """Why the drone cannot fly for a repair; empty if it can.
+
+        Without a radio it would be connected nowhere, and tell nobody where it lands.
+        """
+        if not self._antenna.works():
+            return RADIO_FAILED
+        return self._engine.why_not_repair()
+
+    @abc.abstractmethod
+    def goal_of(self, step: Step) -> Location:
+        """Where a flight for this step would end, clear of other drones, silent ones included."""
+
+    def was_at(self, step: Step) -> bool:
+        """Whether this drone is at the step's place, or flew there since its last connection."""
+        radius_m = self.clearance_m * (2 * PITCH if step.home else NEAR)
+        here = self._pilot.place() if step.owner == NO_ROUTE else None
+        places = [*self._tried_goals, *filter(None, [here])]
+        return any(step.place.distance_m(place) < radius_m for place in places)
+
+    # Actions ---------------------------------------------------------------------------------
+
+    def try_again(self) -> None:
+        """Allow flights to places that were tried in vain; each ends at another side."""
+        self._tried_goals.clear()
+
+    @abc.abstractmethod
+    def fly(self, step: Step, until_connected: bool = False) -> None:
+        """Fly there and land clear of other drones; `on_landed` reports the landing.
+
+        Nothing happens if the drone cannot fly (`why_not_fly`).
+
+        `until_connected`: land as soon as a gateway answers. The routes are forgotten.
+        """
+
+    def bid(
+        self,
+        score: float,
+        node: int | None = None,
+        but_not_to: int = NO_ROUTE,
+        about: Location | None = None,
+    ) -> None:
+        """Send a bid to all neighbours; `node` is its creator if it is relayed.
+
+        `about`: the goal of a flight that it announces, or the gateway's place where one failed.
+        """
+        me = self.node_id
+        creator = me if node is None else node
+        packet = MovementNegotiationMessage(creator, me, me, me, score).to_payload()
+        if about is not None:
+            packet = GatewayPlace(self._control.gateway, about, 0.0).appended_to(packet)
+        for neighbour in sorted(self._control.routes.get_set_of_children() - {creator, but_not_to}):
+            self._control.delivery.send_own(addressed(packet, neighbour))
+
+    def ask_places(self) -> None:
+        """Request the places of all nodes in range; the answers arrive in `on_place`."""
+        self._requests.ask_all()
+
+    def ask_place(self, node: int) -> None:
+        """Request the place of one node, along the route to it."""
+        self._requests.ask(node)
+
+    def announce_place(self, place: Location) -> None:
+        """Send the place to which this drone flies to all nodes in range."""
+        self._requests.announce(place)
+
+    def present(self) -> None:
+        """Introduce this node to all nodes in range."""
+        self._control.introduce()
+
+    def wait_until(self, at_s: float) -> None:
+        """Call `on_time` at this time instead of an earlier request; infinity: not at all."""
+        self._deadlines.set(Due.REPAIR, at_s)
+
+    def happened(self, event: RouterEvent) -> None:
+        """Change the states of the router (see router_states). An election needs this."""
+        self._states.happened(event)
+
+    @abc.abstractmethod
+    def end_round(self) -> None:
+        """An election is over. Count the time without a gateway from its first check."""
+
+    def report(self, kind: MeshEventKind, peer: int = NO_ROUTE, detail: str = "") -> None:
+        """Report an event to the node's observer."""
+        self._report(kind, peer, detail)
+
+    def _view(self, node: int) -> NeighbourView:
+        heard, hops = self._neighbours.place_of(node), self._neighbours.hops_of(node)
+        if heard is None:
+            return NeighbourView(None, math.inf, hops)
+        return NeighbourView(heard.place, self.now_s - heard.heard_s, hops)
+
 
 SILENCE_PATIENCE = 5.0  # the factor on a node's patience if its medium may be down
 

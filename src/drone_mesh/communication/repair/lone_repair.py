@@ -12,8 +12,13 @@ import math
 
 from drone_mesh.communication.control.router_states import RepairState
 from drone_mesh.communication.events.observer import MeshEventKind
-from drone_mesh.communication.repair.actions import JAMMED, RepairActions, Step
-from drone_mesh.communication.repair.interfaces import SILENCE_PATIENCE, IRepairStrategy
+from drone_mesh.communication.repair.interfaces import (
+    JAMMED,
+    SILENCE_PATIENCE,
+    IRepairStrategy,
+    RepairActions,
+    Step,
+)
 from drone_mesh.drone.location import Location
 
 LISTENS_S = 1.0  # an answer takes some milliseconds

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import enum
-import math
 from dataclasses import dataclass
 
-from drone_mesh.errors import ConfigurationError
-from drone_mesh.settings import setting
+from drone_mesh.settings import setting, settings_of
 
 DEFAULT_REPAIR = "thesis"
 RANGE_M = 9.0  # docs/ros.md, "Wireless signal simulator": a node nearer than this is in range
@@ -49,9 +47,5 @@ class RepairOptions:
 
     def __post_init__(self) -> None:
         """Raise ConfigurationError for a number outside its range."""
-        if not (math.isfinite(self.clearance_m) and self.clearance_m > 0):
-            raise ConfigurationError(
-                f"invalid clearance {self.clearance_m}: must be above 0 metres"
-            )
-        if not (math.isfinite(self.range_m) and self.range_m > 0):
-            raise ConfigurationError(f"invalid range {self.range_m}: must be above 0 metres")
+        for declared in settings_of(self):
+            declared.check(declared.default)  # the value of this instance

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Callable
 
 from drone_mesh.communication.control.pilot import Pilot
 from drone_mesh.communication.control.places import PlaceRequests
 from drone_mesh.communication.neighbours import Neighbours
-from drone_mesh.communication.repair.actions import Step
-from drone_mesh.communication.repair.heights import above_ground, at_whole_metres
+from drone_mesh.communication.repair.interfaces import Step
 from drone_mesh.communication.repair.options import RepairOptions
-from drone_mesh.communication.repair.spots import Landing
-from drone_mesh.communication.repair.taken_places import TakenPlaces
+from drone_mesh.communication.repair.spots import (
+    Landing,
+    TakenPlaces,
+    above_ground,
+    at_whole_metres,
+)
 from drone_mesh.communication.timing import LANDED_WITHIN_M
 from drone_mesh.drone.location import Location
 
@@ -21,6 +25,7 @@ ASKS_ON_GROUND = 2  # a lossy medium loses a question now and then
 LEG = 2.0 / 3.0  # of the range: at half that height it hears nodes below
 
 
+@dataclass(eq=False)
 class RepairFlight:
     """One flight of one drone, from take-off until it is clear of other drones.
 
@@ -29,38 +34,26 @@ class RepairFlight:
     ground it asks again.
     """
 
-    def __init__(
-        self,
-        node_id: int,
-        pilot: Pilot,
-        requests: PlaceRequests,
-        neighbours: Neighbours,
-        introduce: Callable[[], None],
-        step: Step,
-        goal: Location,
-        options: RepairOptions,
-        taken: TakenPlaces,
-        landing: Landing,
-    ) -> None:
-        """To `goal`, at or near the place of `step`. `introduce` broadcasts a PRESENT."""
-        self.goal = goal
-        self._step = step
-        self.group = neighbours.ids()  # the neighbours that it leaves behind
+    _node_id: int
+    _pilot: Pilot
+    _requests: PlaceRequests
+    _neighbours: Neighbours
+    _introduce: Callable[[], None]  # broadcasts a PRESENT
+    _step: Step
+    goal: Location  # at or near the place of the step
+    _options: RepairOptions
+    _taken: TakenPlaces
+    _landing: Landing
+
+    def __post_init__(self) -> None:
+        self.group = self._neighbours.ids()  # the neighbours that it leaves behind
         self.stops_when_connected = False
         self.asks_left = 0  # on the ground
-        self._wanted = at_whole_metres(step.place)  # or beside it
-        self._taken = taken
-        self._landing = landing
-        self._node_id = node_id
-        self._pilot = pilot
-        self._requests = requests
-        self._neighbours = neighbours
-        self._introduce = introduce
-        self._clearance_m = options.clearance_m
-        self._leg_m = LEG * options.range_m
+        self._wanted = at_whole_metres(self._step.place)  # or beside it
+        self._leg_m = LEG * self._options.range_m
         self._diversions = 0
         self._leg_from: Location | None = None
-        self._leg_end = goal
+        self._leg_end = self.goal
 
     @property
     def on_ground(self) -> bool:
@@ -87,7 +80,7 @@ class RepairFlight:
         here = self._pilot.location()
         if here is not None and not self.on_ground:
             below = Location(here.latitude, here.longitude, self.goal.height)
-            if below.distance_m(self.goal) >= self._clearance_m:
+            if below.distance_m(self.goal) >= self._options.clearance_m:
                 relay = self._neighbours.place_of(next_hop)
                 self._wanted = below
                 self._landing = Landing(here, [] if relay is None else [relay.place])
@@ -95,9 +88,12 @@ class RepairFlight:
 
     def on_place(self, node: int, place: Location) -> None:
         """Another node reports its place; keep clear of it."""
-        if node == self._step.owner and place.distance_m(self._step.place) < self._clearance_m:
+        if (
+            node == self._step.owner
+            and place.distance_m(self._step.place) < self._options.clearance_m
+        ):
             self.stop_when_connected()
-        if above_ground(place).distance_m(self.goal) < self._clearance_m:
+        if above_ground(place).distance_m(self.goal) < self._options.clearance_m:
             self.stop_when_connected()
         self.on_taken(place)
 
@@ -111,7 +107,7 @@ class RepairFlight:
             self.fly_on()
 
     def _is_taken_by(self, place: Location, spot: Location) -> bool:
-        near = above_ground(place).distance_m(spot) < self._clearance_m
+        near = above_ground(place).distance_m(spot) < self._options.clearance_m
         return near and not self._taken.is_free(spot)
 
     def arrived(self) -> bool:

@@ -7,9 +7,12 @@ from __future__ import annotations
 
 import abc
 import hashlib
+import os
+from pathlib import Path
 
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.errors import ConfigurationError
+from drone_mesh.secret_file import read_secret_file
 
 KEY_BYTES = 16  # 128 bits
 _NETWORK, _AUTHORITY, _PAIR = b"network", b"authority", b"pair"
@@ -118,3 +121,25 @@ def keys_from_text(text: str) -> MeshKey | NodeKeys:
 
 def _derived(secret: bytes, purpose: bytes) -> bytes:
     return hashlib.blake2s(purpose, key=secret, digest_size=KEY_BYTES, person=b"dronemsh").digest()
+
+
+def read_key_file(path: Path) -> MeshKey | NodeKeys:
+    """The keys in a secret file. Raises ConfigurationError if it is none or holds no keys."""
+    text = read_secret_file(path)
+    try:
+        return keys_from_text(text)
+    except ConfigurationError as error:
+        raise ConfigurationError(f"{path}: {error}") from None
+
+
+def write_key_file(path: Path, keys: MeshKey | NodeKeys) -> None:
+    """Create a file, mode 600. Raises ConfigurationError if it exists: keys are not overwritten."""
+    try:
+        with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as file:
+            file.write(keys.to_text())
+    except FileExistsError as error:
+        raise ConfigurationError(
+            f"key file {path}: exists already and is not overwritten; choose another name"
+        ) from error
+    except OSError as error:
+        raise ConfigurationError(f"key file {path}: {error.strerror or error}") from error

@@ -7,7 +7,7 @@ import statistics
 from collections import Counter, defaultdict
 from typing import Sequence
 
-from drone_mesh.communication.data.ticket import TicketState
+from drone_mesh.communication.data.outgoing import TicketState
 from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.lab.impairments import Traffic

@@ -8,8 +8,7 @@ from pathlib import Path
 
 from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.communication.node.node_configuration import NodeConfiguration
-from drone_mesh.communication.seals.key_file import read_key_file
-from drone_mesh.communication.seals.keys import MeshKey
+from drone_mesh.communication.seals.keys import MeshKey, read_key_file
 from drone_mesh.configuration import FactoryConfiguration
 from drone_mesh.errors import ConfigurationError, naming_argument
 from drone_mesh.internet.mqtt_topics import PASSWORD_VARIABLE, Broker, parse_broker

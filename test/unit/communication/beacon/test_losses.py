@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from drone_mesh.communication.beacon.losses import MOST, Losses
+from drone_mesh.communication.beacon.neighbour import MOST, Losses
 from drone_mesh.drone.location import Location
 
 HERE = Location(0.0, 0.0, 0.0)

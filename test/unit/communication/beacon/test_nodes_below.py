@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from drone_mesh.communication.beacon.nodes_below import NodesBelow
+from drone_mesh.communication.beacon.own_beacons import NodesBelow
 from drone_mesh.communication.beacon.packets import (
     NO_ANCESTORS,
     NONE_BELOW,

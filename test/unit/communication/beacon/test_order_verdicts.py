@@ -7,8 +7,7 @@ import pytest
 from drone_mesh.communication.beacon.courier import Transit
 from drone_mesh.communication.beacon.packets import NO_ANCESTORS, Beacon
 from drone_mesh.communication.beacon.routes import BeaconRoutes
-from drone_mesh.communication.beacon.search import Searches
-from drone_mesh.communication.beacon.verdicts import SUSPECTED_S, Verdicts
+from drone_mesh.communication.beacon.verdicts import SUSPECTED_S, Searches, Verdicts
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.timing import Deadlines
 from drone_mesh.communication.wire import messages

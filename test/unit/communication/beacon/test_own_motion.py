@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from drone_mesh.communication.beacon.own_motion import OwnMotion
+from drone_mesh.communication.beacon.own_beacons import OwnMotion
 from drone_mesh.drone.location import Location
 
 

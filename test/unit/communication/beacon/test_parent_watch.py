@@ -8,8 +8,8 @@ import pytest
 from rig import AlwaysHalf
 
 from drone_mesh.communication.beacon.packets import NO_ANCESTORS, Beacon
-from drone_mesh.communication.beacon.parent_watch import ParentWatch
 from drone_mesh.communication.beacon.routes import BeaconRoutes
+from drone_mesh.communication.beacon.times import ParentWatch
 from drone_mesh.communication.timing import Deadlines
 
 HOP_S = 0.01  # AlwaysHalf: node 9 waits for four hops more for each of its neighbours

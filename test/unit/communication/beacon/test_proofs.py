@@ -8,9 +8,9 @@ from types import SimpleNamespace
 import pytest
 from rig import AlwaysHalf, RecordingAntenna, packet
 
+from drone_mesh.communication.beacon.connection import Proofs
 from drone_mesh.communication.beacon.courier import DROP, Courier
 from drone_mesh.communication.beacon.packets import NO_ANCESTORS, Beacon
-from drone_mesh.communication.beacon.proofs import Proofs
 from drone_mesh.communication.beacon.routes import BeaconRoutes
 from drone_mesh.communication.control.places import KnownPlaces, PlaceRequests
 from drone_mesh.communication.events.complaints import Complaints

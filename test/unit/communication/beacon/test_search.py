@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from drone_mesh.communication.beacon.routes import BeaconRoutes
-from drone_mesh.communication.beacon.search import Searches
+from drone_mesh.communication.beacon.verdicts import Searches
 from drone_mesh.communication.timing import Deadlines
 
 HOP_S = 0.0025

@@ -7,7 +7,7 @@ import random
 import pytest
 
 from drone_mesh.communication.beacon.packets import NO_ANCESTORS, Beacon
-from drone_mesh.communication.beacon.trickle import AT_REST_S, Trickle
+from drone_mesh.communication.beacon.times import AT_REST_S, Trickle
 from drone_mesh.communication.timing import Medium
 
 FAST = Medium.for_hop(0.0011)

@@ -8,8 +8,7 @@ from rig import packet
 from drone_mesh.communication.beacon.courier import DROP, HOLD, Transit
 from drone_mesh.communication.beacon.packets import NO_ANCESTORS, Beacon, Below
 from drone_mesh.communication.beacon.routes import BeaconRoutes
-from drone_mesh.communication.beacon.search import Searches
-from drone_mesh.communication.beacon.verdicts import Verdicts
+from drone_mesh.communication.beacon.verdicts import Searches, Verdicts
 from drone_mesh.communication.timing import Deadlines, Due
 
 OWN, FROM_5_THROUGH_1 = "09 09 00 00 32", "05 01 00 09 32"  # for node 50
@@ -40,7 +39,7 @@ def node():
 
 
 def transit(text):
-    return Transit(packet(text), came_from=255 if text == OWN else 1, now_s=0.0)
+    return Transit(packet(text), came_from=255 if text == OWN else 1, seen_s=0.0)
 
 
 @pytest.mark.parametrize(

@@ -7,8 +7,8 @@ import math
 import pytest
 
 from drone_mesh.communication.data import packets
-from drone_mesh.communication.data.ack_turns import TURN_S, AckTurns
 from drone_mesh.communication.data.inbox import ACK_DELAY_S, Inbox
+from drone_mesh.communication.data.inboxes import TURN_S, AckTurns
 from drone_mesh.communication.data.packets import Head, Poll
 from drone_mesh.communication.timing import FAST_HOP_S, UNDISTURBED, Medium
 

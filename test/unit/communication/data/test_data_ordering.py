@@ -1,6 +1,5 @@
 from drone_mesh.communication.data.ordering import HOLD_S, PortOrder
-from drone_mesh.communication.data.packets import Head
-from drone_mesh.communication.data.reassembly import Whole
+from drone_mesh.communication.data.packets import Head, Whole
 
 
 def message(order, behind=0, reliable=True):

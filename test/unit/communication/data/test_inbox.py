@@ -11,8 +11,7 @@ from drone_mesh.communication.data.flood import MOST_HEADS, Flood
 from drone_mesh.communication.data.inbox import MOST_PORTS, Inbox
 from drone_mesh.communication.data.ordering import PortOrder
 from drone_mesh.communication.data.outgoing import LIFETIME_S
-from drone_mesh.communication.data.packets import Head, Poll
-from drone_mesh.communication.data.reassembly import Whole
+from drone_mesh.communication.data.packets import Head, Poll, Whole
 from drone_mesh.communication.timing import UNDISTURBED, Deadlines
 
 ROOM = 27

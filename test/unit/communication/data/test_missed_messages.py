@@ -7,8 +7,7 @@ import pytest
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.inbox import Inbox
 from drone_mesh.communication.data.outbox import Outbox
-from drone_mesh.communication.data.outgoing import OutgoingMessage
-from drone_mesh.communication.data.ticket import Ticket
+from drone_mesh.communication.data.outgoing import LIFETIME_S, OutgoingMessage, Ticket
 from drone_mesh.communication.timing import UNDISTURBED
 
 ROOM = 27
@@ -34,12 +33,11 @@ class Link:
         payload = self.count.to_bytes(4, "big")
         ticket = Ticket(self.count, 0, 5, 4, self.reliable)
         self.count += 1
-        message = OutgoingMessage(ticket, payload, 0.0)
-        self.outbox.add(message)
+        self.outbox.waiting.append(OutgoingMessage(ticket, payload, LIFETIME_S))
         packet = self.outbox.next_packet(0.0)
         self.outbox.on_sent(packet, 0.0)
         if self.reliable:
-            self.outbox.give_up(message, "")
+            self.outbox.expire(LIFETIME_S, has_route=True)
         if not heard:
             return []
         wholes = self.inbox.fragment(packet.kind - packets.FRAGMENTS.start, packet.body, 0.0)
@@ -68,7 +66,7 @@ def test_a_new_session_waits_for_the_acknowledgements_of_the_last():
         link.send(heard=False)
     for number in range(2):
         ticket = Ticket(link.count + number, 0, 5, 4, True)
-        link.outbox.add(OutgoingMessage(ticket, bytes(4), 0.0))
+        link.outbox.waiting.append(OutgoingMessage(ticket, bytes(4), LIFETIME_S))
     last = link.outbox.next_packet(0.0)
     link.outbox.on_sent(last, 0.0)
     assert link.outbox.next_packet(0.0) is None

@@ -6,9 +6,8 @@ import pytest
 
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.outbox import Outbox
-from drone_mesh.communication.data.outgoing import OutgoingMessage
+from drone_mesh.communication.data.outgoing import LIFETIME_S, OutgoingMessage, Ticket, TicketState
 from drone_mesh.communication.data.pacing import FIRST_TIMEOUT_S, MOST_TIMEOUT_S, RoundTrip
-from drone_mesh.communication.data.ticket import Ticket, TicketState
 
 
 def outbox_with(count, relayed):
@@ -23,7 +22,7 @@ def outbox_with(count, relayed):
     outbox.set_relayed(relayed)
     tickets = [Ticket(number, to=0, port=5, size=16, reliable=True) for number in range(count)]
     for ticket in tickets:
-        outbox.add(OutgoingMessage(ticket, bytes(16), now_s=0.0))
+        outbox.waiting.append(OutgoingMessage(ticket, bytes(16), LIFETIME_S))
     return outbox, tickets
 
 
@@ -47,7 +46,7 @@ def test_behind_relays_few_messages_leave_at_once_while_answers_are_late(relayed
     outbox.answered(ack_of(first, nonce=0), answered_s)
     for number in range(1, 31):
         ticket = Ticket(number, to=0, port=5, size=16, reliable=True)
-        outbox.add(OutgoingMessage(ticket, bytes(16), answered_s))
+        outbox.waiting.append(OutgoingMessage(ticket, bytes(16), answered_s + LIFETIME_S))
     sent = send_all(outbox, answered_s)
     assert [packet.kind for packet in sent] == [packets.FRAGMENTS.start] * most
 
@@ -63,7 +62,7 @@ def test_while_a_poll_has_no_answer_nothing_else_is_sent(relayed):
     assert len(send_all(outbox, 0.0)) >= 3
     for number in range(20):
         ticket = Ticket(10 + number, to=0, port=5, size=16, reliable=True)
-        outbox.add(OutgoingMessage(ticket, bytes(16), now_s=0.0))
+        outbox.waiting.append(OutgoingMessage(ticket, bytes(16), LIFETIME_S))
     polled_s = []
     for tenth in range(11, 1000):
         for packet in send_all(outbox, tenth / 10) if tenth > 11 else send_polls(outbox):

@@ -8,10 +8,14 @@ import pytest
 
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.outbox import Outbox
-from drone_mesh.communication.data.outgoing import OutgoingMessage
-from drone_mesh.communication.data.pacing import RoundTrip
-from drone_mesh.communication.data.ticket import Ticket
-from drone_mesh.communication.data.train import FIRST_LENGTH, LEAST_LENGTH, MOST_LENGTH, Train
+from drone_mesh.communication.data.outgoing import LIFETIME_S, OutgoingMessage, Ticket
+from drone_mesh.communication.data.pacing import (
+    FIRST_LENGTH,
+    LEAST_LENGTH,
+    MOST_LENGTH,
+    RoundTrip,
+    Train,
+)
 from drone_mesh.inprocess import Network
 
 
@@ -105,7 +109,7 @@ def test_a_loss_of_best_effort_shortens_the_next_train_and_not_those_after_it():
     outbox.set_relayed(True)
     for number in (1, 2, 3):
         ticket = Ticket(number, to=0, port=5, size=1024, reliable=False)
-        outbox.add(OutgoingMessage(ticket, bytes(1024), now_s=0.0))
+        outbox.waiting.append(OutgoingMessage(ticket, bytes(1024), LIFETIME_S))
     arrived = Counter()  # by message, as bits
 
     def length_of_train(lost):

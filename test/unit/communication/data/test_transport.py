@@ -3,9 +3,8 @@ import pytest
 from drone_mesh.channel.access_rules import AccessRules
 from drone_mesh.channel.medium_access import MediumAccess
 from drone_mesh.communication.data import packets
-from drone_mesh.communication.data.outgoing import LIFETIME_S
+from drone_mesh.communication.data.outgoing import LIFETIME_S, TO_ALL, TO_GATEWAY, TicketState
 from drone_mesh.communication.data.packets import Head
-from drone_mesh.communication.data.ticket import TO_ALL, TO_GATEWAY, TicketState
 from drone_mesh.communication.data.transport import MOST_QUEUED
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.communication.wire.messages import is_data

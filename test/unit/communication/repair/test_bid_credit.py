@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from drone_mesh.communication.repair.bid_credit import BidCredit, highest_plausible
+from drone_mesh.communication.repair.election import BidCredit, highest_plausible
 from drone_mesh.drone.location import Location
 
 MOST = 2000.0

@@ -12,13 +12,13 @@ from rig import FROM_0, Rig, packet
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.repair.election import HOME_FAILED, TOOK_OFF, TOOK_OFF_HOME
 from drone_mesh.communication.repair.interfaces import IRepairStrategy
-from drone_mesh.communication.repair.named_strategies import (
-    REPAIR_STRATEGIES,
-    create_repair_strategy,
-)
 from drone_mesh.communication.repair.options import LostPlace, RepairOptions
 from drone_mesh.communication.repair.spots import Landing, own_spot, spot_beside_rivals
-from drone_mesh.communication.repair.strategies.thesis import Thesis
+from drone_mesh.communication.repair.strategies import (
+    REPAIR_STRATEGIES,
+    Thesis,
+    create_repair_strategy,
+)
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.location import Location
 

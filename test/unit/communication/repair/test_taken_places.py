@@ -5,7 +5,7 @@ from __future__ import annotations
 from drone_mesh.communication.control.places import KnownPlaces
 from drone_mesh.communication.neighbours import Neighbours, SeenMotion
 from drone_mesh.communication.repair.options import RepairOptions
-from drone_mesh.communication.repair.taken_places import TakenPlaces
+from drone_mesh.communication.repair.spots import TakenPlaces
 from drone_mesh.communication.timing import Deadlines
 from drone_mesh.drone.location import Location
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from seal_rig import KEY, OTHER_KEY
 
-from drone_mesh.communication.data.ticket import TO_GATEWAY
+from drone_mesh.communication.data.outgoing import TO_GATEWAY
 from drone_mesh.inprocess import Network
 
 

@@ -4,8 +4,12 @@ import os
 
 import pytest
 
-from drone_mesh.communication.seals.key_file import read_key_file, write_key_file
-from drone_mesh.communication.seals.keys import MeshKey, keys_from_text
+from drone_mesh.communication.seals.keys import (
+    MeshKey,
+    keys_from_text,
+    read_key_file,
+    write_key_file,
+)
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.raspberry.key_command import main
 

@@ -12,7 +12,7 @@ from proofs.stranger import Hole, Tap
 from seal_rig import KEY, OTHER_KEY
 
 from drone_mesh.communication.data import packets
-from drone_mesh.communication.data.ticket import TicketState
+from drone_mesh.communication.data.outgoing import TicketState
 from drone_mesh.communication.seals.message_seal import MessageSeal
 from drone_mesh.inprocess import Network
 

@@ -8,7 +8,7 @@ import pytest
 from proofs.stranger import Hole
 from seal_rig import KEY, packet
 
-from drone_mesh.communication.data.ticket import TO_GATEWAY, TicketState
+from drone_mesh.communication.data.outgoing import TO_GATEWAY, TicketState
 from drone_mesh.communication.heartbeats.detours import Detours, RelayCheck, Swallowing
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.timing import Deadlines, MeshTiming

@@ -1,1 +1,0 @@
-"""Repair strategies that come with drone_mesh; docs/strategies.md compares them."""
