@@ -114,7 +114,7 @@ def borrowed_names(stranger: Stranger) -> None:
 def far_place(stranger: Stranger) -> None:
     """Claim that the gateway is far away, in its name and as hearsay; then it is off."""
     own_word = LocationMessage.BODY.pack(FAR.latitude, FAR.longitude, 0, 0)
-    hearsay = body(GatewayPlace(0, FAR, 0.0).to_payload(0, 0, 0, 0))
+    hearsay = body(GatewayPlace(0, FAR, 0.0).to_payload(0, 0))
     me = stranger.node_id
     for node in stranger.network.nodes:
         for to in [node] if node in stranger.in_range() else stranger.in_range():

@@ -59,7 +59,10 @@ class IMeshDebugInfo(abc.ABC):
 
     @abc.abstractmethod
     def get_connected_to_gateway(self) -> bool:
-        """Whether a gateway answered the last heartbeat; stays true while it may still answer."""
+        """Whether a gateway answered the last heartbeat; stays true while it may still answer.
+
+        Of a gateway: true while its internet works; otherwise whether it reaches another one.
+        """
 
     @abc.abstractmethod
     def get_total_message_sent(self) -> int:

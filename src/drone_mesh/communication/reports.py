@@ -89,24 +89,10 @@ class NodeReport:
 
 
 class NodeWords:
-    """NODE_WORDS: why its creator cannot fly, in one or more packets."""
+    """NODE_WORDS: a part of why its creator cannot fly: the part byte, and text."""
 
     TYPE: ClassVar[MessageType] = MessageType.NODE_WORDS
     BODY: ClassVar[struct.Struct] = TYPE.about.layout
-
-    @classmethod
-    def packets(cls, words: str, creator: int, gateway: int) -> list[bytes]:
-        """All parts, from `creator` for `gateway`."""
-        bodies = [cls.BODY.pack(part, text) for part, text in split(words, WORDS_BYTES)]
-        return [
-            messages.packet(cls.TYPE, creator, creator, gateway, gateway, body) for body in bodies
-        ]
-
-    @classmethod
-    def part_in(cls, payload: bytes) -> tuple[int, bytes]:
-        """The part byte, and the text of that part."""
-        part, text = cls.BODY.unpack_from(payload, HEADER_BYTES)
-        return part, text
 
 
 NOTHING_REPORTED = NodeReport(0, NO_ROUTE, NO_ROUTE, None, None, False, False, 0.0)
@@ -171,7 +157,9 @@ class NodeReporter:
         if words == self._words and (not words or self._words_in > 0):
             return
         self._words, self._words_in = words, WORDS_AGAIN_REPORTS
-        for packet in NodeWords.packets(words, me, gateway):
+        for part in split(words, WORDS_BYTES):
+            body = NodeWords.BODY.pack(*part)
+            packet = messages.packet(NodeWords.TYPE, me, me, gateway, gateway, body)
             self._control.delivery.send_own(packet)
 
 
@@ -210,7 +198,7 @@ class ReportBook:
     def on_words(self, payload: bytes, creator: int, _from: int) -> None:
         """A part of the reason why its drone cannot fly."""
         assembly = self._words.setdefault(creator, TextAssembly())
-        whole = assembly.add(*NodeWords.part_in(payload))
+        whole = assembly.add(*NodeWords.BODY.unpack_from(payload, HEADER_BYTES))
         if whole is not None:
             self._put(self._known(creator)._replace(why_not_fly=whole))
 

@@ -11,8 +11,7 @@ import math
 from collections import Counter
 from dataclasses import dataclass, replace
 
-from drone_mesh.errors import ConfigurationError
-from drone_mesh.settings import setting
+from drone_mesh.settings import setting, settings_of
 
 HEARTBEAT_ANSWER_S = 0.5  # at most one heartbeat to the gateway within this time
 CIRCULATION_S = 0.5  # the same packet from another neighbour within this time circulates
@@ -54,30 +53,13 @@ class MeshTiming:
 
     def __post_init__(self) -> None:
         """Raise ConfigurationError for a number outside its range."""
-        if not self.check_period_s > 0:
-            raise ConfigurationError(
-                f"invalid check_period {self.check_period_s}: must be above 0 seconds"
-            )
-        if not self.connection_lost_after_s >= 0:
-            raise ConfigurationError(
-                f"invalid connection_lost_after {self.connection_lost_after_s}: "
-                "must be above 0 seconds, or 0 for that of the technique"
-            )
-        if self.send_attempts < 1:
-            raise ConfigurationError(
-                f"invalid send_attempts {self.send_attempts}: must be at least 1"
-            )
-        if not (self.report_period_s == 0 or self.report_period_s >= MIN_REPORT_PERIOD_S):
-            raise ConfigurationError(
-                f"invalid report_period {self.report_period_s}: must be 0 (no reports) or at "
-                f"least {MIN_REPORT_PERIOD_S:g} seconds"
-            )
+        for declared in settings_of(self):
+            declared.check(declared.default)
 
     def lost_after(self, seconds: float) -> MeshTiming:
         """The same; without a gateway for `seconds` is an emergency, unless these set it."""
-        return (
-            self if self.connection_lost_after_s else replace(self, connection_lost_after_s=seconds)
-        )
+        lost_after_s = self.connection_lost_after_s or seconds
+        return replace(self, connection_lost_after_s=lost_after_s)
 
 
 FAST_HOP_S = 0.0026  # of an nRF24L01+ at 250 kbit/s; the times of the mesh suit hops up to this

@@ -8,10 +8,12 @@ from __future__ import annotations
 import random
 
 from drone_mesh.communication.interfaces import IInternetConnection, IWirelessCommunication
+from drone_mesh.communication.node.component import NodeSettings
 from drone_mesh.communication.node.gateway import MeshnetworkGateway
 from drone_mesh.communication.node.router import MeshnetworkRouter
+from drone_mesh.communication.repair.options import RepairOptions
 from drone_mesh.communication.routing.child_table_tree import ChildTableTree
-from drone_mesh.communication.timing import UNDISTURBED
+from drone_mesh.communication.timing import UNDISTURBED, MeshTiming
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
@@ -159,28 +161,17 @@ class Rig:
         self.routing = routing or ChildTableTree()
         self.events = []
         carried = (self.antenna, self.engine, self.routing)
-        settings = {
-            "timing": timing,
-            "observer": self.events.append,
-            "debug": debug,
-            "options": options,
-        }
+        settings = NodeSettings(
+            timing=timing or MeshTiming(),
+            options=options or RepairOptions(),
+            observer=self.events.append,
+            debug=debug,
+        )
         if gateway:
-            self.mesh = MeshnetworkGateway(
-                node_id,
-                *carried,
-                self.internet,
-                AlwaysHalf(),
-                **settings,
-            )
+            more = (self.internet, AlwaysHalf(), settings)
+            self.mesh = MeshnetworkGateway(node_id, *carried, *more)
         else:
-            self.mesh = MeshnetworkRouter(
-                node_id,
-                *carried,
-                AlwaysHalf(),
-                repair,
-                **settings,
-            )
+            self.mesh = MeshnetworkRouter(node_id, *carried, AlwaysHalf(), repair, settings)
         self.mesh.start(self.now_s)
         self.forget()
 

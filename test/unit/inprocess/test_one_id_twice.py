@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import random
+from unittest.mock import Mock
 
 import pytest
 
 from drone_mesh.communication.node.own_id import OwnId
 from drone_mesh.communication.seals.keys import MeshKey
+from drone_mesh.communication.timing import Deadlines, Due
 from drone_mesh.inprocess import Network
 
 KEY = MeshKey(bytes(range(16)))
@@ -45,8 +47,15 @@ def test_the_later_of_two_radios_with_one_id_gives_way_and_both_name_it(routing,
 
 def test_whoever_comes_back_after_giving_way_finds_the_id_introduced_again():
     """The other one introduces itself only so often, but anew when the first can be back."""
-    earlier, later = OwnId(random.Random(1)), OwnId(random.Random(2))
-    assert [earlier.heard(11.0) for _ in range(4)] == [True, True, True, False]
-    back_s = later.give_way(11.0)
-    assert 41.0 <= back_s <= 71.0
-    assert [earlier.heard(41.0) for _ in range(4)] == [True, True, True, False]
+    control, antenna, deadlines = Mock(), Mock(), Deadlines()
+    own_id = OwnId(control, antenna, deadlines, Mock(), random.Random(1), 10.0)
+    control.says_connected.return_value = False
+    for now_s in (11.0, 41.0):
+        deadlines.now_s = now_s
+        for _ in range(4):
+            own_id.heard(0, b"")
+    assert control.introduce.call_count == 3 + 3
+    control.says_connected.return_value = True
+    own_id.heard(0, b"")
+    antenna.switch_power.assert_called_once_with(False)
+    assert 41.0 + 30.0 <= deadlines.get(Due.OWN_ID) <= 41.0 + 60.0

@@ -8,7 +8,7 @@ import subprocess
 import pytest
 
 from drone_mesh.communication.beacon.packets import Beacon, Below, Motion
-from drone_mesh.communication.orders.messages import OrderOutcome, reply_packets
+from drone_mesh.communication.orders.intake import OrderOutcome, reply_packets
 from drone_mesh.communication.reports import NodeReport
 from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.messages import (

@@ -180,8 +180,8 @@ def test_emulated_nodes_need_no_id():
         ("--id 254", "invalid value '254': must be a whole number 0..253"),
         ("--id 3 --spi 0", "invalid SPI device '0'"),
         ("--id 3 --channel 126", "invalid value '126': must be a whole number 0..125"),
-        ("--id 3 --check-period 0", "invalid check_period 0.0: must be above 0 seconds"),
-        ("--id 3 --check-period nan", "invalid check_period nan: must be above 0 seconds"),
+        ("--id 3 --check-period 0", "invalid check_period 0.0: expected seconds, 0.1..3600"),
+        ("--id 3 --check-period nan", "invalid check_period nan: expected seconds, 0.1..3600"),
         (
             "--id 3 --routing gossip",
             "technique 'gossip': use one of babel, batman, beacon, child_table_tree",

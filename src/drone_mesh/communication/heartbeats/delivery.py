@@ -195,13 +195,14 @@ class Delivery(IDelivery):
             taken |= self.send(packet, to)
         return taken
 
-    @abc.abstractmethod
     def send_own_to_each(self, payload: bytes, others: Sequence[int]) -> None:
         """Like `send_own`, to each of these."""
+        for other in others:
+            self.send_own(messages.addressed(payload, other))
 
-    @abc.abstractmethod
     def undelivered(self, payload: bytes, tries: int) -> bool:
         """The antenna gave up a queued packet. Returns whether the packet takes another route."""
+        return False
 
     # Lost nodes ------------------------------------------------------------------------------
 
@@ -232,12 +233,11 @@ class Delivery(IDelivery):
     ) -> None:
         """Tell the neighbours of a missing node, `first` before the others, not `reported_by`."""
 
-    @abc.abstractmethod
     def came_back(self, missing: int, neighbour: int) -> None:
         """`neighbour` sent a packet for `missing` that this node could only send straight back."""
+        self.report_missing(missing, first=neighbour)
 
-    @abc.abstractmethod
-    def neighbour_leaves(self, neighbour: int) -> None:
+    def neighbour_leaves(self, neighbour: int) -> None:  # noqa: B027 (the next packet fails)
         """A neighbour or this node flies, and they will be out of reach of each other."""
 
     def neighbour_lost(self, node: int, came_from: int = NO_ROUTE) -> None:
@@ -290,12 +290,7 @@ class ImmediateDelivery(Delivery):
                 self.delivered(other, 1)
             elif not self.send(packet, other, failures=1):
                 self.send_own(packet)
-        for other in set(others).difference(direct):
-            self.send_own(messages.addressed(payload, other))
-
-    def undelivered(self, payload: bytes, tries: int) -> bool:
-        """Does not happen: `send` tells the outcome."""
-        return False
+        super().send_own_to_each(payload, list(set(others).difference(direct)))
 
     def report_missing(
         self, missing: int, first: int = NO_ROUTE, reported_by: int = NO_ROUTE
@@ -322,10 +317,3 @@ class ImmediateDelivery(Delivery):
                         self.send_own(messages.addressed(packet, neighbour))
         finally:
             self._reporting = False
-
-    def came_back(self, missing: int, neighbour: int) -> None:
-        """Tell all neighbours, and the one that sent it first."""
-        self.report_missing(missing, first=neighbour)
-
-    def neighbour_leaves(self, neighbour: int) -> None:
-        """Does nothing: the next packet that fails looks for other routes."""

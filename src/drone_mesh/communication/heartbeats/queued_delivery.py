@@ -6,7 +6,6 @@ docs/protocol.md, "Sending" and "Missing nodes"; docs/shared-channel.md.
 from __future__ import annotations
 
 import math
-from typing import Sequence
 
 from drone_mesh.communication.heartbeats.delivery import Delivery
 from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE
@@ -26,11 +25,6 @@ class QueuedDelivery(Delivery):
         taken = self._antenna.send_message_to(payload)
         self.total_sent += taken
         return taken
-
-    def send_own_to_each(self, payload: bytes, others: Sequence[int]) -> None:
-        """Like `send_own`, to each of these."""
-        for other in others:
-            self.send_own(messages.addressed(payload, other))
 
     def undelivered(self, payload: bytes, tries: int) -> bool:
         """The antenna gave up a packet. Returns whether the packet takes another route.

@@ -65,22 +65,18 @@ def assemble_node(
         antenna = seals = SealedAntenna(
             antenna, node_id, keys, seal_rng, clock, configuration.timing
         )
-    settings: NodeSettings = {
-        "seals": NO_SEALS if seals is None else seals,
-        "timing": configuration.timing,
-        "options": configuration.repair_options,
-        "observer": observer,
-        "debug": debug,
-    }
+    settings = NodeSettings(
+        NO_SEALS if seals is None else seals,
+        configuration.timing,
+        configuration.repair_options,
+        observer,
+        debug,
+    )
     technique = create_routing_technique(configuration.routing)
     component: MeshnetworkComponent
     if internet is None:
         strategy = create_repair_strategy(configuration.repair)
-        component = MeshnetworkRouter(
-            node_id, antenna, engine, technique, rng, strategy, **settings
-        )
+        component = MeshnetworkRouter(node_id, antenna, engine, technique, rng, strategy, settings)
     else:
-        component = MeshnetworkGateway(
-            node_id, antenna, engine, technique, internet, rng, **settings
-        )
+        component = MeshnetworkGateway(node_id, antenna, engine, technique, internet, rng, settings)
     return AssembledNode(component, seals or component)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import random
 import struct
-from typing import TypedDict
+from dataclasses import dataclass
 
 from drone_mesh.communication.control.control_plane import (
     ControlledNode,
@@ -67,14 +67,18 @@ _LOCATION = int(MessageType.LOCATION)
 _MOVE_TO_LOCATION = int(MessageType.MOVE_TO_LOCATION)
 
 
-class NodeSettings(TypedDict, total=False):
-    """The arguments of every MeshnetworkComponent that have a default."""
+@dataclass(frozen=True)
+class NodeSettings:
+    """What every node has and most leave as it is."""
 
-    seals: IMeshSeals
-    timing: MeshTiming | None
-    observer: MeshObserver
-    debug: bool
-    options: RepairOptions | None
+    seals: IMeshSeals = NO_SEALS  # those of its antenna
+    timing: MeshTiming = MeshTiming()
+    options: RepairOptions = RepairOptions()
+    observer: MeshObserver = ignore_events
+    debug: bool = True  # the antenna displays the node
+
+
+AS_IN_THE_DOCUMENT = NodeSettings()
 
 
 class MeshnetworkComponent(NodeSnapshots, IMeshNetwork, IControlHost):
@@ -91,16 +95,11 @@ class MeshnetworkComponent(NodeSnapshots, IMeshNetwork, IControlHost):
         routing: ITechnique,
         rng: random.Random,
         states: RouterStates | None,
-        *,
-        seals: IMeshSeals = NO_SEALS,
-        timing: MeshTiming | None = None,
-        observer: MeshObserver = ignore_events,
-        debug: bool = True,
-        options: RepairOptions | None = None,
+        settings: NodeSettings,
     ) -> None:
-        """`rng` spreads simultaneous actions of many nodes; `debug`: the antenna displays the node.
+        """`rng` spreads simultaneous actions of many nodes.
 
-        `states` are those of a router; a gateway has none. `seals` are those of its antenna.
+        `states` are those of a router; a gateway has none.
 
         Raises ValueError for a node id outside 0..253.
         """
@@ -108,19 +107,18 @@ class MeshnetworkComponent(NodeSnapshots, IMeshNetwork, IControlHost):
             raise ValueError(f"invalid node id {node_id}: must be 0..{MAX_NODE_ID}")
         self._node_id = node_id
         self._antenna = antenna
-        self._has_key = seals.has_key
         self._rng = rng
-        self._timing = (timing or MeshTiming()).lost_after(routing.connection_lost_after_s)
-        self._options = options or RepairOptions()
-        self._debug = debug
+        self._timing = settings.timing.lost_after(routing.connection_lost_after_s)
+        self._options, seals = settings.options, settings.seals
+        self._has_key = seals.has_key
+        self._debug = settings.debug
         self._deadlines = deadlines = Deadlines()
         check_s, medium = self._timing.check_period_s, antenna.medium
         asked_s = check_s * max(1.0, medium.place_periods)
         motion = SeenMotion(self._options.range_m, asked_s)
         self._neighbours = Neighbours(check_s, noticed_late=medium.shared, motion=motion)
-        self._report = Reporter(node_id, deadlines, observer)
+        self._report = Reporter(node_id, deadlines, settings.observer)
         self.complaints = complaints = Complaints(node_id)
-        self._own_id = OwnId(rng)
         self.places = KnownPlaces()
         self._frame = CommonFrame(engine.frame_digest())
         self._claims = Claims(
@@ -148,6 +146,9 @@ class MeshnetworkComponent(NodeSnapshots, IMeshNetwork, IControlHost):
         )
         self.control = control = _control_plane(node, routing)
         self._learn, self._forward = control.learn, control.forward  # called for each packet
+        # A gateway never gives way: it is looked for as soon as it starts.
+        new_for_s = -math.inf if states is None else check_s
+        self._own_id = OwnId(control, antenna, deadlines, complaints, rng, new_for_s)
         self._orders = OrderIntake(
             node_id, control, self._pilot, engine, deadlines, medium, complaints, self._report
         )
@@ -163,12 +164,13 @@ class MeshnetworkComponent(NodeSnapshots, IMeshNetwork, IControlHost):
         )
         self.data = Transport(node_id, control, antenna, seals, deadlines, complaints, rng)
         # A packet or a timer is for the first part that declares it.
-        self._parts: list[object] = [self, *control.parts, self.data, self._orders, self._reporter]
+        self._parts: list[object] = [self, *control.parts, self.data, self._orders]
+        self._parts += [self._reporter, self._own_id]
 
     # Driven from outside ---------------------------------------------------------------------
 
     def start(self, now_s: float) -> None:
-        """Start the antenna, and debugging if configured; schedule the first check; introduce."""
+        """Start the antenna and what is due; introduce the node."""
         self._deadlines.now_s = now_s
         handlers = receivers(self._parts)
         ignored = [number for number in range(256) if ABOUT[number].handler is Handler.ROUTER]
@@ -182,7 +184,6 @@ class MeshnetworkComponent(NodeSnapshots, IMeshNetwork, IControlHost):
         self._deadlines.set(Due.CHECK, first_check_s)
         self._reporter.start(share=(first_check_s - now_s) / self._timing.check_period_s)
         self._report(MeshEventKind.STARTED)
-        self._begin()
         self.control.start()
 
     def stop(self) -> None:
@@ -226,7 +227,7 @@ class MeshnetworkComponent(NodeSnapshots, IMeshNetwork, IControlHost):
             return
         me = self._node_id
         if from_ == me:
-            self._own_id_heard(kind, payload, now_s)
+            self._own_id.heard(kind, payload)
             return
         if creator > MAX_NODE_ID or from_ > MAX_NODE_ID or forward > BROADCAST:
             self._drop("a packet with invalid ids", payload)
@@ -255,10 +256,7 @@ class MeshnetworkComponent(NodeSnapshots, IMeshNetwork, IControlHost):
             # From a neighbour that has not introduced itself yet, the order is only dropped: its
             # gateway repeats it.
             if kind == _MOVE_TO_LOCATION and self._frame.is_foreign(from_):
-                order = messages.GoToLocationMessage.from_payload(payload)
-                orders = self._orders
-                tell = orders.on_foreign_order if forward == me else orders.on_foreign_passage
-                tell(order, messages.order_number(payload), from_)
+                self._orders.on_foreign(payload, from_)
             return
         if forward != me and forward != BROADCAST:
             if kind == _LOCATION:
@@ -267,23 +265,11 @@ class MeshnetworkComponent(NodeSnapshots, IMeshNetwork, IControlHost):
         else:
             self._receivers[kind](payload, creator, from_)
 
-    def _own_id_heard(self, kind: int, payload: bytes, now_s: float) -> None:
-        """Another radio uses this node's id: name it, show that it is taken, or give way."""
-        self.complaints.own_id_heard(now_s)
-        own_id = self._own_id
-        if not self._served and own_id.was_heard and self.control.says_connected(kind, payload):
-            self._deadlines.set(Due.OWN_ID, own_id.give_way(now_s))
-            self._antenna.switch_power(False)
-        elif own_id.heard(now_s):
-            self.control.introduce()
-
     def on_delivered(self, neighbour: int, tries: int, now_s: float) -> None:
-        """A neighbour has received a packet; the routes learn from this."""
         self._deadlines.now_s = now_s
         self.control.on_delivered(neighbour, tries)
 
     def on_undelivered(self, payload: bytes, tries: int, now_s: float) -> None:
-        """Send the packet over another route, if there is one; the routes learn from this."""
         self._deadlines.now_s = now_s
         self.control.on_undelivered(payload, tries)
 
@@ -312,11 +298,6 @@ class MeshnetworkComponent(NodeSnapshots, IMeshNetwork, IControlHost):
         else:
             self._antenna_is_off()
 
-    @due(Due.OWN_ID)
-    def _return_with_own_id(self) -> None:
-        self._deadlines.set(Due.OWN_ID, math.inf)
-        self._antenna.switch_power(True)
-
     @receives(MessageType.SEAL_CHALLENGE)
     def _on_seal_challenge(self, payload: bytes, creator: int, _from: int) -> None:
         """Log that a neighbour has a key and this node has none."""
@@ -331,14 +312,6 @@ class MeshnetworkComponent(NodeSnapshots, IMeshNetwork, IControlHost):
 
     # What a router or a gateway does besides -------------------------------------------------
 
-    @property
-    def _served(self) -> bool:
-        """Whether the mesh knows this node, so that another one with its id gives way to it."""
-        return True  # a gateway is looked for as soon as it starts
-
-    def _begin(self) -> None:
-        """Start this kind of node, before routing starts."""
-
     def _check(self, due_s: float) -> None:
         self.control.check(due_s)
 
@@ -351,7 +324,6 @@ class MeshnetworkComponent(NodeSnapshots, IMeshNetwork, IControlHost):
     # For the control plane -------------------------------------------------------------------
 
     def on_node_missing(self, node: int, told: bool) -> None:
-        """Messages for it may not arrive."""
         self.data.on_node_missing(node)
 
 

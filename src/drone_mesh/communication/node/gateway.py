@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import random
-from typing import TYPE_CHECKING
 
 from drone_mesh.communication.control.delivery import ITechnique
 from drone_mesh.communication.events.observer import MeshEventKind
@@ -17,7 +16,11 @@ from drone_mesh.communication.interfaces import (
     KnownNode,
     OrderRecord,
 )
-from drone_mesh.communication.node.component import MeshnetworkComponent, NodeSettings
+from drone_mesh.communication.node.component import (
+    AS_IN_THE_DOCUMENT,
+    MeshnetworkComponent,
+    NodeSettings,
+)
 from drone_mesh.communication.node.flights import Flights
 from drone_mesh.communication.node.whereabouts import Whereabouts
 from drone_mesh.communication.orders.book import OrderBook
@@ -27,9 +30,6 @@ from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused
-
-if TYPE_CHECKING:
-    from typing_extensions import Unpack
 
 SEARCH_WITHIN_S = 600.0  # search for nodes that were heard within this time
 
@@ -45,18 +45,19 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         routing: ITechnique,
         internet: IInternetConnection,
         rng: random.Random,
-        **settings: Unpack[NodeSettings],
+        settings: NodeSettings = AS_IN_THE_DOCUMENT,
     ) -> None:
         """Like MeshnetworkComponent; orders arrive through `internet`."""
-        super().__init__(node_id, antenna, engine, routing, rng, None, **settings)
+        super().__init__(node_id, antenna, engine, routing, rng, None, settings)
         control, deadlines, medium = self.control, self._deadlines, antenna.medium
         self._internet = internet
         self._internet_works = True
         self._heartbeats: dict[int, tuple[int, float]] = {}  # by creator: hops, when
         self._reports = ReportBook(deadlines)
-        self._book = self._orders.book = OrderBook(
+        self._book = OrderBook(
             node_id, control, deadlines, medium, self.complaints, self._report, self._may_find
         )
+        self._orders.tell_own = self._book.on_outcome
         self._final_places = FinalPlaces(
             node_id, control, deadlines, self._pilot, self._neighbours, self._options.clearance_m
         )
@@ -75,6 +76,11 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
             self._pilot, self._neighbours, control, self._orders, self._report
         )
         self._parts += [self._book, self._reports, self._whereabouts, self._flights]
+
+    def start(self, now_s: float) -> None:
+        """Start the node and its internet connection."""
+        super().start(now_s)
+        self._internet.connect(self)
 
     def stop(self) -> None:
         """Stop the internet connection, the antenna and debugging."""
@@ -124,7 +130,6 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         return True
 
     def get_orders(self) -> list[OrderRecord]:
-        """The orders that it remembers, oldest first, with their outcomes."""
         return self._book.records()
 
     def get_node_reports(self) -> list[ReportedNode]:
@@ -132,7 +137,6 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         return self._reports.nodes()
 
     def get_known_nodes(self) -> list[KnownNode]:
-        """All other nodes that it has a route to or has heard, by id."""
         nodes = []
         reported = {one.node_id: one.report.hops for one in self._reports.nodes()}
         for node in range(MAX_NODE_ID + 1):
@@ -167,6 +171,3 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         medium = self._antenna.medium
         ago_s = self._deadlines.now_s - heard_s
         return medium.shared and ago_s < medium.stretched(SEARCH_WITHIN_S)
-
-    def _begin(self) -> None:
-        self._internet.connect(self)

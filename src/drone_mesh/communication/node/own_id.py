@@ -10,7 +10,11 @@ from __future__ import annotations
 import math
 import random
 
-from drone_mesh.communication.timing import RateLimit
+from drone_mesh.communication.control.control_plane import IControlPlane
+from drone_mesh.communication.control.node_part import due
+from drone_mesh.communication.events.complaints import Complaints
+from drone_mesh.communication.interfaces import IWirelessCommunication
+from drone_mesh.communication.timing import Deadlines, Due, RateLimit
 
 SHARED_FOR_S = 60.0  # for so long after the last packet of the other, both say so
 OFF_S = 30.0  # the antenna of a node that gives way is off for 1 to 2 times this
@@ -20,29 +24,52 @@ INTRODUCTIONS = 3  # in OFF_S, so that the other one hears one each time it come
 class OwnId:
     """Another radio with the id of one node. Belongs to the component's thread."""
 
-    def __init__(self, rng: random.Random) -> None:
-        """`rng` spreads the time off, so that two nodes that gave way do not return together."""
+    def __init__(
+        self,
+        control: IControlPlane,
+        antenna: IWirelessCommunication,
+        deadlines: Deadlines,
+        complaints: Complaints,
+        rng: random.Random,
+        new_for_s: float,
+    ) -> None:
+        """`rng` spreads the time off, so that two nodes that gave way do not return together.
+
+        A node gives way until it has been connected for longer than `new_for_s`.
+        """
+        self._control = control
+        self._antenna = antenna
+        self._deadlines = deadlines
+        self._complaints = complaints
         self._rng = rng
-        self.connected_s = math.inf  # when the node was first connected, since it last gave way
+        self._new_for_s = new_for_s
+        self._connected_s = math.inf  # when the node was first connected, since it last gave way
         self._heard_s = -math.inf
         self._introductions = RateLimit(INTRODUCTIONS, OFF_S)
 
-    @property
-    def was_heard(self) -> bool:
-        """Whether the other radio was ever heard, so that this node has shown itself to it."""
-        return self._heard_s > -math.inf
+    def connected(self) -> None:
+        """The node is connected."""
+        self._connected_s = min(self._connected_s, self._deadlines.now_s)
 
-    def heard(self, now_s: float) -> bool:
-        """Record a packet of the other radio. Returns whether to introduce this node to it."""
+    def heard(self, kind: int, payload: bytes) -> None:
+        """A packet of the other radio: name it, show that the id is taken, or give way."""
+        now_s, was_heard = self._deadlines.now_s, self._heard_s > -math.inf
+        self._complaints.own_id_heard(now_s)
         self._heard_s = now_s
-        return self._introductions.count(0, now_s)
+        is_new = now_s - self._connected_s <= self._new_for_s
+        if is_new and was_heard and self._control.says_connected(kind, payload):
+            self._connected_s = math.inf
+            self._deadlines.set(Due.OWN_ID, now_s + OFF_S * (1.0 + self._rng.random()))
+            self._antenna.switch_power(False)
+        elif self._introductions.count(0, now_s):
+            self._control.introduce()
 
-    def give_way(self, now_s: float) -> float:
-        """Give way to the other radio, which is connected. Returns when to switch on again."""
-        self._heard_s = now_s
-        self.connected_s = math.inf
-        return now_s + OFF_S * (1.0 + self._rng.random())
+    @due(Due.OWN_ID)
+    def come_back(self) -> None:
+        """The time off is over."""
+        self._deadlines.set(Due.OWN_ID, math.inf)
+        self._antenna.switch_power(True)
 
-    def is_shared(self, now_s: float) -> bool:
+    def is_shared(self) -> bool:
         """Whether the other radio was heard lately. Any thread may ask."""
-        return now_s - self._heard_s <= SHARED_FOR_S
+        return self._deadlines.now_s - self._heard_s <= SHARED_FOR_S

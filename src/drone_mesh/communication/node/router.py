@@ -6,13 +6,16 @@ docs/protocol.md, "Connection", and docs/repair.md. `router_states` has its stat
 from __future__ import annotations
 
 import random
-from typing import TYPE_CHECKING
 
 from drone_mesh.communication.control.delivery import ITechnique
 from drone_mesh.communication.control.places import PlaceRequests
 from drone_mesh.communication.control.router_states import RouterStates
 from drone_mesh.communication.interfaces import IWirelessCommunication
-from drone_mesh.communication.node.component import MeshnetworkComponent, NodeSettings
+from drone_mesh.communication.node.component import (
+    AS_IN_THE_DOCUMENT,
+    MeshnetworkComponent,
+    NodeSettings,
+)
 from drone_mesh.communication.node.flights import RouterFlights
 from drone_mesh.communication.node.whereabouts import RouterWhereabouts
 from drone_mesh.communication.repair.connection_repair import ConnectionRepair
@@ -20,9 +23,6 @@ from drone_mesh.communication.repair.interfaces import IRepairStrategy
 from drone_mesh.communication.repair.status import RepairStatus
 from drone_mesh.communication.repair.strategies import Thesis
 from drone_mesh.drone.interfaces import IDroneEngine
-
-if TYPE_CHECKING:
-    from typing_extensions import Unpack
 
 
 class MeshnetworkRouter(MeshnetworkComponent):
@@ -36,11 +36,11 @@ class MeshnetworkRouter(MeshnetworkComponent):
         routing: ITechnique,
         rng: random.Random,
         repair: IRepairStrategy | None = None,
-        **settings: Unpack[NodeSettings],
+        settings: NodeSettings = AS_IN_THE_DOCUMENT,
     ) -> None:
         """Like MeshnetworkComponent; the default of `repair` is Thesis."""
         self._states = states = RouterStates()
-        super().__init__(node_id, antenna, engine, routing, rng, states, **settings)
+        super().__init__(node_id, antenna, engine, routing, rng, states, settings)
         control, deadlines, pilot = self.control, self._deadlines, self._pilot
         self._repair = ConnectionRepair(
             node_id,
@@ -87,13 +87,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
         self._parts += [self._repair, self._whereabouts, self._flights]
 
     def get_repair_status(self) -> RepairStatus:
-        """What the node does about a lost connection, and why."""
         return self._repair.status()
-
-    @property
-    def _served(self) -> bool:
-        connected_for_s = self._deadlines.now_s - self._own_id.connected_s
-        return connected_for_s > self._timing.check_period_s
 
     def _check(self, due_s: float) -> None:
         super()._check(due_s)
@@ -115,7 +109,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
         return self._repair.may_connect(node, know_gateway)
 
     def on_connected(self) -> None:  # noqa: D102
-        self._own_id.connected_s = min(self._own_id.connected_s, self._deadlines.now_s)
+        self._own_id.connected()
         self.places.connected_here(self._pilot.place(), self.control.hops)
         self._repair.on_connected()
 

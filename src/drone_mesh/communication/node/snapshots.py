@@ -27,30 +27,21 @@ class NodeSnapshots(IMeshDebugInfo):
     _antenna: IWirelessCommunication
 
     def get_node_id(self) -> int:
-        """This node's id, 0..253."""
         return self._node_id
 
     def get_connected_to_gateway(self) -> bool:
-        """Whether a gateway answered the last heartbeat, or may still answer.
-
-        Of a gateway: true while its internet works; otherwise whether it reaches another one.
-        """
         return self.control.connected
 
     def get_preferred_gateway(self) -> int:
-        """Id of the gateway that this node uses, perhaps itself; NO_ROUTE while it knows none."""
         return self.control.gateway
 
     def get_hops_from_gateway_away(self) -> int:
-        """Hops to that gateway, 0 for a gateway with internet; 255 while unknown."""
         return self.control.hops
 
     def get_total_message_sent(self) -> int:
-        """Packets sent successfully, own and forwarded ones, broadcasts not counted."""
         return self.control.delivery.total_sent
 
     def get_last_good_known_location_id(self) -> int:
-        """Id of the node whose place this one would fly to, or NO_ROUTE."""
         return self.places.good_id
 
     def get_last_good_known_location_seen_s(self) -> float:
@@ -58,7 +49,6 @@ class NodeSnapshots(IMeshDebugInfo):
         return self.places.good_seen_s
 
     def get_router_tech_table_size(self) -> int:
-        """Known nodes; one that is known through two neighbours counts twice."""
         return self.control.routes.get_table_size()
 
     def get_neighbours(self) -> dict[int, float]:
@@ -76,8 +66,7 @@ class NodeSnapshots(IMeshDebugInfo):
         return self.control.routes.get_direction_to_node(node)
 
     def get_shares_id(self) -> bool:
-        """Whether another radio with this node's id was heard lately."""
-        return self._own_id.is_shared(self._deadlines.now_s)
+        return self._own_id.is_shared()
 
     def get_repair_status(self) -> RepairStatus:
         """What the node does about a lost connection, and why."""

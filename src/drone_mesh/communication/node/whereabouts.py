@@ -95,7 +95,7 @@ class Whereabouts:
             age_s = now_s - places.gateway_seen_s
             extension = GatewayPlace(self._control.gateway, places.gateway, age_s)
             if self._has_key:
-                self._control.delivery.send_own(extension.to_payload(me, me, asker, asker))
+                self._control.delivery.send_own(extension.to_payload(me, asker))
             else:
                 answer = extension.appended_to(answer)
         self._control.delivery.send_own(answer)

@@ -5,7 +5,10 @@ docs/protocol.md, "Orders".
 
 from __future__ import annotations
 
+import itertools
 import math
+import operator
+from collections import defaultdict
 from dataclasses import dataclass, field
 from typing import Callable, Iterable
 
@@ -18,7 +21,7 @@ from drone_mesh.communication.control.node_part import due, receives
 from drone_mesh.communication.events.complaints import Complaints
 from drone_mesh.communication.events.observer import MeshEventKind, Reporter, explanation
 from drone_mesh.communication.interfaces import OrderRecord, OrderState
-from drone_mesh.communication.orders.messages import OrderOutcome, OrderQuery, OrderReply
+from drone_mesh.communication.orders.intake import OrderOutcome, OrderQuery, OrderReply
 from drone_mesh.communication.timing import Deadlines, Due, Medium
 from drone_mesh.communication.wire.messages import GoToLocationMessage, with_order_number
 from drone_mesh.communication.wire.packet_types import MessageType
@@ -48,14 +51,6 @@ EVENT_OF = {
 _FAILURES = (
     OrderState.REFUSED, OrderState.NO_ROUTE, OrderState.LOST_CONTACT, OrderState.GIVEN_UP,
 )  # fmt: skip
-_STATE_AFTER = {
-    OrderOutcome.ACCEPTED: OrderState.ACCEPTED,
-    OrderOutcome.REFUSED: OrderState.REFUSED,
-    OrderOutcome.ARRIVED: OrderState.ARRIVED,
-    OrderOutcome.GIVEN_UP: OrderState.GIVEN_UP,
-    OrderOutcome.UNKNOWN: OrderState.GIVEN_UP,
-    OrderOutcome.REPLACED: OrderState.REPLACED,
-}
 
 
 @dataclass
@@ -75,9 +70,9 @@ class _Order:
     unanswered: int = 0  # packets since the drone's last reply about it
     heard_s: float = 0.0  # when the drone last reported about it, or when it was ordered
     settled: bool = False  # the drone itself has reported the outcome
-    reason_parts: TextAssembly = field(default_factory=TextAssembly)
     dropped: str = ""  # why a relay says that it has dropped the order
-    dropped_parts: TextAssembly = field(default_factory=TextAssembly)
+    # Reasons in parts: True: of its drone, False: of relays
+    parts: dict[bool, TextAssembly] = field(default_factory=lambda: defaultdict(TextAssembly))
 
 
 @dataclass(eq=False)
@@ -99,18 +94,8 @@ class OrderBook:
 
     def records(self) -> list[OrderRecord]:
         """All remembered orders, oldest first."""
-        return [
-            OrderRecord(
-                order.number,
-                order.drone,
-                order.goal,
-                order.state,
-                order.reason,
-                order.ordered_s,
-                order.changed_s,
-            )
-            for order in self._orders.values()
-        ]
+        told = operator.attrgetter(*OrderRecord._fields)
+        return [OrderRecord(*told(order)) for order in self._orders.values()]
 
     def enter(self, drone: int, goal: Location) -> int:
         """Record a new order; returns its number."""
@@ -183,14 +168,13 @@ class OrderBook:
         order = self._orders.get(reply.number)
         if order is None:
             return
-        if order.drone != drone:  # a relay; its word alone decides nothing
-            why = order.dropped_parts.add(reply.part, reply.text)
-            if why is not None and reply.outcome is OrderOutcome.REFUSED:
-                order.dropped = f"node {drone} dropped the order: {why}"
+        reason = order.parts[drone == order.drone].add(reply.part, reply.text)
+        if reason is None:
             return
-        reason = order.reason_parts.add(reply.part, reply.text)
-        if reason is not None:
+        if drone == order.drone:
             self.on_outcome(reply.number, reply.outcome, reason)
+        elif reply.outcome is OrderOutcome.REFUSED:  # a relay; its word alone decides nothing
+            order.dropped = f"node {drone} dropped the order: {reason}"
 
     def on_outcome(self, number: int, outcome: OrderOutcome, reason: str) -> None:
         """A drone has reported the outcome of an order."""
@@ -198,12 +182,14 @@ class OrderBook:
         if order is None or order.settled:
             return
         order.unanswered, order.heard_s = 0, self._deadlines.now_s
-        if outcome is OrderOutcome.UNKNOWN:
+        is_unknown = outcome is OrderOutcome.UNKNOWN
+        if is_unknown:
             reason = "the drone no longer knows this order"
         order.settled = outcome is not OrderOutcome.ACCEPTED
         if outcome in (OrderOutcome.ACCEPTED, OrderOutcome.ARRIVED):
             self._replace(order, self._older(order), for_good=True)
-        self._move(order, _STATE_AFTER[outcome], reason)
+        state = OrderState.GIVEN_UP if is_unknown else OrderState[outcome.name]
+        self._move(order, state, reason)
         is_own = order.drone == self._node_id
         self._wait(order, math.inf if order.settled or is_own else QUERY_PERIOD_S)
 
@@ -222,7 +208,8 @@ class OrderBook:
             if not self._seek(order):
                 self._move(order, OrderState.NO_ROUTE)
             return
-        has_route = self._has_route(order)
+        # Without one nothing is repeated: the drone may be in flight, out of reach.
+        has_route = self._control.routes.may_reach(order.drone)
         if order.state is OrderState.SENT and not has_route and order.waits < MOST_WAITS:
             order.waits += 1
             self._wait(order, REPEAT_AFTER_S[order.unanswered])
@@ -244,20 +231,13 @@ class OrderBook:
                 self._control.delivery.send_own(query)
             self._wait(order, QUERY_PERIOD_S)
 
-    def _has_route(self, order: _Order) -> bool:
-        """Without one nothing is repeated: the drone may be in flight, out of reach."""
-        return self._control.routes.may_reach(order.drone)
-
     def _send(self, order: _Order) -> bool:
-        taken = self._control.delivery.send_own(self._packet(order))
-        order.copies += taken
-        return taken
-
-    def _packet(self, order: _Order) -> bytes:
         me, to = self._node_id, order.drone
         latitude, longitude, height = order.goal
         packet = GoToLocationMessage(me, me, to, to, latitude, longitude, int(height)).to_payload()
-        return with_order_number(packet, order.number)
+        taken = self._control.delivery.send_own(with_order_number(packet, order.number))
+        order.copies += taken
+        return taken
 
     def _lost(self, order: _Order, why: str) -> None:
         self._move(order, OrderState.LOST_CONTACT, f"at {order.heard_s:.0f} s: {why}")
@@ -271,11 +251,9 @@ class OrderBook:
 
     def _older(self, order: _Order) -> list[_Order]:
         """The orders for its drone before it whose end the drone has not reported."""
-        numbers = list(self._orders)
-        before = (self._orders[number] for number in numbers[: numbers.index(order.number)])
         return [
             other
-            for other in before
+            for other in itertools.takewhile(lambda one: one is not order, self._orders.values())
             if other.drone == order.drone
             and not (other.settled or other.state is OrderState.NO_ROUTE)
         ]

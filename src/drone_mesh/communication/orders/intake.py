@@ -1,25 +1,28 @@
 """OrderIntake: which orders a node accepts, and its replies to them.
 
-docs/protocol.md, "Orders".
+docs/protocol.md, "Orders". The bodies of both messages, types 64 and 65, fit into 14 bytes, so that
+they leave room for a seal.
 """
 
 from __future__ import annotations
 
+import enum
 import math
+import struct
 from collections import deque
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Callable, ClassVar, Protocol
 
 from drone_mesh.communication.control.control_plane import IControlPlane
 from drone_mesh.communication.control.node_part import due, receives
 from drone_mesh.communication.control.pilot import Pilot
 from drone_mesh.communication.events.complaints import Complaints
 from drone_mesh.communication.events.observer import MeshEventKind, Reporter
-from drone_mesh.communication.orders.book import OrderBook
-from drone_mesh.communication.orders.messages import OrderOutcome, OrderQuery, reply_packets
 from drone_mesh.communication.timing import Deadlines, Due, Medium
-from drone_mesh.communication.wire.messages import GoToLocationMessage, order_number
+from drone_mesh.communication.wire import messages
+from drone_mesh.communication.wire.messages import HEADER_BYTES, GoToLocationMessage, order_number
 from drone_mesh.communication.wire.packet_types import MessageType
+from drone_mesh.communication.wire.text_parts import is_valid, split
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
@@ -29,6 +32,69 @@ ORDERS_KEPT = 8  # more than the gateways that order one drone
 ARRIVED_WITHIN_M = 1.5  # a MAVLink drone has arrived within 1 m (drone/route.py)
 REPLY_AGAIN_S = 1.0  # how often a reply without a route is retried
 REPLY_TRIES = 120  # then the gateway queries
+TEXT_BYTES = 10  # of a reason, in one packet
+
+
+class OrderOutcome(enum.IntEnum):
+    """The outcome of an order, as reported by the drone."""
+
+    ACCEPTED = 1  # it flies there
+    REFUSED = 2  # it stays; with a reason
+    ARRIVED = 3  # it is there
+    GIVEN_UP = 4  # the flight ended elsewhere; with the reason
+    UNKNOWN = 5  # answer to a query: it knows no such order (any more)
+    REPLACED = 6  # it flies elsewhere; with the order that came
+
+
+@dataclass(frozen=True)
+class OrderReply:
+    """One part of a drone's reply about the order `number` to the gateway that sent it."""
+
+    TYPE: ClassVar[MessageType] = MessageType.ORDER_REPLY
+    BODY: ClassVar[struct.Struct] = TYPE.about.layout
+
+    number: int  # 1..65535
+    outcome: OrderOutcome
+    part: int  # see text_parts.split
+    text: bytes  # of the reason, UTF-8, at most TEXT_BYTES
+
+    @classmethod
+    def from_payload(cls, payload: bytes) -> OrderReply | None:
+        """Decode; None for an invalid outcome or part."""
+        number, outcome, part, text = cls.BODY.unpack_from(payload, HEADER_BYTES)
+        try:
+            known = OrderOutcome(outcome)
+        except ValueError:
+            return None
+        return cls(number, known, part, text) if is_valid(part) else None
+
+
+def reply_packets(
+    number: int, outcome: OrderOutcome, reason: str, creator: int, gateway: int
+) -> list[bytes]:
+    """The reply in as many packets as its reason needs, from `creator` for `gateway`."""
+    pack, kind = OrderReply.BODY.pack, OrderReply.TYPE
+    return [
+        messages.packet(kind, creator, creator, gateway, gateway, pack(number, outcome, part, text))
+        for part, text in split(reason, TEXT_BYTES)
+    ]
+
+
+class OrderQuery:
+    """A gateway asks for the state of an order; the body is its number."""
+
+    TYPE: ClassVar[MessageType] = MessageType.ORDER_QUERY
+    BODY: ClassVar[struct.Struct] = TYPE.about.layout
+
+    @classmethod
+    def packet(cls, number: int, gateway: int, drone: int) -> bytes:
+        """The 32 bytes, from `gateway` for `drone`."""
+        return messages.packet(cls.TYPE, gateway, gateway, drone, drone, cls.BODY.pack(number))
+
+    @classmethod
+    def number_in(cls, payload: bytes) -> int:
+        """The number of the order."""
+        return int(cls.BODY.unpack_from(payload, HEADER_BYTES)[0])
 
 
 class ITakesOff(Protocol):
@@ -62,8 +128,9 @@ class OrderIntake:
     _report: Reporter
 
     def __post_init__(self) -> None:
-        self.flights: ITakesOff  # set by the node, like the book
-        self.book: OrderBook | None = None  # a gateway's: its own drone replies to it
+        self.flights: ITakesOff  # set by the node
+        # A gateway sets it to its book: order number, outcome and reason of its own drone.
+        self.tell_own: Callable[[int, OrderOutcome, str], None] = lambda *_reply: None
         self._known: deque[_KnownOrder] = deque(maxlen=ORDERS_KEPT)
 
     @receives(MessageType.MOVE_TO_LOCATION)
@@ -101,20 +168,22 @@ class OrderIntake:
             self._report(MeshEventKind.FLIGHT_ORDERED, gateway, order=number, place=goal)
             self.flights.took_off()
 
-    def on_foreign_order(self, order: GoToLocationMessage, number: int, passed_by: int) -> None:
-        """An order from a neighbour whose places may refer to another frame: not flown."""
-        foreign = _KnownOrder(order.creator, number, order.location, OrderOutcome.REFUSED)
-        reason = f"node {passed_by}, which passed the order on, has another --origin"
-        if number and self._find(order.creator, number) is None:
-            self._remember(foreign)
-        self._reply(foreign, OrderOutcome.REFUSED, reason)
+    def on_foreign(self, payload: bytes, passed_by: int) -> None:
+        """An order from a neighbour whose places may refer to another frame: tell its gateway.
 
-    def on_foreign_passage(self, order: GoToLocationMessage, number: int, passed_by: int) -> None:
-        """An order for another drone, dropped here for the same reason: tell its gateway."""
-        if number:
-            reason = f"node {passed_by} has another --origin"
-            me, gateway = self._node_id, order.creator
-            for packet in reply_packets(number, OrderOutcome.REFUSED, reason, me, gateway):
+        It is neither flown nor passed on.
+        """
+        order, number = GoToLocationMessage.from_payload(payload), order_number(payload)
+        me, gateway, refused = self._node_id, order.creator, OrderOutcome.REFUSED
+        if order.forward == me:
+            foreign = _KnownOrder(gateway, number, order.location, refused)
+            if number and self._find(gateway, number) is None:
+                self._remember(foreign)
+            why = f"node {passed_by}, which passed the order on, has another --origin"
+            self._reply(foreign, refused, why)
+        elif number:
+            why = f"node {passed_by} has another --origin"
+            for packet in reply_packets(number, refused, why, me, gateway):
                 self._control.delivery.send_own(packet)
 
     @receives(MessageType.ORDER_QUERY)
@@ -122,29 +191,23 @@ class OrderIntake:
         """A gateway queries the state of an order."""
         number = OrderQuery.number_in(payload)
         known = self._find(gateway, number)
-        if known is not None:
-            self._reply(known, known.outcome, known.reason)
+        if known is None:
+            self._send(_KnownOrder(gateway, number, _NOWHERE, OrderOutcome.UNKNOWN))
         else:
-            unknown = _KnownOrder(gateway, number, _NOWHERE, OrderOutcome.UNKNOWN)
-            self._send(unknown)
+            self._reply(known, known.outcome, known.reason)
 
     def on_landed(self) -> None:
         """Reply to the order whose flight is over, if there was one."""
-        orders = self._under_way()
-        if not orders:
-            return
         pilot, engine = self._pilot, self._engine
-        here = pilot.location()
-        why = engine.why_ended() or engine.why_not_fly() or pilot.flight_end
-        for order in orders:
-            if here is None:
-                self._reply(order, OrderOutcome.GIVEN_UP, f"{why}; its place is not known")
-                continue
-            off_m = here.distance_m(order.goal)
+        for order in self._under_way():
+            here = pilot.location()
+            off_m = math.nan if here is None else here.distance_m(order.goal)
             if off_m <= ARRIVED_WITHIN_M:
                 self._reply(order, OrderOutcome.ARRIVED)
-            else:
-                self._reply(order, OrderOutcome.GIVEN_UP, f"{why}; {off_m:.1f} m from the goal")
+                continue
+            why = engine.why_ended() or engine.why_not_fly() or pilot.flight_end
+            where = "its place is not known" if here is None else f"{off_m:.1f} m from the goal"
+            self._reply(order, OrderOutcome.GIVEN_UP, f"{why}; {where}")
 
     @due(Due.ORDER_REPLIES)
     def on_due(self) -> None:
@@ -166,10 +229,8 @@ class OrderIntake:
         return True
 
     def _find(self, gateway: int, number: int) -> _KnownOrder | None:
-        for order in self._known:
-            if number and (order.gateway, order.number) == (gateway, number):
-                return order
-        return None
+        found = (one for one in self._known if (one.gateway, one.number) == (gateway, number))
+        return next(found, None) if number else None
 
     def _remember(self, order: _KnownOrder) -> None:
         known = self._find(order.gateway, order.number)
@@ -183,8 +244,7 @@ class OrderIntake:
     def _reply(self, order: _KnownOrder, outcome: OrderOutcome, reason: str = "") -> None:
         order.outcome, order.reason = outcome, reason
         if order.gateway == self._node_id:
-            if self.book is not None:
-                self.book.on_outcome(order.number, outcome, reason)
+            self.tell_own(order.number, outcome, reason)
         elif order.number:
             order.tries_left = REPLY_TRIES
             self._send(order)

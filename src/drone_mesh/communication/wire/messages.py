@@ -4,7 +4,7 @@ docs/wire.md, "Packets".
 
 Each class encodes and decodes its own bytes. The offsets of the header, and of the bodies that
 every node handles, are defined here alone. A body that belongs to one service is defined beside
-that service, also once: `beacon/packets.py`, `data/packets.py`, `orders/messages.py`,
+that service, also once: `beacon/packets.py`, `data/packets.py`, `orders/intake.py`,
 `reports.py` and the routing techniques. The constructor arguments are those of the
 original encoder, in its order: creator, from, to, forward, then the body. Any byte value can be
 encoded and decoded; the receiving component decides whether an id is valid (docs/wire.md, "Bad
@@ -24,8 +24,6 @@ from drone_mesh.communication.wire.packet_types import (
     ABOUT,
     DATA_TYPES,
     FLOATS,
-    UNANSWERED,
-    UNJITTERED,
     MessageType,
     Priority,
 )
@@ -163,6 +161,11 @@ class MovementNegotiationMessage(_TypedMessage, kind=MessageType.MOVEMENT_NEGOTI
     cost: float  # its distance to the gateway in metres; negative: it does not fly
 
 
+def _whole(body: str) -> struct.Struct:
+    """Packs the 32 bytes: the header, a body of this format, and zeros."""
+    return struct.Struct(f"<{HEADER_BYTES}B{body}{BODY_BYTES - struct.calcsize('<' + body)}x")
+
+
 _GATEWAY_PLACE = MessageType.GATEWAY_PLACE.about.layout
 _GATEWAY_PLACE_AT = {
     int(MessageType.LOCATION): HEADER_BYTES + LocationMessage.BODY.size,
@@ -170,9 +173,9 @@ _GATEWAY_PLACE_AT = {
     int(MessageType.GATEWAY_PLACE): HEADER_BYTES,
 }
 _OLDEST_AGE_S = 2**16 - 2
-_REQUEST = int(MessageType.REQUESTLOCATION)
+_REQUESTLOCATION = int(MessageType.REQUESTLOCATION)
 _ASKER_PLACE = struct.Struct("<ffH")  # latitude, longitude, height + 1 and whether it flies there
-_NEW_REQUEST = struct.Struct(f"<{HEADER_BYTES}BffH{BODY_BYTES - _ASKER_PLACE.size}x")
+_NEW_REQUEST = _whole("ffH")
 _FLIES_THERE = 2**15
 _GOAL = 2**31  # highest bit of the time in a LOCATION; nothing else uses that
 _GOAL_AT = HEADER_BYTES + LocationMessage.BODY.size - 1  # the byte with that bit
@@ -182,19 +185,12 @@ _ORDER_NUMBER_AT = HEADER_BYTES + GoToLocationMessage.BODY.size
 _FRAME_DIGEST = struct.Struct("<H")
 _FRAME_DIGEST_AT = PAYLOAD_BYTES - _FRAME_DIGEST.size  # the last bytes of a PRESENT
 _LOCATION = int(MessageType.LOCATION)
-_REQUESTLOCATION = int(MessageType.REQUESTLOCATION)
-_NEW_LOCATION = struct.Struct(
-    f"<{HEADER_BYTES}B{LocationMessage.BODY.format[1:]}{BODY_BYTES - LocationMessage.BODY.size}x"
-)
+_NEW_LOCATION = _whole(LocationMessage.BODY.format[1:])
 _PRESENT = int(MessageType.PRESENT)
-_NEW_PRESENT = struct.Struct(
-    f"<{HEADER_BYTES}B{IntroduceMessage.BODY.format[1:]}{BODY_BYTES - IntroduceMessage.BODY.size}x"
-)
+_NEW_PRESENT = _whole(IntroduceMessage.BODY.format[1:])
 _HEARTBEAT = int(MessageType.HEARTBEAT)
 _HEARTBEAT_HOPS = HEADER_BYTES + 2  # offset of the hop count
-_NEW_HEARTBEAT = struct.Struct(
-    f"<{HEADER_BYTES}B{HeartbeatMessage.BODY.format[1:]}{BODY_BYTES - HeartbeatMessage.BODY.size}x"
-)
+_NEW_HEARTBEAT = _whole(HeartbeatMessage.BODY.format[1:])
 # A packet without the sender and receiver of its hop. Byte 7 counts: the hops of a HEARTBEAT, the
 # ids of a ROUTE_RECORD, which follow it.
 _WITHOUT_HOP = struct.Struct(f"<BxBx3sB{PAYLOAD_BYTES - ROUTE_RECORD_AT - 1}s")
@@ -221,9 +217,9 @@ class GatewayPlace(NamedTuple):
         at = _GATEWAY_PLACE_AT[payload[TYPE_AT]]
         return payload[:at] + body + payload[at + len(body) :]
 
-    def to_payload(self, creator: int, from_: int, to: int, forward: int) -> bytes:
+    def to_payload(self, creator: int, to: int) -> bytes:
         """As a packet of its own."""
-        return packet(MessageType.GATEWAY_PLACE, creator, from_, to, forward, self._body())
+        return packet(MessageType.GATEWAY_PLACE, creator, creator, to, to, self._body())
 
     def _body(self) -> bytes:
         age = 1 + max(0, min(_OLDEST_AGE_S, math.ceil(self.age_s)))
@@ -281,12 +277,12 @@ addressee: Callable[[bytes], int] = operator.itemgetter(FORWARD_AT)
 
 def is_jittered(payload: bytes) -> bool:
     """Whether a broadcast of this type has to wait for a random time."""
-    return payload[TYPE_AT] not in UNJITTERED
+    return ABOUT[payload[TYPE_AT]].jittered
 
 
 def is_answered(payload: bytes) -> bool:
     """Whether several nodes send at once when they hear a broadcast of this type."""
-    return payload[TYPE_AT] not in UNANSWERED
+    return ABOUT[payload[TYPE_AT]].answered
 
 
 def is_data(payload: bytes) -> bool:
@@ -330,22 +326,15 @@ def place_in(location: bytes) -> Location:
     return Location(*LocationMessage.BODY.unpack_from(location, HEADER_BYTES)[:3])
 
 
-def location(
-    place: Location, now_s: float, creator: int, from_: int, to: int, forward: int
-) -> bytes:
-    """The bytes of a new LocationMessage, without the object. Heights are int16, whole metres."""
+def own_location(place: Location, is_goal: bool, now_s: float, me: int, to: int) -> bytes:
+    """A new LOCATION of node `me`: where it is, or its goal while it flies there.
+
+    Heights are int16, whole metres.
+    """
     latitude, longitude, height = place
     height = max(-(2**15), min(2**15 - 1, round(height)))
-    time_s = int(now_s) % 2**32
-    return _NEW_LOCATION.pack(
-        creator, from_, _LOCATION, to, forward, latitude, longitude, height, time_s
-    )
-
-
-def own_location(place: Location, is_goal: bool, now_s: float, me: int, to: int) -> bytes:
-    """A new LOCATION of node `me`: where it is, or its goal while it flies there."""
     time_s = int(now_s) % _GOAL + is_goal * _GOAL
-    return location(place, time_s, me, me, to, to)
+    return _NEW_LOCATION.pack(me, me, _LOCATION, to, to, latitude, longitude, height, time_s)
 
 
 def is_goal(location: bytes) -> bool:
@@ -356,12 +345,10 @@ def is_goal(location: bytes) -> bool:
 def request_for_place(creator: int, to: int, place: Location | None, flies_there: bool) -> bytes:
     """A new REQUESTLOCATION; `place`: of its creator, which is on its way to it if it flies."""
     if place is None:
-        return _NEW_REQUEST.pack(creator, creator, _REQUEST, to, to, 0.0, 0.0, 0)
+        return _NEW_REQUEST.pack(creator, creator, _REQUESTLOCATION, to, to, 0.0, 0.0, 0)
     latitude, longitude, height = place
-    code = 1 + max(0, min(_FLIES_THERE - 2, round(height)))
-    if flies_there:
-        code |= _FLIES_THERE
-    return _NEW_REQUEST.pack(creator, creator, _REQUEST, to, to, latitude, longitude, code)
+    code = 1 + max(0, min(_FLIES_THERE - 2, round(height))) + flies_there * _FLIES_THERE
+    return _NEW_REQUEST.pack(creator, creator, _REQUESTLOCATION, to, to, latitude, longitude, code)
 
 
 def place_of_asker(request: bytes) -> tuple[Location, bool] | None:

@@ -180,8 +180,4 @@ ABOUT = tuple(
 FLOATS = {number: about.floats for number, about in enumerate(ABOUT) if about.floats is not None}
 """What unpacks the floats of bodies, by the numbers of the types that have any."""
 
-UNANSWERED = frozenset(number for number in range(256) if not ABOUT[number].answered)
-
-UNJITTERED = frozenset(number for number in range(256) if not ABOUT[number].jittered)
-
 TYPES_WITH_PLACES = frozenset(number for number in range(256) if ABOUT[number].has_place)

@@ -7,7 +7,6 @@ from dataclasses import replace
 import pytest
 from rig import FROM_0, Rig, packet
 
-from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.routing.techniques.etx_tree import EtxTree
 from drone_mesh.communication.timing import Medium, MeshTiming
 from drone_mesh.drone.location import Location
@@ -41,11 +40,9 @@ def distant_rig(*heard):
 def test_a_router_starts_unconnected_with_255_for_what_it_does_not_know():
     mesh = Rig().mesh
     assert not mesh.get_connected_to_gateway()
-    assert mesh.get_hops_from_gateway_away() == 255
-    assert mesh.get_preferred_gateway() == 255
-    assert mesh.get_last_good_known_location_id() == 255
-    assert mesh.get_router_tech_table_size() == 0
-    assert mesh.get_total_message_sent() == 0
+    assert mesh.get_hops_from_gateway_away() == mesh.get_preferred_gateway() == 255
+    assert mesh.get_last_good_known_location_id() == mesh.get_route_to_gateway() == 255
+    assert mesh.get_router_tech_table_size() == mesh.get_total_message_sent() == 0
 
 
 @pytest.mark.parametrize(("hops", "shown"), [(0, 1), (3, 4), (253, 254), (254, 255), (255, 255)])
@@ -102,35 +99,35 @@ def test_staying_connected_is_no_reason_to_introduce_the_node():
     assert rig.broadcasts() == []
 
 
-def test_becoming_connected_asks_a_gateway_next_door_for_its_location():
+@pytest.mark.parametrize(
+    ("answer", "asked"),
+    [
+        (ANSWER, ["01 01 02 00 00"]),
+        ("00 02 04 01 01 01 00 01", ["01 01 02 02 00", "01 01 02 02 02"]),
+    ],
+    ids=["next door", "behind 2"],
+)
+def test_becoming_connected_asks_the_gateway_and_the_next_hop_for_their_locations(answer, asked):
     rig = Rig()
-    rig.hear(ANSWER)
-    assert rig.sent() == [packet("01 01 02 00 00" + FROM_0)]
-
-
-def test_becoming_connected_asks_the_gateway_and_the_next_hop_for_their_locations():
-    rig = Rig()
-    rig.hear("00 02 04 01 01 01 00 01")
-    assert rig.sent() == [packet("01 01 02 02 00" + FROM_0), packet("01 01 02 02 02" + FROM_0)]
+    rig.hear(answer)
+    assert rig.sent() == [packet(request + FROM_0) for request in asked]
 
 
 # The check -----------------------------------------------------------------------------------
 
 
-def test_a_connected_router_checks_with_a_heartbeat_to_its_gateway():
+@pytest.mark.parametrize(
+    ("hop", "sent"),
+    [
+        (2, ["01 01 04 02 02 01", "01 01 04 02 00 01"]),  # the first: routing maintains its child
+        (0, ["01 01 04 00 00 01"]),
+    ],
+)
+def test_a_connected_router_checks_with_a_heartbeat_to_its_gateway(hop, sent):
     rig = Rig()
-    rig.connect_through(2)
+    rig.connect_through(hop)
     rig.wait_until(5.0)
-    assert rig.sent(HEARTBEAT) == [
-        packet("01 01 04 02 02 01"),  # routing maintains its child
-        packet("01 01 04 02 00 01"),
-    ]
-
-
-def test_a_gateway_that_is_a_neighbour_gets_one_heartbeat_in_a_check():
-    rig = connected_rig()
-    rig.wait_until(5.0)
-    assert rig.sent(HEARTBEAT) == [packet("01 01 04 00 00 01")]
+    assert rig.sent(HEARTBEAT) == list(map(packet, sent))
 
 
 def test_the_location_of_the_gateway_is_asked_for_until_it_is_known():
@@ -164,38 +161,31 @@ def test_a_check_finds_an_antenna_that_is_off_and_does_nothing_but_disconnect():
 # Waiting for the answer ----------------------------------------------------------------------
 
 
-def test_a_heartbeat_says_that_its_creator_is_connected_and_to_whom():
-    """The flag is noted for the packet before it becomes false."""
+def test_a_heartbeat_that_is_not_answered_ends_the_connection_until_a_late_answer():
+    """Its flag is that before it left. One is under way at a time, for half a second."""
     rig = connected_rig()
+    rig.know_neighbour(2)
+    rig.mesh.control.send_heartbeat(2)  # says nothing of the connection
+    rig.wait(0.6)
+    rig.forget()
+    assert rig.mesh.control.send_heartbeat(0)
+    rig.wait(0.4)
     assert rig.mesh.control.send_heartbeat(0)
     assert rig.sent(HEARTBEAT) == [packet("01 01 04 00 00 01 00 00")]
-
-
-def test_a_heartbeat_that_is_not_answered_ends_the_connection():
-    rig = connected_rig()
-    rig.mesh.control.send_heartbeat(0)
-    rig.wait(0.6)
+    assert rig.mesh.get_connected_to_gateway()
+    rig.wait(0.2)
     assert not rig.mesh.get_connected_to_gateway()
     assert rig.kinds()[-1] == "DISCONNECTED"
-
-
-def test_a_heartbeat_that_is_answered_keeps_the_connection():
-    rig = connected_rig()
+    assert rig.mesh.get_hops_from_gateway_away() == 1
     rig.mesh.control.send_heartbeat(0)
-    rig.wait(0.1)
-    rig.hear(ANSWER)
-    rig.wait(4.0)
-    assert rig.mesh.get_connected_to_gateway()
-    assert "DISCONNECTED" not in rig.kinds()
-
-
-def test_an_answer_after_more_than_half_a_second_connects_again():
-    rig = connected_rig()
-    rig.mesh.control.send_heartbeat(0)
+    assert len(rig.sent(HEARTBEAT)) == 1
     rig.wait(0.7)
     rig.hear(ANSWER)
     assert rig.mesh.get_connected_to_gateway()
-    assert rig.mesh.get_hops_from_gateway_away() == 1
+    rig.mesh.control.send_heartbeat(0)
+    rig.hear(ANSWER)
+    rig.wait(2.0)
+    assert rig.kinds()[-1] == "CONNECTED"
 
 
 def test_an_answer_after_the_connection_was_lost_is_a_new_connection():
@@ -218,32 +208,6 @@ def test_a_heartbeat_without_an_acknowledgement_ends_the_connection_at_once():
     rig.antenna.dead = {0}
     assert not rig.mesh.control.send_heartbeat(0)
     assert not rig.mesh.get_connected_to_gateway()
-
-
-def test_waiting_for_an_answer_does_not_touch_the_hops():
-    rig = connected_rig()
-    rig.mesh.control.send_heartbeat(0)
-    rig.wait(0.6)
-    assert rig.mesh.get_hops_from_gateway_away() == 1
-
-
-def test_a_heartbeat_to_another_node_does_not_touch_the_connection():
-    rig = connected_rig()
-    rig.know_neighbour(2)
-    rig.mesh.control.send_heartbeat(2)
-    rig.wait(0.6)
-    assert rig.mesh.get_connected_to_gateway()
-
-
-def test_one_heartbeat_to_the_gateway_is_under_way_within_half_a_second():
-    rig = connected_rig()
-    rig.mesh.control.send_heartbeat(0)
-    rig.wait(0.4)
-    assert rig.mesh.control.send_heartbeat(0)
-    assert len(rig.sent(HEARTBEAT)) == 1
-    rig.wait(0.2)
-    rig.mesh.control.send_heartbeat(0)
-    assert len(rig.sent(HEARTBEAT)) == 1
 
 
 def test_waiting_for_the_first_answer_is_not_being_connected():
@@ -283,18 +247,33 @@ def test_a_check_while_the_first_answer_is_waited_for_does_not_drop_the_route():
 # Heartbeats of routers -----------------------------------------------------------------------
 
 
-def test_a_router_that_knows_no_gateway_gets_a_heartbeat_back():
-    rig = connected_rig()
-    rig.hear("05 02 04 01 01 00 ff 01")
-    assert rig.sent() == [packet("01 01 04 02 05 01 00 00")]
-
-
-def test_the_gateway_of_a_router_is_taken_and_tried():
-    rig = Rig()
-    rig.hear("02 02 04 01 01 01 09 00")
-    assert rig.mesh.get_preferred_gateway() == 9
-    assert rig.mesh.get_route_to_gateway() == 2
-    assert rig.sent() == [packet("01 01 04 02 09 00 09 00")]
+@pytest.mark.parametrize(
+    ("connected", "heard", "sent", "gateway"),
+    [
+        (True, "05 02 04 01 01 00 ff 01", "01 01 04 02 05 01 00 00", 0),  # knows no gateway
+        (True, "02 02 04 01 01 01 09 00", None, 0),  # connected as well, to another gateway
+        (True, "02 02 04 01 01 01 00 00", None, 0),  # and to mine
+        (False, "02 02 04 01 01 01 09 00", "01 01 04 02 09 00 09 00", 9),  # taken and tried
+        (False, "02 02 04 01 01 00 ff 00", None, 255),  # two that are not connected
+        (False, "03 03 04 01 01 00 09 00", None, 255),
+        (False, "02 02 04 01 01 01 01 00", None, 255),  # gateways that cannot be
+        (False, "02 02 04 01 01 01 fe 00", None, 255),
+        (False, "02 02 04 01 01 01 ff 00", None, 255),
+        (False, "01 02 04 01 01 01 01 00", None, 255),  # a router is not its own
+        (True, "02 02 03 01 fe ff 00", "01 01 04 02 02 01 00 00", 0),  # introductions
+        (True, "02 02 03 01 fe 03 01", None, 0),
+        (False, "02 02 03 01 fe 03 01", "01 01 04 02 02 00 ff 00", 255),
+        (False, "02 02 03 01 fe ff 00", None, 255),
+    ],
+)
+def test_a_router_answers_one_that_lacks_what_it_has_and_asks_one_that_has_what_it_lacks(
+    connected, heard, sent, gateway
+):
+    rig = connected_rig() if connected else Rig()
+    rig.hear(heard)
+    assert rig.tried() == ([packet(sent)] if sent else [])
+    assert rig.mesh.get_preferred_gateway() == gateway
+    assert rig.mesh.get_connected_to_gateway() is connected
 
 
 def test_taking_a_gateway_drops_every_other_entry_for_it():
@@ -308,73 +287,7 @@ def test_taking_a_gateway_drops_every_other_entry_for_it():
     assert rig.sent() == [packet("01 01 04 02 09 00 09 00")]
 
 
-@pytest.mark.parametrize(
-    "heartbeat",
-    [
-        "02 02 04 01 01 01 09 00",  # connected as well, to another gateway
-        "02 02 04 01 01 01 00 00",  # and to mine
-    ],
-)
-def test_the_heartbeat_of_a_connected_router_changes_nothing_in_a_connected_one(heartbeat):
-    rig = connected_rig()
-    rig.hear(heartbeat)
-    assert rig.tried() == []
-    assert rig.mesh.get_preferred_gateway() == 0
-
-
-def test_two_unconnected_routers_change_nothing_in_each_other():
-    rig = Rig()
-    rig.hear("02 02 04 01 01 00 ff 00", "03 03 04 01 01 00 09 00")
-    assert rig.tried() == []
-    assert rig.mesh.get_preferred_gateway() == 255
-
-
-@pytest.mark.parametrize("gateway", ["01", "fe", "ff"])
-def test_an_impossible_gateway_is_not_accepted(gateway):
-    rig = Rig()
-    rig.hear(f"02 02 04 01 01 01 {gateway} 00")
-    assert rig.tried() == []
-    assert rig.mesh.get_preferred_gateway() == 255
-
-
-def test_a_router_does_not_become_its_own_gateway():
-    rig = Rig()
-    rig.hear("01 02 04 01 01 01 01 00")
-    assert not rig.mesh.get_connected_to_gateway()
-    assert rig.mesh.get_preferred_gateway() == 255
-
-
 # Introductions -------------------------------------------------------------------------------
-
-
-def test_a_connected_router_answers_the_introduction_of_one_that_is_not():
-    rig = connected_rig()
-    rig.hear("02 02 03 01 fe ff 00")
-    assert rig.sent() == [packet("01 01 04 02 02 01 00 00")]
-
-
-def test_an_unconnected_router_answers_the_introduction_of_one_that_is():
-    rig = Rig()
-    rig.hear("02 02 03 01 fe 03 01")
-    assert rig.sent() == [packet("01 01 04 02 02 00 ff 00")]
-
-
-def test_a_router_that_waits_for_its_gateway_does_not_answer_one_that_is_connected():
-    rig = connected_rig()
-    rig.know_neighbour(2)
-    rig.mesh.control.send_heartbeat(0)
-    rig.forget()
-    rig.hear("02 02 03 01 fe 03 01")
-    assert rig.tried() == []
-
-
-def test_introductions_among_connected_and_among_unconnected_are_not_answered():
-    rig = connected_rig()
-    rig.hear("02 02 03 01 fe 03 01")
-    assert rig.tried() == []
-    rig = Rig()
-    rig.hear("02 02 03 01 fe ff 00")
-    assert rig.tried() == []
 
 
 # Shortcuts -----------------------------------------------------------------------------------
@@ -389,17 +302,21 @@ def test_the_next_heartbeat_tries_a_neighbour_with_fewer_hops():
     assert rig.mesh.get_route_to_gateway() == 3
 
 
-def test_the_neighbour_with_the_fewest_hops_is_tried():
-    rig = distant_rig("03 03 03 01 fe 03 01", "04 04 03 01 fe 01 01", "05 05 03 01 fe 02 01")
+@pytest.mark.parametrize(
+    ("heard", "next_hop"),
+    [
+        (["03 03 03 01 fe 03 01", "04 04 03 01 fe 01 01", "05 05 03 01 fe 02 01"], 4),  # the fewest
+        (["03 03 03 01 fe 04 01"], 2),  # as many as now
+        (["03 03 03 01 fe ff 01"], 2),
+        ([SHORTCUT, "03 03 03 01 fe 06 01"], 2),  # its route has become longer
+        (["05 03 03 01 fe 01 01"], 2),  # 3 is no neighbour with these hops: it relays
+        (["01 03 03 01 fe 01 01"], 2),  # or returns our own introduction
+    ],
+)
+def test_the_neighbour_with_the_fewest_hops_is_tried_if_that_shortens_the_route(heard, next_hop):
+    rig = distant_rig(*heard)
     rig.mesh.control.send_heartbeat(0)
-    assert rig.sent(HEARTBEAT) == [packet("01 01 04 04 00 01 00 00")]
-
-
-@pytest.mark.parametrize("hops", ["04", "05", "fe", "ff"])
-def test_a_neighbour_that_would_not_shorten_the_route_is_not_tried(hops):
-    rig = distant_rig(f"03 03 03 01 fe {hops} 01")
-    rig.mesh.control.send_heartbeat(0)
-    assert rig.sent(HEARTBEAT) == [packet("01 01 04 02 00 01 00 00")]
+    assert rig.tried(HEARTBEAT) == [packet(f"01 01 04 0{next_hop} 00 01 00 00")]
 
 
 def test_an_introduction_counts_for_one_heartbeat():
@@ -441,22 +358,6 @@ def test_a_shortcut_that_does_not_take_the_heartbeat_is_no_loss():
     assert rig.sent(HEARTBEAT) == [packet("01 01 04 02 00 01 00 00")]
 
 
-def test_a_neighbour_whose_route_has_become_longer_is_no_shortcut():
-    rig = distant_rig("03 03 03 01 fe 02 01", "03 03 03 01 fe 06 01")
-    rig.mesh.control.send_heartbeat(0)
-    assert rig.tried(HEARTBEAT) == [packet("01 01 04 02 00 01 00 00")]
-
-
-def test_only_a_neighbour_can_be_a_shortcut():
-    """A neighbour that relays an introduction, or returns our own, is not a shortcut."""
-    for creator in ("05", "01"):
-        rig = Rig()
-        rig.connect_through(2, hops=4)
-        rig.hear(f"{creator} 03 03 01 fe 01 01")
-        rig.mesh.control.send_heartbeat(0)
-        assert rig.tried(HEARTBEAT) == [packet("01 01 04 02 00 01 00 00")]
-
-
 def test_a_neighbour_nearer_to_another_gateway_is_a_shortcut_to_that_one_only():
     """Its few hops do not lead to the own gateway, whose heartbeat takes the usual route."""
     rig = distant_rig("03 03 04 01 01 01 09 00", "03 03 03 01 fe 02 01")
@@ -485,9 +386,7 @@ def test_a_shortcut_from_before_the_loss_does_not_count():
 # Several gateways ----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("hops", "preferred"), [("00", 9), ("01", 9), ("02", 0), ("03", 0), ("fe", 0)]
-)
+@pytest.mark.parametrize(("hops", "preferred"), [("01", 9), ("02", 0), ("fe", 0)])
 def test_a_connected_router_changes_its_gateway_only_for_fewer_hops(hops, preferred):
     rig = Rig()
     rig.connect_through(2, hops=2)
@@ -517,12 +416,6 @@ def test_within_a_period_of_the_last_answer_a_lost_gateway_is_not_given_up_for_a
     assert rig.mesh.get_connected_to_gateway()
 
 
-def test_an_unconnected_router_takes_the_first_gateway_that_answers():
-    rig = Rig()
-    rig.hear("09 03 04 01 01 01 09 20")
-    assert rig.mesh.get_preferred_gateway() == 9
-
-
 def test_another_gateway_has_another_location():
     rig = Rig()
     rig.connect_through(2, hops=2)
@@ -535,21 +428,18 @@ def test_another_gateway_has_another_location():
 # Power ---------------------------------------------------------------------------------------
 
 
-def test_switching_off_disconnects_at_once():
+@pytest.mark.parametrize("waits", [False, True])
+def test_switching_off_disconnects_at_once(waits):
     rig = connected_rig()
+    if waits:
+        rig.mesh.control.send_heartbeat(0)
+        rig.forget()
     rig.antenna.powered = False
     rig.mesh.on_antenna_power(False, rig.now_s)
     assert not rig.mesh.get_connected_to_gateway()
     assert rig.mesh.get_hops_from_gateway_away() == 255
     rig.wait(60.0)
     assert (rig.tried(), rig.broadcasts(), rig.engine.goals) == ([], [], [])
-
-
-def test_switching_off_while_waiting_for_an_answer_disconnects_at_once():
-    rig = connected_rig()
-    rig.mesh.control.send_heartbeat(0)
-    rig.mesh.on_antenna_power(False, rig.now_s)
-    assert not rig.mesh.get_connected_to_gateway()
 
 
 def test_the_time_without_a_gateway_does_not_count_while_the_antenna_is_off():
@@ -568,10 +458,6 @@ def test_the_time_without_a_gateway_does_not_count_while_the_antenna_is_off():
     assert rig.engine.goals == []
     rig.wait_until(66.0)
     assert len(rig.engine.goals) == 1
-
-
-def test_a_router_that_was_never_connected_knows_no_route_to_a_gateway():
-    assert Rig().mesh.get_route_to_gateway() == NO_ROUTE
 
 
 # The last route fails between two checks -------------------------------------------------------
@@ -659,12 +545,15 @@ def test_a_router_whose_only_route_is_gone_asks_around_at_once():
 PRESENT_OF_3 = "03 03 03 01 fe 01 01"  # one hop from its gateway, as node 2 is
 
 
-def test_a_packet_for_the_gateway_that_a_hop_does_not_take_goes_through_another_neighbour():
+@pytest.mark.parametrize(("hops", "takes_over"), [("01", True), ("03", False)])
+def test_a_packet_for_the_gateway_goes_through_another_neighbour_that_is_no_farther_from_it(
+    hops, takes_over
+):
     rig = shared_rig(silence_s=3.0)
     rig.connect_through(2)
-    rig.hear(PRESENT_OF_3)
+    rig.hear(f"03 03 03 01 fe {hops} 01")
     rig.mesh.on_undelivered(packet("01 01 04 02 00 01 00"), 9, rig.now_s)
-    assert rig.sent(HEARTBEAT) == [packet("01 01 04 03 00 01 00")]
+    assert rig.sent(HEARTBEAT) == [packet("01 01 04 03 00 01 00")] * takes_over
 
 
 @pytest.mark.parametrize(("given_up_s", "lost"), [(2.9, False), (3.0, True)])
@@ -673,14 +562,6 @@ def test_a_neighbour_that_was_heard_lately_survives_one_packet_that_is_given_up(
     rig.connect_through(2)
     rig.mesh.on_undelivered(packet("01 01 04 02 00 01 00"), 9, given_up_s)
     assert (2 not in rig.mesh.get_neighbours()) is lost
-
-
-def test_a_packet_goes_through_no_neighbour_that_is_farther_from_the_gateway():
-    rig = shared_rig(silence_s=3.0)
-    rig.connect_through(2)
-    rig.hear("03 03 03 01 fe 03 01")
-    rig.mesh.on_undelivered(packet("01 01 04 02 00 01 00"), 9, rig.now_s)
-    assert rig.sent(HEARTBEAT) == []
 
 
 def test_a_router_whose_next_hop_lost_the_gateway_asks_through_another_neighbour():

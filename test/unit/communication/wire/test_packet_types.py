@@ -14,7 +14,7 @@ from rig import Rig
 from drone_mesh.communication import reports
 from drone_mesh.communication.beacon.plane import BeaconTechnique
 from drone_mesh.communication.control.node_part import receivers
-from drone_mesh.communication.orders import messages as order_messages
+from drone_mesh.communication.orders import intake
 from drone_mesh.communication.wire import messages, packet_types
 from drone_mesh.communication.wire.packet_types import ABOUT, Handler, MessageType
 
@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parents[4]
 FORMS = {"bool": "?", "uint8": "B", "int16": "h", "uint16": "H", "uint32": "I", "float32": "f"}
 OF_MODULES = {
     name: made_of
-    for module in (messages, order_messages, reports)
+    for module in (messages, intake, reports)
     for name, made_of in vars(module).items()
     if isinstance(made_of, type) and hasattr(made_of, "BODY")
 }
