@@ -46,56 +46,27 @@ def test_a_check_maintains_the_routes_and_does_nothing_else():
 
 
 @pytest.mark.parametrize(
-    "heartbeat",
+    ("heard", "sent"),
     [
-        "05 02 04 01 01 00 ff 01",  # knows no gateway
-        "05 02 04 01 01 01 01 01",  # prefers this one
-        "05 02 04 01 01 01 09 01",  # prefers another one
+        ("05 02 04 01 01 00 ff 01", "01 01 04 02 05 01 01 00"),  # a router without a gateway
+        ("05 02 04 01 01 01 01 01", "01 01 04 02 05 01 01 00"),  # one that prefers this gateway
+        ("05 02 04 01 01 01 09 01", "01 01 04 02 05 01 01 00"),  # or another one
+        ("09 02 04 01 01 01 09 01", None),  # a gateway
+        ("05 05 03 01 fe ff 00", "01 01 04 05 05 01 01 00"),  # introductions
+        ("05 05 03 01 fe 03 01", None),
+        ("09 09 03 01 fe 00 01", None),
+        ("05 02 02 01 01", "01 01 01 02 05"),  # asks where it is
+        ("05 05 07 01 01 00 00 80 3f", None),  # a bid: a gateway does not negotiate
+        ("05 09 04 01 02 00 ff 03", "05 01 04 02 02 00 ff 04"),  # for another node
     ],
 )
-def test_the_heartbeat_of_a_router_is_answered_along_its_route(heartbeat):
+def test_a_gateway_answers_those_who_need_one_along_their_route_and_forwards(heard, sent):
     rig = gateway_rig()
-    rig.hear(heartbeat)
-    assert rig.sent() == [packet("01 01 04 02 05 01 01 00")]
-
-
-def test_the_heartbeat_of_a_gateway_is_not_answered():
-    rig = gateway_rig()
-    rig.hear("09 02 04 01 01 01 09 01")
-    assert rig.tried() == []
-
-
-def test_the_introduction_of_a_node_that_knows_no_gateway_is_answered():
-    rig = gateway_rig()
-    rig.hear("05 05 03 01 fe ff 00")
-    assert rig.sent() == [packet("01 01 04 05 05 01 01 00")]
-
-
-def test_the_introduction_of_a_connected_node_is_not_answered():
-    rig = gateway_rig()
-    rig.hear("05 05 03 01 fe 03 01", "09 09 03 01 fe 00 01")
-    assert rig.tried() == []
-
-
-def test_a_gateway_sends_its_location_when_it_is_asked():
-    rig = gateway_rig()
-    rig.hear("05 02 02 01 01")
-    assert rig.sent() == [packet("01 01 01 02 05")]
-
-
-def test_a_gateway_does_not_negotiate():
-    rig = gateway_rig()
-    rig.hear("05 05 07 01 01 00 00 80 3f")
+    rig.know_neighbour(2)
+    rig.hear(heard)
     rig.wait(4.0)
-    assert rig.tried() == []
+    assert rig.tried() == ([packet(sent)] if sent else [])
     assert rig.engine.goals == []
-
-
-def test_a_gateway_forwards_like_any_node():
-    rig = gateway_rig()
-    rig.know_neighbour(9)
-    rig.hear("05 02 04 01 09 00 ff 03")
-    assert rig.sent() == [packet("05 01 04 09 09 00 ff 04")]
 
 
 # Orders --------------------------------------------------------------------------------------
@@ -228,16 +199,11 @@ def test_an_order_for_its_own_drone_is_flown_and_the_landing_reported():
     ("order", "why"),
     [
         ((254, 0.0, 0.0, 0), "invalid drone id 254: must be 0..253"),
-        ((255, 0.0, 0.0, 0), "invalid drone id 255: must be 0..253"),
         ((-1, 0.0, 0.0, 0), "invalid drone id -1: must be 0..253"),
         ((5, float("nan"), 0.0, 0), "latitude nan is not a finite number"),
-        ((5, 0.0, float("-inf"), 0), "longitude -inf is not a finite number"),
         ((5, 5000.5, 0.0, 0), r"latitude 5000\.5 m is outside -5000\.\.5000 m"),
         ((5, 0.0, -5001.0, 0), r"longitude -5001 m is outside"),
-        ((5, 0.0, 0.0, 501), r"height 501 m is outside 0\.\.500 m"),
-        ((5, 0.0, 0.0, -1), r"height -1 m is outside"),
         ((1, 0.0, 0.0, -1), r"height -1 m is outside"),
-        ((5, 0.0, 0.0, 2.5), r"invalid height 2\.5 m: must be in whole metres"),
         ((1, 0.0, 0.0, 2.5), r"invalid height 2\.5 m: must be in whole metres"),
     ],
 )
@@ -248,12 +214,6 @@ def test_what_is_no_order_is_refused_with_the_reason(order, why):
         rig.mesh.send_goal_request_to_drone(*order, rig.now_s)
     assert rig.tried() == []
     assert rig.engine.goals == []
-
-
-def test_an_order_at_the_bounds_is_taken():
-    rig = gateway_rig()
-    rig.know_neighbour(5)
-    assert rig.mesh.send_goal_request_to_drone(5, 5000.0, -5000.0, 500, rig.now_s)
 
 
 # What it knows -------------------------------------------------------------------------------

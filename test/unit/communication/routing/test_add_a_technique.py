@@ -51,14 +51,8 @@ class LatestNeighbour(IRoutingTechnique):
     def get_table_size(self) -> int:
         return len(self._next_hops)
 
-    def get_amount_of_children(self) -> int:
-        return len(self.get_set_of_children())
-
     def get_set_of_children(self) -> frozenset[int]:
         return frozenset(node for node, hop in self._next_hops.items() if node == hop)
-
-    def empty(self) -> bool:
-        return not self._next_hops
 
 
 def test_a_technique_given_by_its_path_carries_a_mesh_its_orders_and_the_death_of_a_relay():
