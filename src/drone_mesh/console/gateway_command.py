@@ -147,7 +147,7 @@ def _parsed(arguments: Sequence[str] | None) -> argparse.Namespace:
         "--tiles",
         default="",
         metavar="MAP",
-        help="a map under the drones, if the nodes have an --origin: an MBTiles or PMTiles file, "
+        help="a map under the drones, if the nodes have an --origin: an MBTiles file, "
         "or an address with {z}, {x} and {y} (default: none)",
     )
     options = parser.parse_args(arguments)

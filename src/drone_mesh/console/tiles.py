@@ -1,15 +1,13 @@
 """The tiles of a map under the drones: from a file, which the console serves, or from a server.
 
-A file is MBTiles (1.3) or PMTiles (3) with pictures; the page draws no vector tiles. Leaflet, which
-draws them in the page, comes from npm and is no part of this project: `scripts/map_library` puts it
-beside this module.
+A file is MBTiles (1.3) with pictures; the page draws no vector tiles. Leaflet, which draws them in
+the page, comes from npm and is no part of this project: `scripts/map_library` puts it beside this
+module.
 """
 
 from __future__ import annotations
 
-import gzip
 import html
-import io
 import logging
 import re
 import sqlite3
@@ -17,7 +15,7 @@ import threading
 import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Callable, Sequence
+from typing import Any, Callable, Mapping, Sequence
 from urllib.parse import urlsplit
 
 from starlette.requests import Request
@@ -33,9 +31,7 @@ _log = logging.getLogger(__name__)
 LEAFLET = Path(__file__).resolve().parent / "leaflet"
 KEPT_BY_BROWSER_S = 3600
 MOST_ZOOM = 22
-# Of a file: far above what pictures of 512 pixels and their directories need.
-MOST_TILE_BYTES = 4_000_000
-MOST_UNPACKED_BYTES = 1_000_000
+MOST_TILE_BYTES = 4_000_000  # far above what pictures of 512 pixels need
 MOST_WORDS = 2_000  # characters
 MOST_ROWS = 1_000  # of metadata
 MOST_QUERY_S = 5.0
@@ -43,8 +39,6 @@ STEPS = 10_000  # of the database, between two looks at the time
 _OWN_URL = "/tiles/{z}/{x}/{y}"
 _PICTURES = {b"\x89PNG": "image/png", b"\xff\xd8\xff": "image/jpeg", b"RIFF": "image/webp"}
 _IS_TILE = f"typeof(tile_data) = 'blob' AND length(tile_data) <= {MOST_TILE_BYTES}"
-_PACKED = b"\x1f\x8b"  # gzip
-_LONG_NUMBER = re.compile(rb"[\x80-\xff]{10}")
 _URL = re.compile(r"https?://([A-Za-z0-9.-]|\{s\})+(:\d+)?/[^\s'\";]*")
 
 ReadTile = Callable[[int, int, int], "bytes | None"]
@@ -106,7 +100,7 @@ class Tiles:
 def open_tiles(given: str) -> Tiles:
     """The tiles of a file or an address. Raises ConfigurationError, one line.
 
-    `given`: the path of an .mbtiles or .pmtiles file, or an address with {z}, {x} and {y}; words
+    `given`: the path of an .mbtiles file, or an address with {z}, {x} and {y}; words
     behind a # name its author.
     """
     tiles = _of_server(given) if "://" in given else _of_file(Path(given).expanduser())
@@ -129,18 +123,15 @@ def _of_server(given: str) -> Tiles:
 
 
 def _of_file(path: Path) -> Tiles:
-    openers = {".mbtiles": _open_mbtiles, ".pmtiles": _open_pmtiles}
-    if path.suffix.lower() not in openers:
+    if path.suffix.lower() != ".mbtiles":
         raise ConfigurationError(
-            f"{path}: expected an .mbtiles or .pmtiles file, or an address with {{z}}, {{x}}, {{y}}"
+            f"{path}: expected an .mbtiles file, or an address with {{z}}, {{x}}, {{y}}"
         )
     try:
-        with path.open("rb"):
-            pass
+        path.open("rb").close()
+        return _open_mbtiles(path)
     except OSError as error:
         raise ConfigurationError(f"{path}: {error.strerror}") from error
-    try:
-        return openers[path.suffix.lower()](path)
     except ConfigurationError as error:
         raise ConfigurationError(f"{path}: {error}") from error
 
@@ -183,95 +174,23 @@ def _open_mbtiles(path: Path) -> Tiles:
         raise ConfigurationError(f"not an MBTiles file: {error}") from error
     if not some:
         raise ConfigurationError("has no tiles")
-    bounds = _bounds(str(about.get("bounds", "")).split(","))
-    return _of_pictures(some[0][0], (low, high), about, bounds, read)
-
-
-def _open_pmtiles(path: Path) -> Tiles:
-    try:
-        from pmtiles.reader import MmapSource, Reader, all_tiles
-    except ImportError as error:
-        raise ConfigurationError("needs the Python package pmtiles: pip install pmtiles") from error
-    try:
-        with path.open("rb") as file:
-            source = MmapSource(file)  # a mapping of its own: the file may be closed
-        reader = Reader(_bounded(source, _is_directory))
-        header, about = reader.header(), Reader(_bounded(source)).metadata()
-        _position, some = next(iter(all_tiles(_bounded(source, _is_directory))))
-    except StopIteration:
-        raise ConfigurationError("has no tiles") from None
-    except Exception as error:  # of the package and of all that it reads with
-        reason = str(error) or type(error).__name__
-        raise ConfigurationError(f"not a PMTiles file of version 3: {reason}") from error
-    names = ("min_lon_e7", "min_lat_e7", "max_lon_e7", "max_lat_e7")
-    bounds = _bounds([str(header[name] / 1e7) for name in names])
-
-    def read(z: int, x: int, y: int) -> bytes | None:
-        try:
-            picture: bytes | None = reader.get(z, x, y)
-        except Exception as error:
-            _log.warning("the tile %d/%d/%d of %s is damaged: %s", z, x, y, path, error)
-            return None
-        return picture
-
-    zooms = header["min_zoom"], header["max_zoom"]
-    return _of_pictures(some, zooms, about, bounds, read)
-
-
-def _bounded(
-    source: Callable[[int, int], bytes], fits: Callable[[bytes], object] = bool
-) -> Callable[[int, int], bytes]:
-    """The source, but it raises ValueError for parts that unpack to more than a map needs.
-
-    `fits`: whether an unpacked part is one that the package can read in bounded time.
-    """
-
-    def get_bytes(offset: int, length: int) -> bytes:
-        if length > MOST_TILE_BYTES:
-            raise ValueError(f"a part has {length} bytes")
-        part = source(offset, length)
-        if part.startswith(_PACKED):
-            unpacked = gzip.GzipFile(fileobj=io.BytesIO(part)).read(MOST_UNPACKED_BYTES + 1)
-            if len(unpacked) > MOST_UNPACKED_BYTES or not fits(unpacked):
-                raise ValueError(f"a part unpacks to more than {MOST_UNPACKED_BYTES} bytes")
-        return part
-
-    return get_bytes
-
-
-def _is_directory(unpacked: bytes) -> bool:
-    """Whether each number in this directory of a PMTiles file fits into 64 bits."""
-    return _LONG_NUMBER.search(unpacked) is None
-
-
-def _of_pictures(
-    some: bytes,
-    zooms: tuple[Any, Any],
-    about: Any,
-    bounds: Sequence[float],
-    read: ReadTile,
-) -> Tiles:
-    """The tiles of a file; `some` is any one of them and shows their kind."""
-    if _picture_type(some) is None:
+    if _picture_type(some[0][0]) is None:
         raise ConfigurationError(
             "its tiles are not pictures (PNG, JPEG or WebP): the page draws no vector tiles"
         )
-    low, high = (zoom if isinstance(zoom, int) else -1 for zoom in zooms)
-    if not 0 <= low <= high:
-        raise ConfigurationError(f"zoom levels {zooms[0]!r:.20} to {zooms[1]!r:.20}")
-    offer = MapOffer(_OWN_URL, low, min(high, MOST_ZOOM), _credit(about), bounds)
-    return Tiles(offer, read)
+    if not (isinstance(low, int) and isinstance(high, int) and 0 <= low <= high):
+        raise ConfigurationError(f"zoom levels {low!r:.20} to {high!r:.20}")
+    bounds = _bounds(str(about.get("bounds", "")).split(","))
+    return Tiles(MapOffer(_OWN_URL, low, min(high, MOST_ZOOM), _credit(about), bounds), read)
 
 
 def _picture_type(data: bytes) -> str | None:
     return next((kind for start, kind in _PICTURES.items() if data.startswith(start)), None)
 
 
-def _credit(about: Any) -> str:
+def _credit(about: Mapping[str, Any]) -> str:
     """The attribution as plain text; files have HTML there."""
-    known = about if isinstance(about, dict) else {}
-    words = str(known.get("attribution") or known.get("name") or "")[:MOST_WORDS]
-    words = re.sub(r"<[^<>]*>", "", words)
+    words = re.sub(r"<[^<>]*>", "", str(about.get("attribution") or about.get("name") or ""))
     return html.unescape(words).strip()[:200]
 
 

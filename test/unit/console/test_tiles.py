@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import gzip
 import sqlite3
-import struct
-import tracemalloc
 from pathlib import Path
 
 import pytest
@@ -43,24 +40,6 @@ def mbtiles(path: Path, tile: object = PNG, **metadata: str) -> str:
     return str(path)
 
 
-def pmtiles(path: Path, **metadata: str) -> str:
-    from pmtiles.tile import Compression, TileType, zxy_to_tileid
-    from pmtiles.writer import write
-
-    with write(str(path)) as writer:
-        writer.write_tile(zxy_to_tileid(2, 0, 0), PNG)
-        header = {
-            "tile_type": TileType.PNG,
-            "tile_compression": Compression.NONE,
-            **{
-                f"{end}_{axis}_e7": 0 for end in ("min", "max", "center") for axis in ("lon", "lat")
-            },
-            "center_zoom": 2,
-        }
-        writer.finalize(header, metadata or {"attribution": ABOUT["attribution"]})
-    return str(path)
-
-
 def refusal(given: object) -> str:
     with pytest.raises(ConfigurationError) as caught:
         open_tiles(str(given))
@@ -68,10 +47,8 @@ def refusal(given: object) -> str:
     return str(caught.value)
 
 
-@pytest.mark.parametrize("kind", ["mbtiles", "pmtiles"])
-def test_the_tiles_of_a_file_are_served_where_the_page_asks_for_them(tmp_path, kind):
-    path = tmp_path / f"field.{kind}"
-    tiles = open_tiles(mbtiles(path, **ABOUT) if kind == "mbtiles" else pmtiles(path))
+def test_the_tiles_of_a_file_are_served_where_the_page_asks_for_them(tmp_path):
+    tiles = open_tiles(mbtiles(tmp_path / "field.mbtiles", **ABOUT))
     offer = tiles.for_page()
     assert (offer["url"], offer["min_zoom"], offer["max_zoom"]) == ("/tiles/{z}/{x}/{y}", 2, 2)
     assert offer["credit"] == "© Some One"
@@ -116,17 +93,9 @@ def test_a_bad_address_is_refused(given):
 
 def test_a_bad_file_is_refused_in_one_line(tmp_path):
     (tmp_path / "text.mbtiles").write_text("no database" * 100)
-    (tmp_path / "text.pmtiles").write_text("no archive" * 100)
-    (tmp_path / "empty.pmtiles").write_text("")
-    (tmp_path / "short.pmtiles").write_bytes(
-        Path(pmtiles(tmp_path / "a.pmtiles")).read_bytes()[:90]
-    )
     assert "text.mbtiles: not an MBTiles file: file is not a" in refusal(tmp_path / "text.mbtiles")
-    for name in ("text", "empty", "short"):
-        path = tmp_path / f"{name}.pmtiles"
-        assert refusal(path).startswith(f"{path}: not a PMTiles file of version 3: ")
     assert refusal(tmp_path / "none.mbtiles").endswith("none.mbtiles: No such file or directory")
-    assert "expected an .mbtiles or .pmtiles file" in refusal(tmp_path / "map.tif")
+    assert "expected an .mbtiles file" in refusal(tmp_path / "map.tif")
     assert "has no tiles" in refusal(mbtiles(tmp_path / "empty.mbtiles", tile=None))
     vectors = mbtiles(tmp_path / "vectors.mbtiles", tile=b"\x1f\x8b...")
     assert "the page draws no vector tiles" in refusal(vectors)
@@ -199,47 +168,6 @@ def test_a_view_whose_query_never_ends_is_given_up(tmp_path, monkeypatch):
     assert refusal(path) == f"{path}: not an MBTiles file: interrupted"
 
 
-def packed(path: Path, at: int, content: bytes) -> Path:
-    """A PMTiles file whose header's part `at` is this content, packed."""
-    file = bytearray(Path(pmtiles(path)).read_bytes())
-    part = gzip.compress(content)
-    file[at : at + 16] = struct.pack("<QQ", len(file), len(part))
-    path.write_bytes(bytes(file) + part)
-    return path
-
-
-ROOT, ABOUT_AT = 8, 24  # of the header: offset and length of the root directory, of the metadata
-
-
-@pytest.mark.parametrize(
-    ("at", "content"),
-    [
-        (ABOUT_AT, b'{"name": "' + b" " * 50_000_000 + b'"}'),
-        (ROOT, b"\x80\x80\x40" + b"\x01" * 50_000_000),
-        (ROOT, b"\x01" + b"\xff" * 900_000),  # one number of 6,300,000 bits
-    ],
-)
-def test_a_pmtiles_file_that_unpacks_to_gigabytes_is_refused_at_once(tmp_path, at, content):
-    path = packed(tmp_path / "a.pmtiles", at, content)
-    tracemalloc.start()
-    try:
-        words = refusal(path)
-        _now, most = tracemalloc.get_traced_memory()
-    finally:
-        tracemalloc.stop()
-    assert words.endswith("a part unpacks to more than 1000000 bytes")
-    assert most < 10_000_000
-
-
-@pytest.mark.parametrize("content", [b"[1]", b"[" * 100_000, b'{"name": ' + b"<" * 900_000])
-def test_odd_metadata_of_a_pmtiles_file_is_one_line_or_no_credit(tmp_path, content):
-    path = packed(tmp_path / "a.pmtiles", ABOUT_AT, content)
-    if content == b"[1]":
-        assert open_tiles(str(path)).offer.credit == ""
-    else:
-        assert refusal(path).startswith(f"{path}: not a PMTiles file of version 3: ")
-
-
 def test_a_credit_is_short_whatever_a_file_says(tmp_path):
-    path = pmtiles(tmp_path / "a.pmtiles", attribution="<" * 900_000)
+    path = mbtiles(tmp_path / "a.mbtiles", attribution="<" * 900_000)
     assert open_tiles(path).offer.credit == "<" * 200
