@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import abc
 from typing import Iterable, List, Literal, NamedTuple, Optional, Sequence, Tuple, Union
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
@@ -91,14 +90,17 @@ class _Answered(_Request):
     number: int = Field(ge=0, le=MAX_ORDER_NUMBER)
 
 
-class PageOrder(_Answered, abc.ABC):
-    """One order of one page."""
+class PageOrder(_Answered):
+    """One order of one page: `do` names the method of MeshControls, all else are its arguments."""
 
+    do: str
     heard: HeardOrNone = None
 
-    @abc.abstractmethod
     def carry_out(self, controls: MeshControls) -> str:
         """Carry the order out; returns a short text for the page. Raises OrderRefused."""
+        arguments = self.model_dump(exclude={"number", "heard", "do"})
+        text: str = getattr(controls, self.do)(**arguments)
+        return text
 
     def drones(self, layouts: Sequence[LayoutOffer]) -> Sequence[int]:
         """The drones that it sends somewhere."""
@@ -110,9 +112,6 @@ class _Power(PageOrder):
     node: NodeId
     on: bool
 
-    def carry_out(self, controls: MeshControls) -> str:
-        return controls.power(self.node, self.on)
-
 
 class _Fly(PageOrder):
     do: Literal["fly"]
@@ -122,9 +121,6 @@ class _Fly(PageOrder):
     z: Height
     allow_shared_place: bool = False  # also to the place of another drone
 
-    def carry_out(self, controls: MeshControls) -> str:
-        return controls.fly(self.node, self.x, self.y, self.z, self.allow_shared_place)
-
     def drones(self, layouts: Sequence[LayoutOffer]) -> Sequence[int]:
         return (self.node,)
 
@@ -132,9 +128,6 @@ class _Fly(PageOrder):
 class _Layout(PageOrder):
     do: Literal["layout"]
     case: int = Field(ge=0, le=MAX_CASE)
-
-    def carry_out(self, controls: MeshControls) -> str:
-        return controls.layout(self.case)
 
     def drones(self, layouts: Sequence[LayoutOffer]) -> Sequence[int]:
         return [place[0] for offer in layouts if offer.case == self.case for place in offer.places]
@@ -160,9 +153,6 @@ class _Speed(PageOrder):
     paused: bool
     factor: float = Field(ge=0, le=MAX_REAL_TIME_FACTOR, allow_inf_nan=False)
 
-    def carry_out(self, controls: MeshControls) -> str:
-        return controls.speed(self.paused, self.factor)
-
 
 class _Add(PageOrder):
     """Add a drone; without `node` it gets the lowest free id."""
@@ -173,16 +163,10 @@ class _Add(PageOrder):
     x: Coordinate
     y: Coordinate
 
-    def carry_out(self, controls: MeshControls) -> str:
-        return controls.add(self.node, self.gateway, self.x, self.y)
-
 
 class _Remove(PageOrder):
     do: Literal["remove"]
     node: NodeId
-
-    def carry_out(self, controls: MeshControls) -> str:
-        return controls.remove(self.node)
 
 
 class _Mission(PageOrder):
@@ -205,9 +189,6 @@ class _Pilots(PageOrder):
 
     do: Literal["pilots"]
     action: Literal["pause", "resume", "stop"]
-
-    def carry_out(self, controls: MeshControls) -> str:
-        return controls.pilots(self.action)
 
 
 class ReadPlaces(_Answered):

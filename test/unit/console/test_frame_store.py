@@ -41,6 +41,9 @@ def test_a_new_page_gets_everything():
     assert first["nodes"]["1"]["hops"] == 1
     assert first["nodes"]["1"]["neighbours"] == 2
     assert first["nodes"]["1"]["position"] == [2.0, 3.0, 0.0]
+    assert (first["nodes"]["0"]["condition"], first["nodes"]["0"]["colour"]) == (
+        "connected", "gateway",
+    )  # fmt: skip
 
 
 def test_a_page_that_is_up_to_date_gets_only_what_changed():
@@ -108,12 +111,6 @@ def test_a_node_that_is_gone_is_removed_and_may_come_back():
     back = frame(store, known)
     assert "gone" not in back
     assert back["nodes"]["1"]["hops"] == 1
-
-
-def test_an_unknown_position_is_null():
-    store = FrameStore()
-    store.update_mesh(MeshStatus(1.0, [NodeStatus(3)]), wall_s=0.0)
-    assert frame(store, 0)["nodes"]["3"]["position"] is None
 
 
 def test_each_event_is_sent_once():
@@ -188,14 +185,6 @@ def test_the_selected_node_has_its_neighbours_and_the_age_of_its_fallback_positi
     assert store.detail_of(1)["fallback_age"] == 12
 
 
-def test_a_frame_carries_the_condition_and_the_colour_of_each_node():
-    store = FrameStore()
-    store.update_mesh(mesh(path=(2.0, 3.0, 1.0), connected=False), wall_s=0.0)
-    nodes = frame(store, 0)["nodes"]
-    assert (nodes["0"]["condition"], nodes["0"]["colour"]) == ("connected", "gateway")
-    assert (nodes["1"]["condition"], nodes["1"]["colour"]) == ("flying", "flying")
-
-
 def test_a_frame_carries_each_link_once_under_its_use_at_the_lower_id():
     store = FrameStore()
     nodes = [
@@ -220,16 +209,9 @@ def test_nodes_at_one_position_come_with_their_slots():
     store = FrameStore()
     nodes = [NodeStatus(node, position=(2.0, 2.0, float(node))) for node in (1, 2)]
     store.update_mesh(MeshStatus(1.0, [*nodes, NodeStatus(3)]), wall_s=0.0)
+    assert frame(store, 0)["nodes"]["3"]["position"] is None
     slots = {node: fields["slot"] for node, fields in frame(store, 0)["nodes"].items()}
     assert slots == {"1": [0, 2], "2": [1, 2], "3": None}
-
-
-def test_the_latest_order_of_a_drone_is_shown_with_it():
-    store = FrameStore()
-    store.add_events([EventRecord(1.0, 0, "order accepted", (1,), "", 7, A)])
-    store.update_mesh(mesh(), wall_s=0.0)
-    assert frame(store, 0)["nodes"]["1"]["order"] == f"order 7 to {A.in_words()}: accepted"
-    assert frame(store, 0)["nodes"]["0"]["order"] == ""
 
 
 def test_the_end_of_an_earlier_order_is_not_shown_once_a_new_one_is_given():
@@ -259,22 +241,15 @@ def test_an_order_that_was_refused_leaves_the_earlier_one_as_it_was():
     assert frame(store, 0)["nodes"]["1"]["order"] == f"order 7 to {A.in_words()}: arrived"
 
 
-def test_a_node_says_which_messages_of_users_it_sent_and_received():
-    store = FrameStore()
-    busy = {"data_sent": 3, "data_bytes_sent": 72, "data_queued": 1, "data_given_up": 1}
-    store.update_mesh(MeshStatus(1.0, [NodeStatus(1, **busy), NodeStatus(2)]), wall_s=0.0)
-    shown = {node: fields["data"] for node, fields in frame(store, 0)["nodes"].items()}
-    words = "3 sent (72 bytes), 0 received (0 bytes), 1 waiting, 1 given up"
-    assert shown == {"1": words, "2": ""}
-
-
-def test_a_node_on_a_shared_channel_says_what_it_does_there():
+def test_a_node_says_what_it_does_on_a_shared_channel_and_which_messages_of_users_it_had():
     store = FrameStore()
     busy = {"airtime": 0.0123, "tries": 1.254, "queue": 2, "given_up": 1}
+    busy.update({"data_sent": 3, "data_bytes_sent": 72, "data_queued": 1, "data_given_up": 1})
     store.update_mesh(MeshStatus(1.0, [NodeStatus(1, **busy), NodeStatus(2)]), wall_s=0.0)
-    channels = {node: fields["channel"] for node, fields in frame(store, 0)["nodes"].items()}
-    words = "1.2 % airtime, 1.25 tries per packet, 2 waiting, 1 given up"
-    assert channels == {"1": words, "2": ""}
+    shown = {n: (node["channel"], node["data"]) for n, node in frame(store, 0)["nodes"].items()}
+    channel = "1.2 % airtime, 1.25 tries per packet, 2 waiting, 1 given up"
+    data = "3 sent (72 bytes), 0 received (0 bytes), 1 waiting, 1 given up"
+    assert shown == {"1": (channel, data), "2": ("", "")}
 
 
 def eventful_store() -> FrameStore:

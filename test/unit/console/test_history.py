@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 
-from drone_mesh.console.frame_store import FrameStore
 from drone_mesh.console.history import History
 from drone_mesh.console.page import Player
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus, ObstacleStatus
@@ -108,15 +107,6 @@ def test_a_step_pauses_and_ends_at_both_ends():
     assert shown(player)["clock"]["paused"]
     player.step(-1000)
     assert shown(player)["clock"]["t"] == 0.0
-
-
-def test_the_store_fills_the_history_that_it_is_given():
-    history = History()
-    store = FrameStore(history)
-    store.update_mesh(mesh(1.0), wall_s=0.0)
-    store.add_events([EventRecord(1.0, 0, "flight decided", (2,))])
-    assert history.times == [1.0]
-    assert history.marks == [{"t": 1.0, "kind": "flight", "node": 0}]
 
 
 def test_a_recording_keeps_one_state_of_each_time_and_none_that_goes_back():

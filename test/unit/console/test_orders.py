@@ -192,19 +192,3 @@ def test_of_a_mission_only_the_way_is_offered_and_of_a_layout_only_the_places():
         assert isinstance(request, ReadPlaces)
         found = request.content(Origin(52.0907, 5.1214, 3.0))
         assert (len(found.places), len(found.ways)) == (0 if ways else 2, ways)
-
-
-def places_in(text: str) -> list[tuple[int, float, float, float]]:
-    request = parse_request(json.dumps({"do": "places", "number": 1, "text": text}))
-    assert isinstance(request, ReadPlaces)
-    return request.content(None).places
-
-
-def test_a_layout_file_says_where_its_drones_would_fly_and_orders_nothing():
-    text = "cases: {5: {1: [1, 2, 3], 2: [4, 5, 6]}}"
-    assert places_in(text) == [(2, 4.0, 5.0, 6.0), (1, 1.0, 2.0, 3.0)]
-
-
-def test_a_layout_file_that_cannot_be_read_is_refused_with_its_line():
-    with pytest.raises(OrderRefused, match="line 3"):
-        places_in("cases:\n  1:\n    17: [far, 14, 0]\n")

@@ -116,36 +116,28 @@ def test_a_byte_order_mark_is_no_part_of_a_text(tmp_path):
     ("text", "why"),
     [
         ("", "expected 'cases:'"),
-        ("cases:", "expected 'cases:'"),
         ("cases: [1]", "expected 'cases:'"),
         ("casus: {}", "unknown key casus: expected only 'cases'"),
         (
             "cases: {one: {1: [0, 0, 0]}}",
             "invalid case 'one': must be a whole number 0..4294967295",
         ),
-        ("cases: {-1: {1: [0, 0, 0]}}", "invalid case -1:"),
         ("cases: {4294967296: {1: [0, 0, 0]}}", "invalid case 4294967296:"),
         ("cases: {true: {1: [0, 0, 0]}}", "invalid case True:"),
         ("cases: {5: {}}", "case 5: expected 'node id"),
         ("cases: {5: [1, 2]}", "case 5: expected 'node id"),
         ("cases: {5: {254: [0, 0, 0]}}", "case 5: invalid node id 254: must be 0..253"),
-        ("cases: {5: {255: [0, 0, 0]}}", "case 5: invalid node id 255"),
-        ("cases: {5: {-1: [0, 0, 0]}}", "case 5: invalid node id -1"),
         ("cases: {5: {1.0: [0, 0, 0]}}", "case 5: invalid node id 1.0"),
-        ("cases: {5: {1: [0, 0]}}", r"case 5, drone 1: invalid place \[0, 0\]"),
-        ("cases: {5: {1: [0, 0, 0, 0]}}", "case 5, drone 1: invalid place .*"),
+        ("cases:\n  5:\n    1: [0, 0]", r"line 3: case 5, drone 1: invalid place \[0, 0\]"),
         ("cases: {5: {1: 7}}", "case 5, drone 1: invalid place 7"),
         ("cases: {5: {1: [0, here, 0]}}", "case 5, drone 1: invalid place .*"),
         ("cases: {5: {1: [0, true, 0]}}", "case 5, drone 1: invalid place .*"),
         ("cases: {5: {1: [.nan, 0, 0]}}", "case 5, drone 1: longitude nan is not a finite"),
-        ("cases: {5: {1: [0, .inf, 0]}}", "case 5, drone 1: latitude inf is not a finite"),
         ("cases: {5: {1: [0, 5001, 0]}}", "case 5, drone 1: latitude 5001 m is outside"),
         ("cases: {5: {1: [0, 0, 501]}}", "case 5, drone 1: height 501 m is outside 0..500"),
-        ("cases: {5: {1: [0, 0, -1]}}", "case 5, drone 1: height -1 m is outside"),
         ("cases:\n  5: {1: [0, 0, 0]}\n  5: {2: [0, 0, 0]}", "line 3: duplicate key 5"),
         ("cases:\n  5:\n    010: [0, 0, 0]", "line 3: 010 is not a number in decimal digits"),
         ("cases:\n  5:\n    1: [0, 1:30, 0]", "line 3: 1:30 is not a number in decimal digits"),
-        ("cases:\n  5:\n    1: [0, 1:30.5, 0]", "line 3: 1:30.5 is not a number in decimal digits"),
         ("cases:\n  5:\n    1: [0, 0, 0]\n    1: [1, 1, 1]", "line 4: duplicate key 1"),
     ],
 )
@@ -154,19 +146,6 @@ def test_a_bad_file_is_refused_with_the_place_and_the_reason(load, tmp_path, tex
         load(text)
     assert str(refused.value).startswith(str(tmp_path / "mine.yaml"))
     assert "\n" not in str(refused.value)
-
-
-@pytest.mark.parametrize(
-    ("place", "why"),
-    [
-        ("2: [0, 0]", r"line 5: case 5, drone 2: invalid place \[0, 0\]"),
-        ("2: [0, 0, 501]", "line 5: case 5, drone 2: height 501"),
-        ("two: [0, 0, 0]", "line 5: case 5: invalid node id 'two'"),
-    ],
-)
-def test_a_refusal_names_the_line(load, place, why):
-    with pytest.raises(ConfigurationError, match=why):
-        load(f"# mine\ncases:\n  5:\n    1: [0, 0, 0]\n    {place}\n")
 
 
 def test_a_file_that_is_not_there_is_named(tmp_path):

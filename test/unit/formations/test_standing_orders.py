@@ -241,9 +241,8 @@ def follow(network, orders, seconds):
 
 
 @pytest.mark.parametrize("pause_s", [1, 3, 8, 20])
-@pytest.mark.parametrize("seed", range(3))
-def test_the_last_layout_ordered_is_reached_whatever_was_ordered_before(seed, pause_s):
-    network = Network(seed=seed)
+def test_the_last_layout_ordered_is_reached_whatever_was_ordered_before(pause_s):
+    network = Network(seed=1)
     network.add_gateway(0, -1.0, 0.0)
     for k in range(17):
         network.add_router(k + 1, float(k % 6), float(k // 6))

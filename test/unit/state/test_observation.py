@@ -48,12 +48,6 @@ def test_a_drone_is_described_by_its_underside_and_the_rest_of_its_path():
     assert len(view.path) == 9
 
 
-def test_a_drone_without_a_flight_has_no_path():
-    view = describe_drone(0, Role.GATEWAY, (-1.0, 0.0, 0.1), None, now_s=3.0)
-    assert view.position == pytest.approx((-1.0, 0.0, 0.0))
-    assert view.path == ()
-
-
 @pytest.mark.parametrize(("now_s", "waypoints"), [(0.0, 3), (0.6, 2), (4.6, 1), (9.9, 1)])
 def test_waypoints_that_were_passed_are_not_ahead(now_s, waypoints):
     path = FlightPath((0.0, 0.0, 0.0), (10.0, 0.0, 0.0), start_s=0.0)

@@ -111,9 +111,5 @@ def test_a_sample_counts_routers_that_are_on():
 
 
 def test_of_no_routers_there_is_no_connected_share():
-    assert take_sample(MeshStatus(1.0, [NodeStatus(1, on=False)])).connected_share is None
-
-
-def test_where_no_router_is_connected_there_are_no_hops():
-    sample = take_sample(MeshStatus(1.0, [NodeStatus(1, connected=False, hops=3)]))
-    assert (sample.mean_hops, sample.most_hops) == (None, None)
+    sample = take_sample(MeshStatus(1.0, [NodeStatus(1, on=False, hops=3)]))
+    assert (sample.connected_share, sample.mean_hops, sample.most_hops) == (None, None, None)

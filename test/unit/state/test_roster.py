@@ -55,16 +55,12 @@ def test_a_node_that_moved_to_another_host_survives_the_end_of_the_first():
     assert [node.id for node in roster.snapshot([], wall_s=3.0)] == [1]
 
 
-def test_a_node_without_a_drone_has_no_place():
+def test_a_node_without_a_drone_has_no_place_and_a_drone_without_a_report_is_switched_off():
     roster = MeshRoster()
     roster.merge_report("host", [NodeStatus(7)], wall_s=0.0)
-    (stranger,) = roster.snapshot([], wall_s=0.0)
-    assert all(map(math.isnan, stranger.position))
-
-
-def test_a_drone_without_a_report_is_listed_as_switched_off():
-    (drone,) = MeshRoster().snapshot([DroneView(3, Role.ROUTER, (1.0, 2.0, 0.0))], wall_s=0.0)
+    drone, node = roster.snapshot([DroneView(3, Role.ROUTER, (1.0, 2.0, 0.0))], wall_s=0.0)
     assert (drone.id, drone.on, drone.position) == (3, False, (1.0, 2.0, 0.0))
+    assert all(map(math.isnan, node.position))
 
 
 def test_a_node_that_was_removed_is_gone_even_if_its_host_fell_silent():

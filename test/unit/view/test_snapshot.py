@@ -91,10 +91,6 @@ def test_an_obstacle_is_shown_and_dims_the_drone_behind_it(shoot):
     assert hidden[y, x, 1] > hidden[y, x, 0] + 10  # which still shines through
 
 
-def test_a_picture_has_the_size_that_was_asked_for(shoot):
-    assert shoot([GATEWAY, ROUTER], size=(320, 200)).shape == (200, 320, 3)
-
-
 def test_each_drone_is_where_it_stands_in_the_colour_of_its_condition(shoot):
     drones = [GATEWAY] + [
         DronePicture(1 + i, Role.ROUTER, (3.0 * i, 4.0, 0.0), condition)
@@ -107,20 +103,6 @@ def test_each_drone_is_where_it_stands_in_the_colour_of_its_condition(shoot):
     for drone in drones:
         (place,) = camera.project([drone.centre()])
         assert share_of_colour(pixels, drone.colour, place, radius=3) > 0.5, drone
-
-
-@pytest.mark.slow
-def test_a_fleet_of_254_is_all_in_the_picture(shoot):
-    drones = [
-        DronePicture(k, Role.ROUTER, (6.0 * (k % 16), 6.0 * (k // 16), 0.0)) for k in range(254)
-    ]
-    pixels = shoot(drones, size=(700, 450))
-    camera = camera_of(drones, (700, 450))
-    shares = [
-        share_of_colour(pixels, drone.colour, place, radius=2)
-        for drone, place in zip(drones, camera.project([drone.centre() for drone in drones]))
-    ]
-    assert min(shares) > 0.2
 
 
 def test_ids_are_written_and_differ(shoot):
@@ -158,11 +140,6 @@ def test_a_flight_is_drawn_to_its_goal_and_the_goal_is_in_the_picture(shoot):
     assert share_of_colour(pixels, LIGHT.path, goal, radius=10) > 0.05
 
 
-def test_an_empty_world_is_a_picture_of_the_ground(shoot):
-    pixels = shoot([])
-    assert np.ptp(pixels.reshape(-1, 3), axis=0).min() > 0, "not even a grid"
-
-
 def test_a_legend_explains_the_colours_that_occur_where_there_is_room_for_it(shoot):
     off = replace(OTHER, condition=Condition.OFF)
     corner = (600 - 160, 68)  # the third row
@@ -175,11 +152,6 @@ def test_a_title_is_written_into_the_upper_left_corner(shoot):
     corner = np.s_[:40, :200]
     plain, titled = shoot([ROUTER])[corner], shoot([ROUTER], title="after 12.3 s")[corner]
     assert (titled.sum(axis=2) < 200).sum() > (plain.sum(axis=2) < 200).sum() + 50
-
-
-def test_a_place_that_cannot_be_written_is_an_os_error(tmp_path):
-    with pytest.raises(FileNotFoundError):
-        render(Scene([ROUTER]), tmp_path / "nowhere" / "picture.png", SIZE)
 
 
 @settings(deadline=None, max_examples=40)
@@ -195,12 +167,6 @@ def test_a_fleet_fills_the_frame_on_the_side_that_is_short_of_room():
     points = [(0.0, 0.0, 0.0), (100.0, 0.0, 0.0)]
     pixels = frame(Camera((1280, 800)), points, Margins(80, 40, 200, 60)).project(points)
     assert pixels[:, 0] == pytest.approx([80, 1080], abs=1)
-
-
-def test_margins_shrink_in_a_small_picture():
-    points = [(0.0, 0.0, 0.0), (100.0, 0.0, 0.0)]
-    pixels = frame(Camera((200, 100)), points, Margins(100, 0, 200, 0)).project(points)
-    assert pixels[:, 0] == pytest.approx([100 / 3, 200 - 200 / 3], abs=1)
 
 
 @settings(deadline=None, max_examples=40)
