@@ -9,9 +9,9 @@ from drone_mesh.errors import ConfigurationError
 from drone_mesh.inprocess.clock import VirtualClock
 from drone_mesh.inprocess.interfaces import IInProcessAir
 from drone_mesh.inprocess.radio import InProcessAir
-from drone_mesh.inprocess.shared_antenna import SharedChannel
+from drone_mesh.inprocess.shared_air import SharedAir
 from drone_mesh.nrf24.emulator.links import IdealDisc, LinkModel, LogDistance
-from drone_mesh.nrf24.emulator.space import Fading, Space
+from drone_mesh.nrf24.emulator.space import Fading
 from drone_mesh.nrf24.settings import RadioSettings, data_rate
 
 
@@ -31,7 +31,14 @@ def create_air(
 
     Raises ConfigurationError.
     """
-    _check_numbers(max_distance_m, loss, delay_s, jitter_s)
+    for name, value, is_right, rule in (  # NaN is neither below nor above a bound
+        ("max_distance_m", max_distance_m, max_distance_m > 0, "above 0"),
+        ("loss", loss, 0 <= loss <= 1, "a share, 0..1"),
+        ("delay_s", delay_s, 0 <= delay_s < math.inf, "0 or more"),
+        ("jitter_s", jitter_s, 0 <= jitter_s < math.inf, "0 or more"),
+    ):
+        if not is_right:
+            raise ConfigurationError(f"invalid {name} {value}: must be {rule}")
     if radio == "disc":
         if fading != "none":
             raise ConfigurationError("fading needs the radio shared or chips")
@@ -39,39 +46,20 @@ def create_air(
         return InProcessAir(VirtualClock(), own_rng, max_distance_m, loss, delay_s, jitter_s)
     settings = RadioSettings(data_rate=data_rate(rate))
     if links is None and fading != "none":
-        links = LogDistance.with_edge_at(
-            max_distance_m,
-            random.Random(rng.random()),
-            bits_per_s=settings.data_rate.value,
-        )
+        own_rng, bits_per_s = random.Random(rng.random()), settings.data_rate.value
+        links = LogDistance.with_edge_at(max_distance_m, own_rng, bits_per_s=bits_per_s)
     links = links or IdealDisc(max_distance_m)
+    air: SharedAir | ChipAir
     if radio == "shared":
-        shared = SharedChannel(VirtualClock(), links, settings, max_distance_m)
-        _fade(shared.space, fading, rician_k_db, rng)
-        return shared
-    if radio == "chips":
+        air = SharedAir(VirtualClock(), links, settings, max_distance_m)
+    elif radio == "chips":
         from drone_mesh.inprocess.chip_air import ChipAir  # needs greenlet
 
-        chips = ChipAir(links, settings, max_distance_m, random.Random(rng.random()))
-        _fade(chips.space, fading, rician_k_db, rng)
-        return chips
-    raise ConfigurationError(f"invalid radio {radio!r}: use disc, shared or chips")
-
-
-def _fade(space: Space, kind: str, k_db: float, rng: random.Random) -> None:
-    if kind != "none":
-        links = space.links
+        air = ChipAir(links, settings, max_distance_m, random.Random(rng.random()))
+    else:
+        raise ConfigurationError(f"invalid radio {radio!r}: use disc, shared or chips")
+    if fading != "none":
         scale = links.metres_per_metre if isinstance(links, LogDistance) else 1.0
         own_rng = random.Random(rng.random())
-        space.fading = Fading(kind, own_rng, k_db=k_db, metres_per_metre=scale)
-
-
-def _check_numbers(max_distance_m: float, loss: float, delay_s: float, jitter_s: float) -> None:
-    """Raises ConfigurationError; also for NaN, which is neither below nor above a bound."""
-    if not max_distance_m > 0:
-        raise ConfigurationError(f"invalid max_distance_m {max_distance_m}: must be above 0")
-    if not 0 <= loss <= 1:
-        raise ConfigurationError(f"invalid loss {loss}: must be a share, 0..1")
-    for name, value in (("delay_s", delay_s), ("jitter_s", jitter_s)):
-        if not 0 <= value < math.inf:
-            raise ConfigurationError(f"invalid {name} {value}: must be 0 or more")
+        air.space.fading = Fading(fading, own_rng, k_db=rician_k_db, metres_per_metre=scale)
+    return air

@@ -17,7 +17,6 @@ from drone_mesh.inprocess.interfaces import Host, IInProcessAir, IInProcessAnten
 from drone_mesh.nrf24.emulator.air import Air
 from drone_mesh.nrf24.emulator.chip import EmulatedChip
 from drone_mesh.nrf24.emulator.links import LinkModel
-from drone_mesh.nrf24.emulator.space import Space
 from drone_mesh.nrf24.high_level import NRF24HighLevelInterface
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
 from drone_mesh.nrf24.settings import RadioSettings
@@ -73,6 +72,7 @@ class ChipAir(IInProcessAir):
         """`max_distance_m`: the range for pictures and path searches."""
         self.clock = TaskClock()
         self.air = Air(self.clock.tasks, links, rng)
+        self.space = self.air.space  # the obstacles, fading and noise between the antennas
         self.settings = settings
         self.max_distance_m = max_distance_m
         self.antennas: dict[int, ChipAntenna] = {}  # by node
@@ -83,11 +83,6 @@ class ChipAir(IInProcessAir):
     @property
     def delivered(self) -> int:
         return sum(antenna.statistics().received for antenna in self.antennas.values())
-
-    @property
-    def space(self) -> Space:
-        """The obstacles, fading and noise between the antennas."""
-        return self.air.space
 
     @property
     def frames(self) -> int:

@@ -1,17 +1,23 @@
-"""A drone without a world: it flies its path on the virtual clock."""
+"""A drone without a world: it flies on the virtual clock; pilots; what it knows of its place."""
 
 from __future__ import annotations
 
 import math
-from typing import Callable, Optional
+import random
+from dataclasses import dataclass
+from typing import Callable, Iterable, Mapping, Optional
+
+import numpy as np
 
 from drone_mesh.air.obstacles import NO_PATH
 from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath, PlanFlight
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
-from drone_mesh.errors import GoalRefused
+from drone_mesh.errors import ConfigurationError, GoalRefused, LocationUnknown
 from drone_mesh.inprocess.clock import Clock
+from drone_mesh.inprocess.interfaces import IInProcessAir
+from drone_mesh.mobility import Segment, Track
 
 OnPath = Callable[[Optional[FlightPath], FlightPath], None]
 """Called with the path so far (None: at rest) and the new one."""
@@ -28,7 +34,6 @@ class InProcessDrone(IDroneEngine):
         why_not_fly: str = "",
     ) -> None:
         """`on_flight` is called with True at the start of a flight and with False at its end."""
-        self.flown_m = 0.0  # straight distance from start to goal of all flights, in metres
         self._why_not_fly = why_not_fly
         self._clock = clock
         self._place = start
@@ -55,8 +60,6 @@ class InProcessDrone(IDroneEngine):
         self.under_pilot = False
         if self.path is None:
             self._on_flight(True)
-        else:
-            self.flown_m += math.dist(self.path.start, here.to_vector())
         before, self.path = self.path, plan
         self._clock.call_at(self._clock.now_s + plan.duration_s, self._arrive, plan)
         for observer in self._observers:
@@ -83,6 +86,128 @@ class InProcessDrone(IDroneEngine):
     def _arrive(self, path: FlightPath) -> None:
         if path is self.path:  # not replanned in flight
             self._place = Location.from_vector(path.goal)
-            self.flown_m += math.dist(path.start, path.goal)
             self.path = None
             self._on_flight(False)
+
+
+CORRELATED_S = 10.0  # the error of a receiver drifts; after this time it is another one
+
+
+@dataclass(frozen=True)
+class PositionErrors:
+    """The errors of the positions that the mesh software gets; flights and links are exact."""
+
+    sigma_m: float = 0.0  # standard deviation along x and along y
+    outliers: float = 0.0  # share of positions that are wrong by `outlier_m` in some direction
+    outlier_m: float = 0.0
+    known: bool = True  # False: no drone knows its position
+
+    @property
+    def none(self) -> bool:
+        """Whether positions are exact."""
+        return self.known and not self.sigma_m and not self.outliers
+
+
+class PositionReceiver(IDroneEngine):
+    """A drone whose position the mesh learns from a receiver with errors."""
+
+    def __init__(
+        self, drone: InProcessDrone, clock: Clock, errors: PositionErrors, rng: random.Random
+    ) -> None:
+        self._drone, self._clock, self._errors, self._rng = drone, clock, errors, rng
+        self._error_m = (self._drawn(), self._drawn())
+        self._drawn_s = 0.0
+
+    def set_goal(self, latitude: float, longitude: float, height: float) -> None:
+        self._drone.set_goal(latitude, longitude, height)
+
+    def why_not_fly(self) -> str:
+        return self._drone.why_not_fly()
+
+    def get_location(self) -> Location:
+        if not self._errors.known:
+            raise LocationUnknown("no position receiver")
+        place = self._drone.get_location()
+        x_m, y_m = self._drifted()
+        if self._rng.random() < self._errors.outliers:
+            angle = self._rng.uniform(-math.pi, math.pi)
+            x_m += self._errors.outlier_m * math.cos(angle)
+            y_m += self._errors.outlier_m * math.sin(angle)
+        return Location(place.latitude + y_m, place.longitude + x_m, place.height)
+
+    def _drifted(self) -> tuple[float, float]:
+        """The error now: normally distributed, and correlated over CORRELATED_S."""
+        now_s = self._clock.now_s
+        kept = math.exp(-(now_s - self._drawn_s) / CORRELATED_S)
+        fresh = math.sqrt(1.0 - kept**2)
+        x_m, y_m = (kept * before + fresh * self._drawn() for before in self._error_m)
+        self._error_m, self._drawn_s = (x_m, y_m), now_s
+        return self._error_m
+
+    def _drawn(self) -> float:
+        return self._rng.gauss(0.0, self._errors.sigma_m)
+
+
+STEP_S = 0.1  # positions at 10 Hz, as a GPS receiver gives them
+
+
+class Pilots:
+    """Drones of a network that move as their tracks say, in steps of STEP_S.
+
+    The mesh of a drone learns nothing but its position. A flight order ends the pilot's flight: the
+    drone flies to its goal and stays there.
+    """
+
+    def __init__(
+        self,
+        clock: Clock,
+        air: IInProcessAir,
+        drones: Mapping[int, InProcessDrone],
+        tracks: Mapping[int, Track],
+    ) -> None:
+        """From now on these drones are where their tracks say, which begin at time 0.
+
+        Raises ConfigurationError for a track of a drone that there is not.
+        """
+        unknown = sorted(tracks.keys() - drones.keys())
+        if unknown:
+            raise ConfigurationError(f"drone {unknown[0]} has a track and is not in the network")
+        self._clock, self._air = clock, air
+        self._drones, self._tracks = drones, tracks
+        for node in tracks:
+            drones[node].under_pilot = True
+        self._hold(sorted(tracks))
+        self._step(None)
+
+    @property
+    def flying(self) -> list[int]:
+        """The drones that still follow their tracks."""
+        return [node for node in self._nodes if self._drones[node].under_pilot]
+
+    def _hold(self, nodes: Iterable[int]) -> None:
+        """Keep the current legs of these drones as arrays, one row each."""
+        now_s = self._clock.now_s
+        self._nodes = list(nodes)
+        legs = [self._tracks[node].leg_at(now_s) for node in self._nodes]
+        self._starts_s = np.array([leg.start_s for leg in legs])
+        self._ends_s = np.array([leg.end_s for leg in legs])
+        self._places = np.array([leg.start for leg in legs])
+        self._velocities = np.array([leg.velocity for leg in legs])
+
+    def _put(self, row: int, leg: Segment) -> None:
+        self._starts_s[row], self._ends_s[row] = leg.start_s, leg.end_s
+        self._places[row], self._velocities[row] = leg.start, leg.velocity
+
+    def _step(self, _: object) -> None:
+        now_s, drones = self._clock.now_s, self._drones
+        if not all(drones[node].under_pilot for node in self._nodes):
+            self._hold(self.flying)
+        if not self._nodes:
+            return
+        for row in np.flatnonzero(self._ends_s <= now_s).tolist():
+            self._put(row, self._tracks[self._nodes[row]].leg_at(now_s))
+        places = self._places + self._velocities * (now_s - self._starts_s)[:, None]
+        for node, (x, y, z) in zip(self._nodes, places.tolist()):
+            drones[node].put(Location(y, x, z))
+        self._air.moved(self._nodes)
+        self._clock.call_at(now_s + STEP_S, self._step, None)

@@ -31,12 +31,10 @@ from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
 from drone_mesh.inprocess.airs import create_air
 from drone_mesh.inprocess.bounds import SHORTEST_PATH, LinkMap, Oracle, ShortestPath
+from drone_mesh.inprocess.drone import Pilots, PositionErrors, PositionReceiver
 from drone_mesh.inprocess.interfaces import IInProcessAir
-from drone_mesh.inprocess.node import InProcessNode, NoInternet
-from drone_mesh.inprocess.pilots import Pilots
-from drone_mesh.inprocess.positions import PositionErrors, PositionReceiver
+from drone_mesh.inprocess.node import InProcessNode, NoInternet, event_records, mesh_status
 from drone_mesh.inprocess.radio import HOP_DELAY_S
-from drone_mesh.inprocess.status import event_records, mesh_status
 from drone_mesh.mobility import Track
 from drone_mesh.nrf24.emulator.links import LinkModel
 from drone_mesh.nrf24.emulator.space import RICIAN_K_DB
@@ -103,23 +101,11 @@ class Network:
         )
         self._key = key
         self._positions = positions or PositionErrors()
-        self.air: IInProcessAir
         if isinstance(radio, str):
-            self.air = create_air(
-                radio,
-                self._rng,
-                max_distance_m,
-                loss,
-                delay_s,
-                jitter_s,
-                rate,
-                links,
-                fading,
-                rician_k_db,
-            )
-        else:
-            self.air = radio
-        self.clock = self.air.clock
+            medium = (loss, delay_s, jitter_s, rate, links, fading, rician_k_db)
+            radio = create_air(radio, self._rng, max_distance_m, *medium)
+        self.air = radio
+        self.clock = radio.clock
         self._link_map = LinkMap(self.clock, self.links)
         self.nodes: dict[int, InProcessNode] = {}
         self.events: list[MeshEvent] = []
@@ -149,23 +135,11 @@ class Network:
         apart_s: float = 0.0,
     ) -> None:
         """Add the factory's fleet; each drone starts `apart_s` after the previous one."""
-        for place in plan_fleet(gateways, routers, gridsize, spacing):
-            self._add(
-                place.node_id,
-                place.longitude,
-                place.latitude,
-                place.node_id * apart_s,
-                gateway=place.role is Role.GATEWAY,
-            )
+        for node_id, role, x, y in plan_fleet(gateways, routers, gridsize, spacing):
+            self._add(node_id, x, y, node_id * apart_s, role is Role.GATEWAY)
 
     def _add(
-        self,
-        node_id: int,
-        x: float,
-        y: float,
-        start_s: float,
-        gateway: bool,
-        why_not_fly: str = "",
+        self, node_id: int, x: float, y: float, start_s: float, gateway: bool, why_not_fly: str = ""
     ) -> None:
         if node_id in self.nodes:
             raise ValueError(f"node {node_id} already exists")
@@ -186,7 +160,7 @@ class Network:
             self._configuration_of(node_id),
             internet=NoInternet() if node.is_gateway else None,
             security=self._security(node_id),
-            observer=self._observe,
+            observer=self.events.append,
         )
         node.component.data.on_received(functools.partial(self._receive, node_id))
         node.deadlines = node.component.deadlines
@@ -283,9 +257,8 @@ class Network:
     ) -> Ticket:
         """Send a message from a node; like Transport.send."""
         node = self.nodes[node_id]
-        ticket = node.component.data.send(
-            to, payload, self.clock.now_s, port=port, reliable=reliable
-        )
+        now_s = self.clock.now_s
+        ticket = node.component.data.send(to, payload, now_s, port=port, reliable=reliable)
         node.plan()
         return ticket
 
@@ -380,14 +353,9 @@ class Network:
         return path
 
     def _places_of_connected(self) -> dict[int, Location]:
-        return {
-            node_id: node.drone.get_location()
-            for node_id, node in self.nodes.items()
-            if node.antenna.powered and node.component.get_connected_to_gateway()
-        }
+        nodes = self.nodes.items()
+        powered = [node_id for node_id, node in nodes if node.antenna.powered]
+        return {node_id: self.location(node_id) for node_id in filter(self.connected, powered)}
 
     def _receive(self, node_id: int, message: ReceivedMessage) -> None:
         self.received.setdefault(node_id, []).append(message)
-
-    def _observe(self, event: MeshEvent) -> None:
-        self.events.append(event)

@@ -9,9 +9,8 @@ from typing import Iterator, Mapping, Sequence
 
 from drone_mesh.lab.engine import run_all
 from drone_mesh.lab.experiment import LoadedExperiment, load_experiment
+from drone_mesh.lab.extensions import column_of
 from drone_mesh.lab.plan import Plan, PlannedRun
-from drone_mesh.lab.program import PROGRAM
-from drone_mesh.lab.progress import Progress
 from drone_mesh.lab.provenance import code_with, describe_session
 from drone_mesh.lab.store import (
     EXPERIMENT,
@@ -21,6 +20,7 @@ from drone_mesh.lab.store import (
     read_provenance,
     read_runs,
 )
+from drone_mesh.lab.terminal import PROGRAM, Progress
 
 
 class OlderCodeError(StoreError):
@@ -64,9 +64,16 @@ class Campaign:
             if again:
                 store.forget(_older(plan, store))
             store.describe([describe_session(self._command, self.loaded, name)])
+            part, parts = shard or (0, 1)
             while True:
-                self._run_plan(plan, store, workers, cluster, shard)
-                more = self._more_seeds(plan, store)
+                missing = {
+                    planned.spec.run: planned
+                    for place, planned in enumerate(plan)
+                    if planned.spec.run not in store.codes and planned.spec.run not in store.failed
+                    if place % parts == part
+                }
+                self._run_missing(missing, plan, store, workers, cluster)
+                more = self._more_seeds(plan)
                 if more is None:
                     break
                 plan = Plan(self.loaded, more)
@@ -77,31 +84,26 @@ class Campaign:
             finally:
                 store.close()
 
-    def _run_plan(
+    def _run_missing(
         self,
+        missing: Mapping[str, PlannedRun],
         plan: Plan,
         store: Store,
         workers: int,
         cluster: str | None,
-        shard: tuple[int, int] | None,
     ) -> None:
-        missing: dict[str, PlannedRun] = {
-            planned.spec.run: planned
-            for place, planned in enumerate(plan)
-            if planned.spec.run not in store.codes and planned.spec.run not in store.failed
-            if shard is None or place % shard[1] == shard[0]
-        }
         self._check_code(plan, store, missing)
         if not missing:
             return
         progress = Progress(len(missing))
         specs = (planned.spec for planned in missing.values())
+        show = f"{PROGRAM} show {shlex.quote(str(self.folder))}"  # repeats one run
         outcomes = run_all(specs, min(workers, len(missing)), cluster)
         try:
             for outcome in outcomes:
                 planned = missing[outcome.spec.run]
                 label = plan.cells[planned.cell].label
-                store.add(outcome, label, self.show_command(outcome.spec.run))
+                store.add(outcome, label, f"{show} {outcome.spec.run}")
                 progress.count(bool(outcome.failure))
                 self.completed += 1
                 self.failures += bool(outcome.failure)
@@ -122,18 +124,14 @@ class Campaign:
             )
         print(f"{text}: `--again` repeats them", flush=True)
 
-    def show_command(self, run: str) -> str:
-        """The command that repeats one run."""
-        return f"{PROGRAM} show {shlex.quote(str(self.folder))} {run}"
-
-    def _more_seeds(self, plan: Plan, store: Store) -> int | None:
+    def _more_seeds(self, plan: Plan) -> int | None:
         """The number of seeds for each cell in the next round; None: enough."""
         stop = self.loaded.experiment.stop
         if stop is None or plan.seeds >= stop.max_seeds:
             return None
         cell_of = {planned.spec.run: planned.cell for planned in plan}
         values: dict[int, list[float]] = {cell: [] for cell in range(len(plan.cells))}
-        column = stop.metric.rpartition(":")[2]
+        column = column_of(stop.metric)
         for run, row in read_runs(self.folder).items():
             if run in cell_of and row[column]:
                 values[cell_of[run]].append(float(row[column]))

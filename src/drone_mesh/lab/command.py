@@ -13,17 +13,17 @@ from drone_mesh.arguments import MOST, is_up_to, whole
 from drone_mesh.errors import MeshError
 from drone_mesh.lab.campaign import Campaign, OlderCodeError, merge
 from drone_mesh.lab.estimate import estimate
-from drone_mesh.lab.experiment import load_experiment
+from drone_mesh.lab.experiment import load_experiment, write_template
 from drone_mesh.lab.plan import Plan
-from drone_mesh.lab.program import PROGRAM
-from drone_mesh.lab.progress import as_duration
 from drone_mesh.lab.store import describe_folder
-from drone_mesh.lab.template import write_template
+from drone_mesh.lab.terminal import PROGRAM, as_duration
 from drone_mesh.stopping import ends_as
 from drone_mesh.web.listening import MAX_PORT
 
 CELLS_SHOWN = 30  # by `lab plan`
 _RESULTS = "results folder of the experiment"
+
+_Run = Callable[[argparse.Namespace], int]
 
 
 @ends_as("lab")
@@ -37,7 +37,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             parser.error(f"unrecognized arguments: {' '.join(after_options)}")
         options.overrides += after_options
     options.command_line = given
-    run: Callable[[argparse.Namespace], int] = options.run
+    run: _Run = options.run
     try:
         return run(options)
     except KeyboardInterrupt:
@@ -53,11 +53,18 @@ def _parser() -> argparse.ArgumentParser:
     )
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
-    new = commands.add_parser("new", help="write a commented experiment to start from")
-    new.add_argument("name", help="name of the experiment and of its file")
-    new.set_defaults(run=_new)
+    def command(run: _Run, words: str, **paths: str) -> argparse.ArgumentParser:
+        """A command named like its function, with these paths."""
+        added = commands.add_parser(run.__name__[1:], help=words)
+        added.set_defaults(run=run)
+        for name, about in paths.items():
+            added.add_argument(name, type=Path, help=about)
+        return added
 
-    plan = commands.add_parser("plan", help="show cells, runs and estimated time; writes nothing")
+    new = command(_new, "write a commented experiment to start from")
+    new.add_argument("name", help="name of the experiment and of its file")
+
+    plan = command(_plan, "show cells, runs and estimated time; writes nothing")
     _add_experiment(plan)
     trials = plan.add_mutually_exclusive_group()
     trials.add_argument("--no-estimate", action="store_true", help="skip the trial runs")
@@ -66,12 +73,9 @@ def _parser() -> argparse.ArgumentParser:
         action="store_true",
         help="make them also if the file names modules of its own, whose code they run",
     )
-    _add_workers(plan)
-    plan.set_defaults(run=_plan)
 
-    run = commands.add_parser("run", help="execute the runs missing from the results folder")
+    run = command(_run, "execute the runs missing from the results folder")
     _add_experiment(run)
-    _add_workers(run)
     run.add_argument(
         "--cluster", metavar="ADDRESS", help="a dask scheduler (tcp://host:8786), or slurm"
     )
@@ -83,49 +87,33 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument(
         "--again", action="store_true", help="discard and repeat the runs of older code"
     )
-    run.set_defaults(run=_run)
 
-    status = commands.add_parser("status", help="show the progress of a results folder")
-    status.add_argument("results", type=Path, help=_RESULTS)
-    status.set_defaults(run=_status)
-
-    merging = commands.add_parser("merge", help="merge shards into one results folder")
-    merging.add_argument("into", type=Path, help="results folder to create or extend")
+    command(_status, "show the progress of a results folder", results=_RESULTS)
+    merging = command(
+        _merge, "merge shards into one results folder", into="results folder to create or extend"
+    )
     merging.add_argument("shards", type=Path, nargs="+", help="results folders of the shards")
-    merging.set_defaults(run=_merge)
 
-    _add_analysis(commands)
-    return parser
-
-
-def _add_analysis(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    report = commands.add_parser("report", help="write tables and figures as one HTML file")
-    report.add_argument("results", type=Path, help=_RESULTS)
+    report = command(_report, "write tables and figures as one HTML file", results=_RESULTS)
     report.add_argument("--out", type=Path, help="the page (default: RESULTS/report.html)")
     report.add_argument(
         "--export", metavar="FORMAT", action="append", default=[],
         choices=("png", "pdf", "svg", "csv", "latex"),
         help="also write each figure or table as a file: png, pdf, svg, csv or latex; repeatable",
     )  # fmt: skip
-    report.set_defaults(run=_report)
 
-    tables = commands.add_parser("tables", help="print the tables of the report as Markdown")
-    tables.add_argument("results", type=Path, help=_RESULTS)
+    tables = command(_tables, "print the tables of the report as Markdown", results=_RESULTS)
     tables.add_argument(
         "--only", nargs="+", choices=("cells", "healing", "paired", "worst"), help="these alone"
     )
-    tables.set_defaults(run=_tables)
 
-    plot = commands.add_parser("plot", help="write one figure as SVG, light and dark")
-    plot.add_argument("results", type=Path, help=_RESULTS)
+    plot = command(_plot, "write one figure as SVG, light and dark", results=_RESULTS)
     plot.add_argument("figure", help="an axis of the sweep, healed_over_time or phases")
     plot.add_argument("out", type=Path, help="the file")
     plot.add_argument("--cells", default="", help="only these: axis=value[,axis=value...]")
     plot.add_argument("--metric", action="append", default=[], help="of the axis; repeatable")
-    plot.set_defaults(run=_plot)
 
-    show = commands.add_parser("show", help="repeat one run, with all its events")
-    show.add_argument("results", type=Path, help=_RESULTS)
+    show = command(_show, "repeat one run, with all its events", results=_RESULTS)
     show.add_argument("run_id", metavar="RUN", help="id of the run, or the beginning of it")
     how = show.add_mutually_exclusive_group()
     how.add_argument("--page", type=Path, metavar="FILE", help="write a report page about the run")
@@ -137,12 +125,12 @@ def _add_analysis(commands: argparse._SubParsersAction[argparse.ArgumentParser])
         default=9081,
         help="port for --console (default %(default)s)",
     )
-    show.set_defaults(run=_show)
 
-    compare = commands.add_parser(
-        "compare", help="compare two cells, or two folders: differences paired by seed"
+    compare = command(
+        _compare,
+        "compare two cells, or two folders: differences paired by seed",
+        results=_RESULTS,
     )
-    compare.add_argument("results", type=Path, help=_RESULTS)
     compare.add_argument(
         "a", metavar="A", help="a cell: axis=value[,axis=value...]; or another results folder"
     )
@@ -153,10 +141,9 @@ def _add_analysis(commands: argparse._SubParsersAction[argparse.ArgumentParser])
         default=[],
         help="metric to compare; repeatable (default: those of the experiment)",
     )
-    compare.set_defaults(run=_compare)
 
-    metrics = commands.add_parser("metrics", help="list all metrics with unit and definition")
-    metrics.set_defaults(run=_metrics)
+    command(_metrics, "list all metrics with unit and definition")
+    return parser
 
 
 def _add_experiment(parser: argparse.ArgumentParser) -> None:
@@ -164,9 +151,6 @@ def _add_experiment(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "overrides", nargs="*", metavar="a.b=c", help="override a value of the file, as in seeds=50"
     )
-
-
-def _add_workers(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--workers", type=whole(0, MOST), default=len(os.sched_getaffinity(0)), metavar="N",
         help="number of processes; 0: run in this process, for a debugger (default: one per core, "

@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import NamedTuple, Sequence
+from typing import Sequence, Tuple
 
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.lab.program import PROGRAM
 from drone_mesh.lab.results import Row, load_results, paired
 from drone_mesh.lab.statistics import holm, mean_interval, paired_difference
+from drone_mesh.lab.terminal import PROGRAM
 
-
-class _Pairs(NamedTuple):
-    """Two groups of runs with the same seeds, in the same order."""
-
-    label: str
-    a: Sequence[Row]
-    b: Sequence[Row]
+_Pairs = Tuple[str, Sequence[Row], Sequence[Row]]
+"""A label, and two groups of runs with the same seeds, in the same order."""
 
 
 def print_cells(folder: Path, a: str, b: str, metrics: Sequence[str]) -> None:
@@ -26,16 +21,14 @@ def print_cells(folder: Path, a: str, b: str, metrics: Sequence[str]) -> None:
     """
     results = load_results(folder)
     cells = results.find_cell(a), results.find_cell(b)
-    rows_a, rows_b = map(results.of_cell, cells)
-    seeds = sorted(rows_a.keys() & rows_b.keys())
-    pairs = _Pairs("", [rows_a[seed] for seed in seeds], [rows_b[seed] for seed in seeds])
+    a_runs, b_runs = results.pairs(*cells)
     chosen = list(metrics) or results.metrics
     results.check_columns(chosen)
-    codes = _one_code(pairs.a), _one_code(pairs.b)
+    codes = _one_code(a_runs), _one_code(b_runs)
     differ = codes[0].partition(" ")[0] != codes[1].partition(" ")[0]  # more than the techniques
     for name, cell, code in zip("AB", cells, codes):
         print(f"{name}: {results.loaded.cells[cell].label}{f', code {code}' if differ else ''}")
-    _print_table([pairs], chosen)
+    _print_table([("", a_runs, b_runs)], chosen)
 
 
 def print_folders(a: Path, b: Path, metrics: Sequence[str]) -> None:
@@ -47,18 +40,15 @@ def print_folders(a: Path, b: Path, metrics: Sequence[str]) -> None:
     chosen = list(metrics) or results.metrics
     results.check_columns(chosen)
     other.check_columns(chosen)
-    found = []
+    found: list[_Pairs] = []
     for index, cell in enumerate(results.loaded.cells):
         rows = [row for _, row in sorted(results.of_cell(index).items())]
         rows = [row for row in rows if row["run"] in other.rows]
         if rows:
-            found.append(_Pairs(cell.label, rows, [other.rows[row["run"]] for row in rows]))
+            found.append((cell.label, rows, [other.rows[row["run"]] for row in rows]))
     if not found:
         raise ConfigurationError(f"{a} and {b} have no run in common: same cell, seed and metrics")
-    for name, folder, groups in (
-        ("A", a, [pairs.a for pairs in found]),
-        ("B", b, [pairs.b for pairs in found]),
-    ):
+    for name, folder, groups in zip("AB", (a, b), list(zip(*found))[1:]):
         print(f"{name}: {folder}, code {', '.join(sorted(set(map(_one_code, groups))))}")
     _print_table(found, chosen)
 
@@ -75,12 +65,12 @@ def _one_code(rows: Sequence[Row]) -> str:
 
 def _print_table(found: Sequence[_Pairs], metrics: Sequence[str]) -> None:
     print(f"{'metric':20} {'seeds':>5}  {'A':26} {'B':26} {'B - A, paired':28} {'p (Holm)':>9}")
-    columns = [paired(pairs.a, pairs.b, metric) for pairs in found for metric in metrics]
+    columns = [paired(a, b, metric) for _label, a, b in found for metric in metrics]
     differences = [paired_difference(xs, ys) for xs, ys in columns]
     lines = zip(columns, differences, holm([one.p for one in differences]))
-    for pairs in found:
-        if pairs.label:
-            print(pairs.label)
+    for label, _a, _b in found:
+        if label:
+            print(label)
         for metric, ((xs, ys), compared, p) in zip(metrics, lines):
             print(
                 f"{metric:20} {len(xs):5}  {mean_interval(xs)!s:26} {mean_interval(ys)!s:26} "

@@ -1,10 +1,11 @@
-"""An experiment file: read, overridden from the command line, checked, expanded into cells."""
+"""An experiment file: read, overridden from the command line, checked, expanded; or begun."""
 
 import copy
 import hashlib
 import itertools
 import json
 import math
+import re
 from pathlib import Path
 from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
@@ -13,18 +14,20 @@ from typing_extensions import Annotated, Literal
 
 from drone_mesh.air import obstacle_file
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.lab import extensions, movement, places
-from drone_mesh.lab.experiment_parts import Part
-from drone_mesh.lab.experiment_source import NoSuchPlace, Source, nearest_name, put
+from drone_mesh.lab import extensions, formations, places
+from drone_mesh.lab.experiment_checks import NoSuchPlace, Source, check_scenario, nearest_name, put
 from drone_mesh.lab.expression import ExpressionError, Where
 from drone_mesh.lab.metrics import METRICS
 from drone_mesh.lab.scenario import Scenario
-from drone_mesh.lab.scenario_checks import check_scenario
+from drone_mesh.lab.scenario_parts import Part
+from drone_mesh.lab.terminal import PROGRAM
 from drone_mesh.yaml_file import KeyPath, read_mapping, read_value
 
 MOST_CELLS = 10_000
 MOST_COMBINATIONS = 1_000_000  # of the axes, before `where`
 MOST_RUNS = 10_000_000  # docs/lab.md: shards keep the memory small
+
+TEMPLATE = Path(__file__).resolve().parent / "experiment.template.yaml"
 
 _TECHNIQUES = ("routing", "repair")
 NAME_PATTERN = r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$"  # used as the name of a folder
@@ -64,7 +67,6 @@ class Experiment(BaseModel):
     compare: Optional[Compare] = None
     draws: Literal["all", "split", "whole"] = "all"  # which runs the report counts
     timeout_s: Annotated[float, Field(gt=0)] = 600.0  # wall time of one run
-    output: Literal["runs", "runs_and_outages"] = "runs_and_outages"
 
 
 class Cell(NamedTuple):
@@ -276,7 +278,7 @@ def _read_files(content: Dict[str, Any], source: Source) -> None:
     for part, key, read in (
         ("layout", "places", places.rows_of_file),
         ("obstacles", "boxes", obstacle_file.rows_of_file),
-        ("mobility", "knots", movement.rows_of_file),
+        ("mobility", "knots", formations.rows_of_file),
     ):
         holder = content.get(part)
         if not isinstance(holder, dict) or not isinstance(holder.get("path"), str):
@@ -299,7 +301,7 @@ def _check_metrics(experiment: Experiment, source: Source) -> None:
             extensions.check_metric(name)
         except ConfigurationError as error:
             raise source.error(place, str(error)) from None
-        column = extensions.own_column(name) if ":" in name else name
+        column = extensions.column_of(name)
         if columns.setdefault(column, name) != name or (":" in name and column in METRICS):
             raise source.error(place, f"metric {name}: another one is also called {column}")
     if experiment.stop is not None and (
@@ -325,3 +327,19 @@ def _check_compare(experiment: Experiment, cells: Sequence[Cell], source: Source
             f"compare.baseline: {compare.baseline!r} is not a value of {compare.over}; "
             f"give one that is, as in compare.baseline={as_text(values[0])}",
         )
+
+
+def write_template(name: str) -> Path:
+    """Write NAME.yaml into the current folder. Raises ConfigurationError if it cannot."""
+    if not re.match(NAME_PATTERN, name):
+        raise ConfigurationError(f"{name!r}: use letters, digits, dot, dash and underscore")
+    path = Path(f"{name}.yaml")
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            text = TEMPLATE.read_text(encoding="utf-8")
+            file.write(text.format(name=name, file=path, program=PROGRAM))
+    except FileExistsError:
+        raise ConfigurationError(f"{path} already exists; it was not changed") from None
+    except OSError as error:
+        raise ConfigurationError(f"{path}: {error.strerror}") from error
+    return path

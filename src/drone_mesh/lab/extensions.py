@@ -15,8 +15,8 @@ from drone_mesh.by_name import in_one_line, load_by_name
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.inprocess import Network
 from drone_mesh.lab.metrics import METRICS
-from drone_mesh.lab.program import PROGRAM
 from drone_mesh.lab.record import RunRecord
+from drone_mesh.lab.terminal import PROGRAM
 
 _OWN = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
 
@@ -91,6 +91,6 @@ def own_metric(name: str) -> OwnMetric:
     return cast(OwnMetric, function)
 
 
-def own_column(name: str) -> str:
-    """The column of runs.csv for a user's metric."""
-    return name.partition(":")[2]
+def column_of(name: str) -> str:
+    """The column of runs.csv for a metric, of this package or a user's."""
+    return name.rpartition(":")[2]

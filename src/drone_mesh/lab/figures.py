@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
 from drone_mesh.lab.experiment import Cell, as_text
-from drone_mesh.lab.metrics.registry import METRICS, is_censored, unit_of
-from drone_mesh.lab.results import Results, is_share, number
+from drone_mesh.lab.metrics.registry import METRICS, is_censored, is_share, unit_of
+from drone_mesh.lab.results import Results, number
 from drone_mesh.lab.statistics import Interval, kaplan_meier
 from drone_mesh.lab.tables import summary_of
 from drone_mesh.view.palette import LIGHT

@@ -1,20 +1,25 @@
-"""Flies layouts in a run, as the drone manager does, and observes how the last one ends."""
+"""What moves the drones of a run: their tracks, and the layouts that it orders."""
 
 from __future__ import annotations
 
 import math
-from typing import Callable, Collection, Sequence
+from pathlib import Path
+from typing import Callable, Collection, Mapping, Sequence
 
 from drone_mesh.drone.location import Location
 from drone_mesh.formations.layouts import Layouts
 from drone_mesh.formations.preview import preview
 from drone_mesh.formations.standing_orders import PartState, StandingOrders
 from drone_mesh.inprocess import Network
-from drone_mesh.inprocess.status import event_records
+from drone_mesh.inprocess.node import event_records
 from drone_mesh.lab.network_sample import gateways_of, physical_graph
+from drone_mesh.lab.places import StartPoint, side_of
+from drone_mesh.lab.scenario import Scenario, Streams
+from drone_mesh.mobility import Area, Track, tracks_of
+from drone_mesh.mobility.trace_files import read_trace
 from drone_mesh.state.model import MeshStatus
 
-LOOK_S = 1.0  # /mesh/state comes at least as often at real time
+LOOK_S = 1.0  # between two looks at the drones; /mesh/state comes at least as often at real time
 
 Order = Callable[[int, float, float, int], None]
 """Orders a drone to x, y and a height, in metres."""
@@ -30,7 +35,6 @@ class Formations:
         self.reached_s: float | None = None
         self.missing: list[int] = []  # those that are not, and can be reached
         self._network, self._order = network, order
-        self._layouts = Layouts.shipped()
         self._orders = StandingOrders()
         self._goals: dict[int, Location] = {}
         self._out_of_reach: set[int] = set()  # left out by the plan
@@ -42,8 +46,8 @@ class Formations:
         self, cases: Sequence[int], apart_s: float, at_once: bool, ring_m: float | None = None
     ) -> None:
         """Order these layouts one after the other, from now on, and then a ring of that radius."""
-        clock, nodes = self._network.clock, self._network.nodes
-        layouts = [(f"layout {case}", dict(self._layouts.orders(case))) for case in cases]
+        clock, nodes, shipped = self._network.clock, self._network.nodes, Layouts.shipped()
+        layouts = [(f"layout {case}", dict(shipped.orders(case))) for case in cases]
         if ring_m is not None:
             layouts.append(("ring", self._ring(ring_m)))
         for count, (name, layout) in enumerate(layouts):
@@ -111,3 +115,63 @@ class Formations:
             self.reached_s = None
         elif self.reached_s is None:
             self.reached_s = network.clock.now_s
+
+
+LEAST_BETWEEN_ORDERS_S = 5.0  # of one drone; a model may turn more often
+
+
+def rows_of_file(path: Path) -> list[list[float]]:
+    """A trace as numbers: id, t, x, y, z. Raises ConfigurationError."""
+    return [[float(node), *knot] for node, knots in read_trace(path).items() for knot in knots]
+
+
+def area_of(scenario: Scenario, places: Sequence[StartPoint]) -> Area:
+    """The rectangle in which drones move: given, or that of the layout."""
+    if scenario.mobility.area is not None:
+        return Area(*scenario.mobility.area)
+    if scenario.layout.kind == "uniform":
+        side_m = side_of(scenario.layout, scenario.range_m)
+        return Area(0.0, 0.0, side_m, side_m)
+    xs, ys = [place.x for place in places], [place.y for place in places]
+    return Area(min(xs), min(ys), max(xs) - min(xs), max(ys) - min(ys))
+
+
+def tracks(scenario: Scenario, places: Sequence[StartPoint], streams: Streams) -> dict[int, Track]:
+    """The tracks of the drones that move, from a stream of their own."""
+    return tracks_of(
+        scenario.mobility.mobility,
+        {place.node_id: (place.x, place.y, 0.0) for place in places},
+        {place.node_id for place in places if place.gateway},
+        area_of(scenario, places),
+        streams.number("motion"),
+    )
+
+
+class ToldPilots:
+    """Orders every leg of the tracks through the mesh, at the speed of the leg.
+
+    Flights follow the profile of ordered flights, so a drone falls behind its track by the climb.
+    """
+
+    def __init__(self, network: Network, flown: Mapping[int, Track], order: Order) -> None:
+        self._network, self._tracks, self._order = network, flown, order
+        self._ordered: dict[int, tuple[float, ...]] = {}
+        self._next_s: dict[int, float] = {}
+        network.clock.call_at(0.0, self._look, None)
+
+    def _look(self, _: object) -> None:
+        now_s = self._network.clock.now_s
+        for node, track in self._tracks.items():
+            goal = track.leg_at(now_s).end
+            if goal != self._ordered.get(node) and now_s >= self._next_s.get(node, 0.0):
+                self._ordered[node], self._next_s[node] = goal, now_s + LEAST_BETWEEN_ORDERS_S
+                self._set_speed(node, track, now_s)
+                x, y, height = goal
+                self._order(node, x, y, round(height))
+        self._network.clock.call_at(now_s + LOOK_S, self._look, None)
+
+    def _set_speed(self, node: int, track: Track, now_s: float) -> None:
+        velocity = track.velocity_at(now_s)
+        speed_m_s = sum(part**2 for part in velocity) ** 0.5
+        if speed_m_s:
+            self._network.nodes[node].drone.speed_m_s = speed_m_s

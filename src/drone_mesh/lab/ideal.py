@@ -20,8 +20,7 @@ from drone_mesh.lab.ideal_plans import IDEAL_PLANS, ROUNDING_M
 from drone_mesh.lab.metrics import METRICS, STACKED_M, covered
 from drone_mesh.lab.picking import cut_vertices_of
 from drone_mesh.lab.places import draw_places
-from drone_mesh.lab.scenario import Scenario
-from drone_mesh.lab.streams import Streams
+from drone_mesh.lab.scenario import Scenario, Streams
 
 STEP_S = 0.1  # as in the published simulations
 ARRIVED_M = 1e-9

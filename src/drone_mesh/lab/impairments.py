@@ -14,9 +14,8 @@ from drone_mesh.drone.location import Location
 from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.radio import InProcessAir
 from drone_mesh.inprocess.shared_air import SharedAir
-from drone_mesh.lab.faults import Jam
-from drone_mesh.lab.scenario import Scenario
-from drone_mesh.lab.streams import Streams
+from drone_mesh.lab.scenario import Scenario, Streams
+from drone_mesh.lab.scenario_parts import Jam
 from drone_mesh.nrf24.emulator.links import OUTDOORS, Hop
 
 _FREE_SPACE = 2.0  # exponent of the path loss, as in IdealDisc

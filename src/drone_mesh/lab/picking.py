@@ -8,9 +8,9 @@ from typing import Collection, Sequence
 
 from drone_mesh.air.graph import Graph
 from drone_mesh.inprocess import Network
-from drone_mesh.lab.faults import Pick
 from drone_mesh.lab.impairments import Impairments
 from drone_mesh.lab.network_sample import gateways_of, physical_graph
+from drone_mesh.lab.scenario_parts import Pick
 
 
 def pick_drones(

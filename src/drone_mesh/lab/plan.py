@@ -43,10 +43,18 @@ class Plan:
         self.seeds = loaded.experiment.seeds if seeds is None else seeds
         self.own_metrics = tuple(name for name in loaded.experiment.metrics if ":" in name)
         self._hashes: dict[tuple[str, ...], str] = {}
-        self._texts = [as_json(cell.scenario) for cell in self.cells]
+        self._texts = [
+            json.dumps(cell.scenario.model_dump(mode="json", exclude_none=True))
+            for cell in self.cells
+        ]
         self._folder = str(loaded.folder.resolve())
         self._own_code = [self._code_of(cell.scenario) for cell in self.cells]
-        self._identities = [identity(cell.scenario) for cell in self.cells]
+        # The values that differ from the defaults. Therefore a parameter added in a later version
+        # does not change old run ids; a changed default requires a new SCHEMA.
+        self._identities = [
+            cell.scenario.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
+            for cell in self.cells
+        ]
 
     def _code_of(self, scenario: Scenario) -> str:
         names = (scenario.routing, scenario.repair, *self.own_metrics)
@@ -83,20 +91,6 @@ class Plan:
         for text in self._texts:
             columns.update(dict.fromkeys(flatten(json.loads(text))))
         return list(columns)
-
-
-def as_json(scenario: Scenario) -> str:
-    """The scenario with all its defaults."""
-    return json.dumps(scenario.model_dump(mode="json", exclude_none=True), separators=(",", ":"))
-
-
-def identity(scenario: Scenario) -> Any:
-    """The parts of a scenario that identify it: the values that differ from the defaults.
-
-    Therefore a parameter added in a later version does not change old run ids; a changed default
-    requires a new SCHEMA.
-    """
-    return scenario.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
 
 
 def run_id(what: Any, seed: int, repetition: int, own_metrics: Sequence[str]) -> str:

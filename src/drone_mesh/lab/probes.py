@@ -43,11 +43,10 @@ class ProbeSender:
         count = int(probes.per_s * max(0.0, last_s - probes.from_s))
         for kind in KINDS[:-1] if probes.between == "gateway" else KINDS[-1:]:
             for _ in range(count):
-                at_s, draw = rng.uniform(probes.from_s, last_s), rng.random()
-                if kind == "any":
-                    network.clock.call_at(at_s, self._send_between_any, (draw, rng.random()))
-                else:
-                    network.clock.call_at(at_s, self._send, (kind, draw))
+                at_s, draws = rng.uniform(probes.from_s, last_s), [rng.random()]
+                if kind == "any":  # first the sender, then the receiver
+                    draws.append(rng.random())
+                network.clock.call_at(at_s, self._send, (kind, draws))
 
     def results(self) -> list[ProbeFate]:
         """The probes with the fates of the messages; to be called once, at the end."""
@@ -66,52 +65,30 @@ class ProbeSender:
                 self._note(probe, received_s - probe.sent_s)
         return self.sent
 
-    def _send(self, what: tuple[str, float]) -> None:
-        kind, draw = what
-        network = self._network
-        graph = physical_graph(network)
-        gateways = gateways_of(network)
-        hops = graph.hops_from(gateways)
-        fit = [node for node in sorted(hops) if not network.nodes[node].is_gateway]
+    def _send(self, what: tuple[str, list[float]]) -> None:
+        kind, (*draw_sender, draw) = what
+        network, graph = self._network, physical_graph(self._network)
+        senders = gateways_of(network)
+        if draw_sender:
+            nodes = sorted(graph.near)
+            senders = [nodes[int(draw_sender[0] * len(nodes))]]
+        hops = graph.hops_from(senders)
+        fit = [node for node in sorted(hops) if node not in senders]
         if not fit:
             return
         node = fit[int(draw * len(fit))]
-        number = len(self.sent)
+        payload = len(self.sent).to_bytes(4, "big")
         probe = ProbeFate(kind, node, network.clock.now_s, hops[node])
         self.sent.append(probe)
-        payload = number.to_bytes(4, "big")
-        try:
+        with contextlib.suppress(MeshError):  # its queue is full, for example: the probe is lost
             if kind == "up":
                 network.send(node, TO_GATEWAY, payload, PORT, reliable=False)
                 return
-            gateway = self._nearest(gateways, node, hops[node])
-            if kind == "down":
-                network.send(gateway, node, payload, PORT, reliable=False)
+            sender = next(one for one in senders if graph.hops_from([one]).get(node) == hops[node])
+            if kind == "echo":
+                network.echo(sender, node, lambda answer: self._answered(probe, answer))
             else:
-                network.echo(gateway, node, lambda answer: self._answered(probe, answer))
-        except MeshError:
-            pass  # its queue is full, for example: the probe is lost
-
-    def _send_between_any(self, draws: tuple[float, float]) -> None:
-        network = self._network
-        graph = physical_graph(network)
-        nodes = sorted(graph.near)
-        sender = nodes[int(draws[0] * len(nodes))]
-        hops = graph.hops_from([sender])
-        receivers = [node for node in sorted(hops) if node != sender]
-        if not receivers:
-            return
-        node = receivers[int(draws[1] * len(receivers))]
-        number = len(self.sent)
-        self.sent.append(ProbeFate("any", node, network.clock.now_s, hops[node]))
-        with contextlib.suppress(MeshError):  # as above
-            network.send(sender, node, number.to_bytes(4, "big"), PORT, reliable=False)
-
-    def _nearest(self, gateways: list[int], node: int, hops: int) -> int:
-        if len(gateways) == 1:
-            return gateways[0]
-        graph = physical_graph(self._network)
-        return next(g for g in gateways if graph.hops_from([g]).get(node) == hops)
+                network.send(sender, node, payload, PORT, reliable=False)
 
     def _answered(self, probe: ProbeFate, answer: EchoAnswer) -> None:
         probe.hops = answer.hops

@@ -18,11 +18,11 @@ from drone_mesh.lab.figures import (
     survival_drawing,
 )
 from drone_mesh.lab.metrics import METRICS
-from drone_mesh.lab.program import PROGRAM
 from drone_mesh.lab.results import Results, load_results
 from drone_mesh.lab.run_report.drawing import in_style, svg_element, svg_of_its_own
 from drone_mesh.lab.store import EXPERIMENT
 from drone_mesh.lab.tables import Table, all_tables
+from drone_mesh.lab.terminal import PROGRAM
 
 _TEMPLATE = Path(__file__).resolve().parent / "report.html"
 PNG_DPI = 200

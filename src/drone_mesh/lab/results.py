@@ -9,7 +9,6 @@ from typing import Iterable, Mapping, NamedTuple, Sequence
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.lab import extensions
 from drone_mesh.lab.experiment import LoadedExperiment, as_text, load_experiment
-from drone_mesh.lab.metrics import METRICS
 from drone_mesh.lab.plan import Plan, PlannedRun
 from drone_mesh.lab.store import (
     EXPERIMENT,
@@ -41,7 +40,7 @@ class Results(NamedTuple):
     def metrics(self) -> list[str]:
         """The columns that the experiment requests."""
         wanted = self.loaded.experiment.metrics or DEFAULT_METRICS
-        return [extensions.own_column(name) if ":" in name else name for name in wanted]
+        return list(map(extensions.column_of, wanted))
 
     def only(self, text: str, metrics: Sequence[str] = ()) -> Results:
         """The cells that match axis=value[,axis=value...], with these metrics if there are any.
@@ -107,11 +106,11 @@ class Results(NamedTuple):
         """A number of runs of a cell in a table, marked if their code is not the same."""
         return f"{runs} (mixed code)" if len(self.codes(cell)) > 1 else str(runs)
 
-    def paired(self, a: int, b: int, metric: str) -> tuple[list[float], list[float]]:
-        """A metric in two cells, for the seeds for which both have a value, in the same order."""
+    def pairs(self, a: int, b: int) -> tuple[list[Row], list[Row]]:
+        """The rows of two cells for the seeds that both have, in the same order."""
         in_a, in_b = self.of_cell(a), self.of_cell(b)
         both = sorted(in_a.keys() & in_b)
-        return paired([in_a[r] for r in both], [in_b[r] for r in both], metric)
+        return [in_a[r] for r in both], [in_b[r] for r in both]
 
     @property
     def axis_names(self) -> dict[str, str]:
@@ -171,11 +170,6 @@ def paired(a: Iterable[Row], b: Iterable[Row], metric: str) -> tuple[list[float]
     values = ((number(x, metric), number(y, metric)) for x, y in zip(a, b))
     whole = [(x, y) for x, y in values if x is not None and y is not None]
     return [x for x, _ in whole], [y for _, y in whole]
-
-
-def is_share(column: str) -> bool:
-    """Whether every run has 0 or 1 in this column."""
-    return column in METRICS and METRICS[column].is_share
 
 
 def _last_words(axis: str) -> str:

@@ -1,6 +1,7 @@
-"""One run as an experiment file describes it: layout, radio, techniques and faults."""
+"""One run as an experiment file describes it, and its streams of random numbers."""
 
 # Pydantic reads these annotations when the module is loaded, and Python 3.8 has no list[int].
+import random
 from typing import ClassVar, Dict, FrozenSet, List, Optional, Tuple, Union
 
 from pydantic import Field, field_validator, model_validator
@@ -15,9 +16,10 @@ from drone_mesh.drone.fleet import MAX_DRONES
 from drone_mesh.drone.flight_path import SPEED_M_S
 from drone_mesh.drone.goal import MAX_HEIGHT_M
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.lab.experiment_parts import (
+from drone_mesh.lab.scenario_parts import (
     Above0,
     AtLeast0,
+    Fault,
     NodeId,
     Part,
     PartOfKind,
@@ -25,7 +27,6 @@ from drone_mesh.lab.experiment_parts import (
     Share,
     part_with_settings,
 )
-from drone_mesh.lab.faults import Fault
 from drone_mesh.mobility import Mobility
 from drone_mesh.mobility.settings import Knot
 from drone_mesh.mobility.settings import check as check_mobility
@@ -272,31 +273,38 @@ class Scenario(Part):
     speed_m_s: Annotated[float, Field(gt=0, le=100)] = SPEED_M_S  # of flights
 
     @model_validator(mode="after")
-    def _suits_its_radio(self) -> "Scenario":
-        if self.radio.kind != "disc":
-            for fault in self.faults:
-                if fault.action in ("cut_link", "loss"):
-                    raise ValueError(f"fault {fault.action} is for the disc radio")
-            if self.sequence is not None:
-                raise ValueError("a sequence is for the disc radio")
-        return self
-
-    @model_validator(mode="after")
-    def _suits_its_model(self) -> "Scenario":
-        if self.model == "ideal" and self.mobility.kind != "none":
+    def _is_consistent(self) -> "Scenario":
+        is_disc, is_moved = self.radio.kind == "disc", self.mobility.kind != "none"
+        actions = [fault.action for fault in self.faults]
+        for action in actions:
+            if action in ("cut_link", "loss") and not is_disc:
+                raise ValueError(f"fault {action} is for the disc radio")
+        if self.sequence is not None and not is_disc:
+            raise ValueError("a sequence is for the disc radio")
+        if self.model == "ideal" and is_moved:
             raise ValueError("model ideal: only repairs move drones there, mobility does not")
-        return self
-
-    @model_validator(mode="after")
-    def _measures_one_load(self) -> "Scenario":
-        actions = [fault.action for fault in self.faults if fault.action in ("send", "load")]
-        if "load" in actions and len(actions) > 1:
+        if "load" in actions and actions.count("load") + actions.count("send") > 1:
             raise ValueError("a load says from when on messages count: no other load or send fits")
-        return self
-
-    @model_validator(mode="after")
-    def _has_batteries_that_flights_empty(self) -> "Scenario":
-        is_piloted = self.mobility.kind != "none" and not self.mobility.told
+        is_piloted = is_moved and not self.mobility.told
         if is_piloted and any(f.battery and f.battery.fly_m is not None for f in self.faults):
             raise ValueError("battery.fly_m counts no flights of pilots (mobility): use live_min")
         return self
+
+
+class Streams:
+    """The random generators of one run.
+
+    The r-th repetition has the same streams in every cell of an experiment (common random numbers):
+    the same layout, victims and losses, whatever the technique under test draws.
+    """
+
+    def __init__(self, seed: int, repetition: int) -> None:
+        self._root = f"{seed}/{repetition}"
+
+    def generator(self, purpose: str) -> random.Random:
+        """A generator for this purpose; equal for equal seed, repetition and purpose."""
+        return random.Random(f"{self._root}/{purpose}")  # seeded by SHA-512, equal in each Python
+
+    def number(self, purpose: str) -> int:
+        """A 32-bit seed for a part that wants a number."""
+        return self.generator(purpose).getrandbits(32)

@@ -12,9 +12,8 @@ from drone_mesh.errors import ConfigurationError
 from drone_mesh.inprocess.radio import InProcessAir
 from drone_mesh.lab.network_sample import physical_graph
 from drone_mesh.lab.record import RunRecord
-from drone_mesh.lab.scenario import Layout, Radio, Scenario, Sequence
+from drone_mesh.lab.scenario import Layout, Radio, Scenario, Sequence, Streams
 from drone_mesh.lab.simulation import Simulation
-from drone_mesh.lab.streams import Streams
 
 GATEWAY = 0
 CONNECTED_WITHIN_S = 60.0

@@ -7,6 +7,7 @@ import json
 import os
 import shutil
 import sys
+import time
 from typing import NamedTuple, NoReturn, Sequence
 
 from drone_mesh.errors import ConfigurationError, MeshError
@@ -16,6 +17,8 @@ from drone_mesh.lab.record import RunRecord
 from drone_mesh.lab.results import Results, load_results
 from drone_mesh.lab.worker import scenario_of, simulation_of
 from drone_mesh.state.model import MeshStatus
+
+POLL_PERIOD_S = 0.5  # period of checks for Ctrl-C
 
 
 class Replay(NamedTuple):
@@ -70,10 +73,8 @@ def show_run(options: argparse.Namespace) -> int:
     if options.page is not None:
         _write_page(options, shown, title)
     elif options.console:
-        from drone_mesh.lab.replay_server import serve_replay
-
         print(verdict)  # before it serves, which lasts until Ctrl-C
-        serve_replay(shown.states, shown.record.events, title, options.port)
+        _serve(shown, title, options.port)
     else:
         _print_story(shown)
     if not options.console:
@@ -120,3 +121,33 @@ def _write_page(options: argparse.Namespace, shown: Replay, title: str) -> None:
     except OSError as error:
         raise MeshError(f"cannot write {options.page}: {error.strerror}") from error
     print(f"wrote {options.page}")
+
+
+def _serve(shown: Replay, title: str, port: int) -> None:
+    """The web console with a time line, until Ctrl-C.
+
+    Raises ConfigurationError if the port is not available.
+    """
+    # Only this needs the console.
+    from drone_mesh.console.controls import RecordingControls
+    from drone_mesh.console.frame_store import FrameStore
+    from drone_mesh.console.history import History
+    from drone_mesh.console.runner import ConsoleRunner
+    from drone_mesh.console.server import ConsoleServer
+    from drone_mesh.web import LOOPBACK
+    from drone_mesh.web.access import Access
+
+    whole = History.of_run(shown.states, shown.record.events)
+    server = ConsoleServer(
+        FrameStore(), RecordingControls(), Access(), recording=title, whole=whole, is_played=False
+    )
+    runner = ConsoleRunner(server, LOOPBACK, port)
+    runner.start()
+    print(f"{title}: {runner.url}  (Ctrl-C ends it)", flush=True)
+    try:
+        while True:
+            time.sleep(POLL_PERIOD_S)
+    except KeyboardInterrupt:
+        pass
+    finally:
+        runner.stop()

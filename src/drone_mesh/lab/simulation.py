@@ -15,9 +15,9 @@ from drone_mesh.channel.statistics import RadioStatistics
 from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.radio import InProcessAir
 from drone_mesh.lab.flights import Flights
+from drone_mesh.lab.formations import ToldPilots, tracks
 from drone_mesh.lab.impairments import Impairments, OneWay
 from drone_mesh.lab.metrics import STACKED_M
-from drone_mesh.lab.movement import ToldPilots, tracks
 from drone_mesh.lab.network_sample import (
     LinkWatch,
     NetworkSample,
@@ -27,11 +27,15 @@ from drone_mesh.lab.network_sample import (
     sample_of,
 )
 from drone_mesh.lab.probes import ProbeSender
-from drone_mesh.lab.propagation import ChannelAir, obstacles_of, put_obstacles
 from drone_mesh.lab.record import AirFigures, Place, RunRecord, ServiceGap, Topology
-from drone_mesh.lab.scenario import Scenario
-from drone_mesh.lab.scenario_network import network_of, places_of
-from drone_mesh.lab.streams import Streams
+from drone_mesh.lab.scenario import Scenario, Streams
+from drone_mesh.lab.scenario_network import (
+    ChannelAir,
+    network_of,
+    obstacles_of,
+    places_of,
+    put_obstacles,
+)
 from drone_mesh.lab.timeline import Timeline
 from drone_mesh.mobility import Track
 from drone_mesh.state.model import MeshStatus

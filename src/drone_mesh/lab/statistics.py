@@ -31,7 +31,6 @@ class Interval(NamedTuple):
     low: float
     high: float
     n: int
-    note: str = ""  # a remark on its method
 
     def __str__(self) -> str:
         if math.isnan(self.value):
@@ -48,9 +47,9 @@ def mean_interval(values: Sequence[float]) -> Interval:
         return Interval(math.nan, math.nan, math.nan, 0)
     value = float(np.mean(values))
     if n < FEWEST:
-        return Interval(value, math.nan, math.nan, n, "too few runs for an interval")
+        return Interval(value, math.nan, math.nan, n)
     if math.isclose(min(values), max(values), rel_tol=ROUNDING):  # BCa is not defined there
-        return Interval(value, value, value, n, "all runs are equal")
+        return Interval(value, value, value, n)
     found = stats.bootstrap(
         (np.asarray(values, float),),
         np.mean,

@@ -15,7 +15,7 @@ from typing import Any, Iterable, Iterator, Mapping, Sequence
 
 from drone_mesh.errors import MeshError
 from drone_mesh.lab.plan import Plan, flatten
-from drone_mesh.lab.program import PROGRAM
+from drone_mesh.lab.terminal import PROGRAM
 from drone_mesh.lab.worker import Outcome, as_cell, metric_columns
 
 FIRST_COLUMNS = ("run", "seed", "repetition")
@@ -127,7 +127,6 @@ class Store:
                 "restored_s": "" if outage.restored_s is None else as_cell(outage.restored_s),
             }
             for outage in outcome.outages
-            if self._plan.loaded.experiment.output == "runs_and_outages"
         ]
         self._insert("runs", spec.run, outcome.code, json.dumps(row), json.dumps(outages))
         self.codes[spec.run] = outcome.code

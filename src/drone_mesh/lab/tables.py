@@ -9,9 +9,8 @@ from dataclasses import dataclass
 from typing import Mapping, Sequence
 
 from drone_mesh.lab.experiment import as_text
-from drone_mesh.lab.metrics.registry import METRICS, is_censored, unit_of
-from drone_mesh.lab.program import PROGRAM
-from drone_mesh.lab.results import Results, Row, is_share, number
+from drone_mesh.lab.metrics.registry import METRICS, is_censored, is_share, unit_of
+from drone_mesh.lab.results import Results, Row, number, paired
 from drone_mesh.lab.statistics import (
     Interval,
     Survival,
@@ -21,6 +20,7 @@ from drone_mesh.lab.statistics import (
     share_interval,
     survival,
 )
+from drone_mesh.lab.terminal import PROGRAM
 
 HEALED_BY_S = (30.0, 60.0, 120.0, 300.0)
 WORST_SHOWN = 8
@@ -181,16 +181,16 @@ def paired_table(results: Results) -> Table | None:
         if base is None:
             continue
         for metric in results.metrics:
-            xs, ys = results.paired(base, index, metric)
+            xs, ys = paired(*results.pairs(base, index), metric)
             seeds = max(results.marked(one, len(xs)) for one in (base, index))
             found.append((cell.values, metric, seeds, paired_difference(xs, ys)))
-    adjusted = holm([paired.p for *_, paired in found])
+    adjusted = holm([compared.p for *_, compared in found])
     rows = [
         [
-            *map(as_text, values.values()), _with_unit(metric), n, str(paired.difference),
-            _verdict(paired.difference, p, metric), "-" if math.isnan(p) else f"{p:.2g}",
+            *map(as_text, values.values()), _with_unit(metric), n, str(compared.difference),
+            _verdict(compared.difference, p, metric), "-" if math.isnan(p) else f"{p:.2g}",
         ]
-        for (values, metric, n, paired), p in zip(found, adjusted)
+        for (values, metric, n, compared), p in zip(found, adjusted)
     ]  # fmt: skip
     difference = f"difference to {as_text(compare.baseline)}"
     header = [*results.axis_names.values(), "metric", "seeds", difference, "", "p (Holm)"]

@@ -12,18 +12,24 @@ from drone_mesh.communication.data.outgoing import Ticket
 from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.errors import QueueFull
 from drone_mesh.inprocess import Network
-from drone_mesh.lab.faults import Fault, StartCondition, parse_condition
 from drone_mesh.lab.flights import Flights
 from drone_mesh.lab.formations import Formations
 from drone_mesh.lab.impairments import Impairments
 from drone_mesh.lab.network_sample import NetworkSample, gateways_of
 from drone_mesh.lab.picking import pick_drones
-from drone_mesh.lab.propagation import put_noise
-from drone_mesh.lab.scenario import Scenario
-from drone_mesh.lab.streams import Streams
+from drone_mesh.lab.scenario import Scenario, Streams
+from drone_mesh.lab.scenario_network import put_noise
+from drone_mesh.lab.scenario_parts import Fault, StartCondition, parse_condition
 
 HEALING_STARTS_WITH = frozenset({"kill", "mute", "deaf", "cut_link", "jam", "gateway_off"})
 """Faults from which the time to heal is measured."""
+
+_FIRST = {
+    MeshEventKind.FLIGHT_DECIDED: "the first flight",
+    MeshEventKind.FLIGHT_ORDERED: "the first flight",
+    MeshEventKind.LANDED: "the first landing",
+    MeshEventKind.DISCONNECTED: "the first loss",
+}
 
 
 class Happened(NamedTuple):
@@ -104,14 +110,9 @@ class Timeline:
             self._seen.setdefault("all connected", sample.now_s)
             if self.first_disruption_s is not None and sample.now_s > self.first_disruption_s:
                 self._seen.setdefault("healed", sample.now_s)
-        flown = (MeshEventKind.FLIGHT_DECIDED, MeshEventKind.FLIGHT_ORDERED)
         for event in self._network.events[self._events_read :]:
-            if event.kind in flown:
-                self._seen.setdefault("the first flight", event.now_s)
-            elif event.kind is MeshEventKind.LANDED:
-                self._seen.setdefault("the first landing", event.now_s)
-            elif event.kind is MeshEventKind.DISCONNECTED:
-                self._seen.setdefault("the first loss", event.now_s)
+            if event.kind in _FIRST:
+                self._seen.setdefault(_FIRST[event.kind], event.now_s)
         self._events_read = len(self._network.events)
 
     def _start(self, index: int) -> None:
@@ -154,13 +155,16 @@ class Timeline:
         for node in nodes:
             self._network.power(node, on)
 
+    def _picked(self, fault: Fault, rng: random.Random, alive: bool = True) -> list[int]:
+        return pick_drones(fault.what, alive, self._network, self._impairments, rng)
+
     def _kill(self, fault: Fault, rng: random.Random) -> list[int]:
-        nodes = pick_drones(fault.what, True, self._network, self._impairments, rng)
+        nodes = self._picked(fault, rng)
         self._power(nodes, False)
         return nodes
 
     def _revive(self, fault: Fault, rng: random.Random) -> list[int]:
-        nodes = pick_drones(fault.what, False, self._network, self._impairments, rng)
+        nodes = self._picked(fault, rng, alive=False)
         self._power(nodes, True)
         return nodes
 
@@ -171,7 +175,7 @@ class Timeline:
         return self._break(fault, rng, self._impairments.one_way.deaf)
 
     def _break(self, fault: Fault, rng: random.Random, broken: set[int]) -> list[int]:
-        nodes = pick_drones(fault.what, True, self._network, self._impairments, rng)
+        nodes = self._picked(fault, rng)
         broken.update(nodes)
         self._after(fault.what.for_s, lambda _: broken.difference_update(nodes))
         return nodes

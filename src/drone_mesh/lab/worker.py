@@ -19,10 +19,9 @@ from drone_mesh.lab.metrics import METRICS, measure_all
 from drone_mesh.lab.plan import RunSpec
 from drone_mesh.lab.provenance import code_with, imported_code
 from drone_mesh.lab.record import RunRecord, ServiceGap
-from drone_mesh.lab.scenario import Scenario
+from drone_mesh.lab.scenario import Scenario, Streams
 from drone_mesh.lab.sequence import SequenceRun
 from drone_mesh.lab.simulation import Simulation
-from drone_mesh.lab.streams import Streams
 
 
 class Outcome(NamedTuple):
@@ -52,7 +51,7 @@ def execute(spec: RunSpec) -> Outcome:
     """Execute a run. Never raises for an error of the run, which is part of the outcome."""
     started = time.perf_counter()
     try:
-        with quiet_nodes(), _Alarm(spec.timeout_s):
+        with quiet_nodes(), _alarm(spec.timeout_s):
             values, event_hash, outages = _measure(spec)
     except KeyboardInterrupt:
         raise
@@ -63,10 +62,8 @@ def execute(spec: RunSpec) -> Outcome:
             message = f"{type(error).__name__}: {message}"
         else:
             message = f"still running after {spec.timeout_s:g} s of wall time"
-        wall_s, words = time.perf_counter() - started, traceback.format_exc()
-        return Outcome(
-            spec, wall_s, code_with(spec.own_code), failure=kind, message=message, traceback=words
-        )
+        failure = {"failure": kind, "message": message, "traceback": traceback.format_exc()}
+        return Outcome(spec, time.perf_counter() - started, code_with(spec.own_code), **failure)
     wall_s = time.perf_counter() - started
     return Outcome(spec, wall_s, code_with(spec.own_code), values, event_hash, outages)
 
@@ -99,7 +96,7 @@ def measured(record: RunRecord, own_metrics: tuple[str, ...]) -> dict[str, float
     """All metrics of a run, with the user's own ones last."""
     values = measure_all(record)
     for name in own_metrics:
-        values[extensions.own_column(name)] = float(extensions.own_metric(name)(record))
+        values[extensions.column_of(name)] = float(extensions.own_metric(name)(record))
     return values
 
 
@@ -111,7 +108,7 @@ def scenario_of(text: str) -> Scenario:
 
 def metric_columns(own_metrics: tuple[str, ...]) -> list[str]:
     """The metric columns of runs.csv."""
-    return [*METRICS, *map(extensions.own_column, own_metrics)]
+    return [*METRICS, *map(extensions.column_of, own_metrics)]
 
 
 def as_cell(value: float) -> str:
@@ -119,35 +116,30 @@ def as_cell(value: float) -> str:
     return "" if math.isnan(value) else f"{round(value, 6):.10g}"
 
 
-class _Alarm:
+@contextlib.contextmanager
+def _alarm(seconds: float) -> Iterator[None]:
     """Raises RunTimeout in the thread that entered it when the time is over.
 
     A signal would reach only the main thread, but a worker runs its tasks in another one. It stops
     Python code, even an endless loop, but not a library call that never returns.
     """
+    thread, lock, over = threading.get_ident(), threading.Lock(), threading.Event()
 
-    def __init__(self, seconds: float) -> None:
-        self._seconds = seconds
-        self._lock = threading.Lock()
-        self._over = False
+    def ring() -> None:
+        with lock:
+            if not over.is_set():
+                raised = ctypes.py_object(RunTimeout)
+                ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), raised)
 
-    def __enter__(self) -> None:
-        self._thread = threading.get_ident()
-        self._timer = threading.Timer(self._seconds, self._ring)
-        self._timer.daemon = True
-        self._timer.start()
-
-    def __exit__(self, *_error: object) -> None:
-        with self._lock:
-            self._over = True
-        self._timer.cancel()
-
-    def _ring(self) -> None:
-        with self._lock:
-            if not self._over:
-                ctypes.pythonapi.PyThreadState_SetAsyncExc(
-                    ctypes.c_ulong(self._thread), ctypes.py_object(RunTimeout)
-                )
+    timer = threading.Timer(seconds, ring)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        with lock:
+            over.set()
+        timer.cancel()
 
 
 @contextlib.contextmanager

@@ -4,17 +4,156 @@ from __future__ import annotations
 
 import csv
 import gzip
+import math
+import re
 import zlib
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Iterable, Iterator, Sequence, Tuple
+from typing import Dict, Iterable, Iterator, List, Mapping, NamedTuple, Sequence, Tuple
 
-from drone_mesh.arguments import MOST, is_up_to
+from drone_mesh.arguments import MOST, finite, is_up_to
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.mobility.bonnmotion import read_bonnmotion
 from drone_mesh.mobility.gateway_record import FIRST_BYTE, answers, places
-from drone_mesh.mobility.knots import Knots, follows, number_in
-from drone_mesh.mobility.ns2_movement import is_ns2, read_ns2
 from drone_mesh.mobility.settings import Knot
+
+Knots = Dict[int, List[Knot]]  # by drone, in order of time
+
+
+def number_in(text: str, line: int, name: str = "") -> float:
+    """The number called `name` in this line. Raises ValueError, also for one above 1e9."""
+    try:
+        return finite(text)
+    except ValueError:
+        given = f"{name} {text}".strip()
+        raise ValueError(f"line {line}: expected numbers, not {given[:60]}") from None
+
+
+def follows(knot: Knot, before: Knot) -> bool:
+    """Whether this place can follow: its time is later, or equal at an equal place."""
+    return knot[0] > before[0] or knot == before
+
+
+_COLUMNS = {"#2D": 3, "#3D": 4}  # BonnMotion itself writes #3D only
+
+_Line = Tuple[int, List[float]]  # its number in the file, and the numbers in it
+
+
+def read_bonnmotion(lines: Iterable[str]) -> Knots:
+    """The k-th line that is no comment is drone k. Raises ValueError, which names the line.
+
+    Without a line #2D or #3D the times tell which it is, as they rise in each line.
+    """
+    drones: list[_Line] = []
+    readings = sorted(_COLUMNS.values())
+    for number, line in enumerate(lines, start=1):
+        if line.strip() in _COLUMNS:
+            readings = [_COLUMNS[line.strip()]]
+        elif line.strip() and not line.startswith("#"):
+            drones.append((number, [number_in(word, number) for word in line.split()]))
+    if not drones:
+        return {}
+    for number, numbers in drones:
+        if not any(_is_track(numbers, columns) for columns in readings):
+            wanted = " or ".join("t x y z"[: 2 * columns - 1] for columns in readings)
+            raise ValueError(f"line {number}: expected {wanted} again and again, with rising t")
+    fit = [c for c in readings if all(_is_track(numbers, c) for _number, numbers in drones)]
+    if len(fit) != 1:
+        both = "fits both t x y and t x y z" if fit else "has lines of t x y and lines of t x y z"
+        raise ValueError(f"{both}: say which it is in a first line #2D or #3D")
+    return {node: list(_knots(numbers, fit[0])) for node, (_number, numbers) in enumerate(drones)}
+
+
+def _is_track(numbers: list[float], columns: int) -> bool:
+    if len(numbers) % columns:
+        return False
+    knots = list(_knots(numbers, columns))
+    return all(follows(b, a) for a, b in zip(knots, knots[1:]))
+
+
+def _knots(numbers: list[float], columns: int) -> Iterator[Knot]:
+    for first in range(0, len(numbers), columns):
+        t, x, y, *z = numbers[first : first + columns]
+        yield t, x, y, z[0] if z else 0.0
+
+
+_START = re.compile(r"\$node_\(([0-9]{1,9})\)\s+set\s+([XYZ])_\s+([^\s;]+)\s*;?")
+_ORDER = re.compile(
+    r'\$ns_\s+at\s+(\S+)\s+"\s*\$node_\(([0-9]{1,9})\)\s+'
+    r'(?:setdest\s+(\S+)\s+(\S+)\s+([^\s"]+)|set\s+([XYZ])_\s+([^\s"]+))\s*"\s*;?'
+)
+# god_ counts hops; a variable moves nobody.
+_NO_MOVEMENT = re.compile(r'(\$god_\s.*|\$ns_\s+at\s+\S+\s+"\$god_\s.*|set\s.*)?')
+
+
+class _Statement(NamedTuple):
+    """Fly somewhere from this time on; at speed 0 it stays, at an infinite one it is there."""
+
+    at_s: float
+    to: Mapping[str, float]  # by axis; on the others it stays
+    speed_m_s: float
+
+
+def is_ns2(lines: Iterable[str]) -> bool:
+    """Whether these are the lines of such a file; no other trace has a line that begins so."""
+    return any(line.lstrip().startswith("$") for line in lines)
+
+
+def read_ns2(lines: Iterable[str]) -> Knots:
+    """Node k is drone k. Raises ValueError, which names the line."""
+    nodes: dict[int, _Ns2Node] = {}
+    for number, line in enumerate(lines, start=1):
+        statement = line.partition("#")[0].strip()
+        start, order = _START.fullmatch(statement), _ORDER.fullmatch(statement)
+        if start:
+            node, axis, value = start.groups()
+            place = nodes.setdefault(int(node), _Ns2Node()).start
+            place[axis] = number_in(value, number, f"{axis}_")
+        elif order:
+            at, node, to_x, to_y, speed, axis, value = order.groups()
+            to = {axis: value} if axis else {"X": to_x, "Y": to_y}
+            goal = {axis: number_in(word, number) for axis, word in to.items()}
+            speed_m_s = math.inf if axis else number_in(speed, number)
+            at_s = number_in(at, number)
+            if at_s < 0 or speed_m_s < 0:
+                raise ValueError(f"line {number}: time {at} and speed {speed} must be 0 or more")
+            nodes.setdefault(int(node), _Ns2Node()).orders.append(_Statement(at_s, goal, speed_m_s))
+        elif not _NO_MOVEMENT.fullmatch(statement):
+            raise ValueError(
+                f"line {number}: expected $node_(K) set X_ NUMBER (or Y_, Z_), "
+                f'$ns_ at TIME "$node_(K) setdest X Y SPEED" (or set X_ NUMBER), or a comment, '
+                f"not {line.strip()[:60]!r}"
+            )
+    return {node_id: list(nodes[node_id].knots()) for node_id in sorted(nodes)}
+
+
+@dataclass
+class _Ns2Node:
+    """One node of an ns-2 movement file: a new order replaces the one before."""
+
+    start: dict[str, float] = field(default_factory=dict)  # by axis; 0 where a file has none
+    orders: list[_Statement] = field(default_factory=list)
+
+    def knots(self) -> Iterator[Knot]:
+        place = {axis: self.start.get(axis, 0.0) for axis in "XYZ"}
+
+        def knot(at_s: float) -> Knot:
+            return at_s, place["X"], place["Y"], place["Z"]
+
+        yield knot(0.0)
+        orders = sorted(self.orders, key=lambda order: order.at_s)
+        ends_s = [order.at_s for order in orders[1:]] + [math.inf]
+        for (at_s, to, speed_m_s), replaced_s in zip(orders, ends_s):
+            yield knot(at_s)
+            goal = {**place, **to}
+            way_m = math.dist(tuple(place.values()), tuple(goal.values()))
+            if not way_m or way_m > speed_m_s * MOST:  # it stays, or is as slow as if it did
+                continue
+            needs_s, has_s = way_m / speed_m_s, replaced_s - at_s
+            share = 1.0 if needs_s <= has_s else has_s / needs_s
+            for axis, end in to.items():
+                place[axis] += (end - place[axis]) * share
+            yield knot(min(at_s + needs_s, replaced_s))
+
 
 TraceRow = Tuple[float, int, float, float, float]  # t (s), drone, x, y, z (m)
 

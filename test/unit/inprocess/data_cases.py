@@ -74,12 +74,6 @@ def run_case(seed, radio="disc"):
     return ""
 
 
-def fingerprint(seed):
-    """What the case of this seed did, to the last bit."""
-    network, _sent, tickets = play(seed)
-    return network.now_s(), network.received, [str(ticket) for ticket in tickets]
-
-
 def main(count=1000, radio="disc"):
     failures = {}
     for seed in range(int(count)):

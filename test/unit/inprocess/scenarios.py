@@ -19,13 +19,18 @@ def layout(case, seed=0, **options):
     return network
 
 
-def line(routers, spacing=6.0, seed=0, **options):
-    """Gateway 0 and routers 1, 2, ... in a line along x."""
-    network = Network(seed=seed, **options)
-    network.add_gateway(0, 0.0, 0.0)
-    for node in range(1, routers + 1):
-        network.add_router(node, spacing * node, 0.0)
+def placed(places, **options):
+    """Gateway 0 and routers 1, 2, ... at these x and y."""
+    network = Network(**options)
+    network.add_gateway(0, *places[0])
+    for node, place in enumerate(places[1:], start=1):
+        network.add_router(node, *place)
     return network
+
+
+def line(routers, spacing=6.0, **options):
+    """Gateway 0 and routers 1, 2, ... in a line along x."""
+    return placed([(spacing * node, 0.0) for node in range(routers + 1)], **options)
 
 
 def fleet(routers, gridsize, seed=0, gateways=1, **options):

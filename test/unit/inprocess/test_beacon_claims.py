@@ -6,6 +6,8 @@ import itertools
 import math
 
 import pytest
+from scenarios import line as in_line
+from scenarios import placed
 
 from drone_mesh.communication.beacon.packets import (
     NO_ANCESTORS,
@@ -32,19 +34,14 @@ KEY = MeshKey(bytes(range(16)))
 
 def line(**options):
     """Gateway 0, and routers 1 and 2 behind it."""
-    network = Network(seed=3, routing="beacon", **options)
-    network.add_gateway(0, 0.0, 0.0)
-    network.add_router(1, 6.0, 0.0)
-    network.add_router(2, 12.0, 0.0)
+    network = in_line(2, seed=3, routing="beacon", **options)
     network.run_for(60.0)
     return network
 
 
 def star(second_relay=False):
     """A gateway, a relay or two, and four routers behind them that all hear each other."""
-    network = Network(seed=1, routing="beacon")
-    network.add_gateway(0, 0.0, 0.0)
-    network.add_router(1, 7.0, 0.0)
+    network = in_line(1, spacing=7.0, seed=1, routing="beacon")
     for node, (x, y) in enumerate([(12.0, 2.0), (12.0, -2.0), (13.0, 0.0), (12.5, 4.0)], 2):
         network.add_router(node, x, y)
     if second_relay:
@@ -267,10 +264,7 @@ def test_a_node_without_beacons_that_leaves_has_not_fallen_silent():
 
 
 def test_a_drone_that_is_flown_while_the_internet_is_off_learns_whom_to_step_back_to():
-    network = Network(seed=1, routing="beacon")
-    network.add_gateway(0, 0.0, 0.0)
-    for node in range(1, 5):
-        network.add_router(node, 6.0 * node, 0.0)
+    network = in_line(4, seed=1, routing="beacon")
     network.add_router(9, 3.0, 3.0)
     network.run_for(30.0)
     network.internet(0, False)
@@ -305,11 +299,7 @@ def test_a_packet_that_is_held_is_tried_again_in_time():
 
 
 def test_a_child_of_a_dead_relay_tells_of_its_new_parent_at_once():
-    network = Network(seed=1, routing="beacon")
-    network.add_gateway(0, 0.0, 0.0)
-    network.add_router(1, 6.0, 2.0)
-    network.add_router(2, 6.0, -2.0)
-    network.add_router(3, 12.0, 0.0)
+    network = placed([(0.0, 0.0), (6.0, 2.0), (6.0, -2.0), (12.0, 0.0)], seed=1, routing="beacon")
     network.run_for(30.0)
     router = network.nodes[3].component
     parent = router.control.next_hop()

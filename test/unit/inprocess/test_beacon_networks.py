@@ -7,12 +7,12 @@ import math
 import random
 
 import pytest
+from scenarios import line, placed
 
 from drone_mesh.communication.beacon.packets import Beacon
 from drone_mesh.communication.data.outgoing import TicketState
 from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.communication.seals.keys import MeshKey
-from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.drone.location import Location
 from drone_mesh.inprocess import Network
@@ -170,10 +170,7 @@ def test_wrong_positions_cost_little():
 @pytest.mark.parametrize(("believed_m", "repaired_m"), [(-0.3, 0.0), (6.6, 7.0)])
 def test_a_repair_ends_at_whole_metres_of_height_and_not_under_the_ground(believed_m, repaired_m):
     """Others hear no other heights in a LOCATION, and altitudes of drones on the ground err."""
-    network = Network(seed=1, routing="beacon")
-    network.add_gateway(0, 0.0, 0.0)
-    network.add_router(1, 6.0, 0.0)
-    network.add_router(2, 12.0, 0.0)
+    network = line(2, seed=1, routing="beacon")
     for node in (network.nodes[0], network.nodes[1]):
         at = node.drone.get_location()._replace(height=believed_m)
         node.component.control._motion._locate = lambda at=at: at
@@ -216,10 +213,12 @@ def test_with_a_key_no_link_seems_to_lose_beacons_although_only_some_carry_a_pla
 
 def test_a_stranger_without_the_key_is_no_neighbour_of_those_who_have_it():
     key = MeshKey(bytes(range(16)))
-    network = Network(seed=1, key=lambda node: None if node == 2 else key, **CHANNEL)
-    network.add_gateway(0, 0.0, 0.0)
-    network.add_router(1, 6.0, 0.0)
-    network.add_router(2, 6.0, 5.0)
+    network = placed(
+        [(0.0, 0.0), (6.0, 0.0), (6.0, 5.0)],
+        seed=1,
+        key=lambda node: None if node == 2 else key,
+        **CHANNEL,
+    )
     network.run_for(20.0)
     assert network.connected(1)
     assert [2 in network.nodes[node].component.control.routes.neighbours for node in (0, 1)] == [
@@ -258,19 +257,10 @@ def test_a_dead_gateway_is_noticed_and_another_one_is_taken():
 
 
 def test_a_router_that_is_cut_off_knows_it_within_four_seconds():
-    network = Network(seed=1, **CHANNEL)
-    network.add_gateway(0, 0.0, 0.0)
-    network.add_router(1, 6.0, 0.0)
+    network = line(1, seed=1, **CHANNEL)
     network.run_for(5.0)
     network.power(0, False)
     assert network.run_until(lambda: not network.connected(1), within_s=4.0)
-
-
-@pytest.mark.parametrize(("given_s", "waits_s"), [(None, 10.0), (0.0, 10.0), (20.0, 20.0)])
-def test_a_router_waits_ten_seconds_before_its_repair_unless_the_user_sets_it(given_s, waits_s):
-    timing = None if given_s is None else MeshTiming(connection_lost_after_s=given_s)
-    network = grid(radio="disc", timing=timing)
-    assert network.nodes[1].component._timing.connection_lost_after_s == waits_s
 
 
 def test_an_ordered_flight_does_not_end_the_membership():
@@ -308,10 +298,7 @@ def test_a_message_for_a_node_that_nobody_announces_is_searched_for():
 
 
 def test_a_packet_without_a_next_hop_waits_for_two_and_a_half_seconds():
-    network = Network(seed=1, routing="beacon")
-    network.add_gateway(0, 0.0, 0.0)
-    network.add_router(1, 6.0, 0.0)
-    network.add_router(2, 12.0, 0.0)
+    network = line(2, seed=1, routing="beacon")
     network.run_for(10.0)
     network.power(2, False)
     network.echo(0, 2, lambda _answer: None)
@@ -329,10 +316,7 @@ def test_pilots_who_fly_the_fleet_cause_no_repair_flight():
 
 
 def test_a_repair_brings_back_a_group_behind_a_dead_relay():
-    network = Network(seed=1, routing="beacon")
-    network.add_gateway(0, 0.0, 0.0)
-    for node in (1, 2, 3):
-        network.add_router(node, 8.0 * node, 0.0)
+    network = line(3, spacing=8.0, seed=1, routing="beacon")
     network.run_for(10.0)
     network.power(1, False)
     assert network.run_until(lambda: network.connected(2) and network.connected(3), within_s=60.0)
@@ -340,10 +324,7 @@ def test_a_repair_brings_back_a_group_behind_a_dead_relay():
 
 def test_each_round_of_a_cut_off_chain_follows_soon_after_the_flight_before():
     """The flight that the others see is no motion, and nobody waits for those who have left."""
-    network = Network(seed=2, routing="beacon")
-    network.add_gateway(0, 0.0, 0.0)
-    for node in (1, 2, 3, 4):
-        network.add_router(node, 8.0 * node, 0.0)
+    network = line(4, spacing=8.0, seed=2, routing="beacon")
     network.run_for(10.0)
     network.power(1, False)
     network.run_for(5.0)
@@ -351,9 +332,7 @@ def test_each_round_of_a_cut_off_chain_follows_soon_after_the_flight_before():
 
 
 def test_those_who_lost_one_parent_remember_its_place_and_not_that_of_each_other():
-    network = Network(seed=1, routing="beacon")
-    network.add_gateway(0, 0.0, 0.0)
-    network.add_router(1, 8.0, 0.0)
+    network = line(1, spacing=8.0, seed=1, routing="beacon")
     for node, y in ((2, -3.0), (3, 0.0), (4, 3.0)):
         network.add_router(node, 14.0, y)
     network.run_for(10.0)
@@ -379,10 +358,7 @@ def test_a_mesh_that_has_just_come_up_knows_the_places_that_a_repair_needs():
 
 def test_in_flight_it_learns_no_place_to_step_back_to():
     """Beside its start it was connected through 1, and flies on from there."""
-    network = Network(seed=1, routing="beacon")
-    network.add_gateway(0, 0.0, 0.0)
-    network.add_router(1, 6.0, 0.0)
-    network.add_router(2, 12.0, 0.0)
+    network = line(2, seed=1, routing="beacon")
     network.run_for(10.0)
     places = network.nodes[2].component.places
     assert places.good_id == 1
@@ -395,9 +371,7 @@ def test_in_flight_it_learns_no_place_to_step_back_to():
 
 
 def test_a_repair_begins_ten_seconds_after_the_loss():
-    network = Network(seed=1, routing="beacon")
-    network.add_gateway(0, 0.0, 0.0)
-    network.add_router(1, 8.0, 0.0)
+    network = line(1, spacing=8.0, seed=1, routing="beacon")
     network.run_for(10.0)
     network.power(0, False)
     network.run_for(40.0)
@@ -411,16 +385,6 @@ def test_the_first_call_of_a_new_router_is_due_at_its_start_and_not_before():
     network.add_router(1, 0.0, 0.0, start_s=5.0)
     network.run_for(5.0)
     assert network.nodes[1].component.next_tick_s >= 5.0
-
-
-def test_the_emulated_chips_carry_it():
-    network = Network(seed=1, radio="chips", routing="beacon", rate="1M")
-    network.add_fleet(gateways=1, routers=8, gridsize=3, spacing=6.0)
-    assert network.run_until(network.all_connected, within_s=2.0)
-    answers = []
-    network.echo(0, 8, answers.append)
-    assert network.run_until(lambda: len(answers) == 1, within_s=1.0)
-    network.stop()
 
 
 @pytest.mark.parametrize("seed", [0, 9, 10])

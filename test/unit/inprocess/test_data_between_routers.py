@@ -8,6 +8,7 @@ import random
 
 import pytest
 import scenarios
+from scenarios import placed
 
 from drone_mesh.communication.node.node_configuration import ROUTING_TECHNIQUES
 from drone_mesh.communication.seals.keys import MeshKey
@@ -57,10 +58,7 @@ def between_two_gateways(**options):
 
 
 def test_a_message_and_an_echo_pass_through_the_gateway_between_two_routers():
-    network = Network(seed=1)
-    network.add_gateway(0, 0.0, 0.0)
-    network.add_router(1, -6.0, 0.0)
-    network.add_router(2, 6.0, 0.0)
+    network = placed([(0.0, 0.0), (-6.0, 0.0), (6.0, 0.0)], seed=1)
     network.run_for(30.0)
     ticket, answers = network.send(1, 2, b"hello"), []
     network.echo(2, 1, answers.append)

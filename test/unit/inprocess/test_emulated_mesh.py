@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 import random
-import threading
-import time
 from collections import Counter
 
 import pytest
-from wall_mesh import WallMesh
 
-from drone_mesh.communication.seals.keys import MeshKey
 from drone_mesh.inprocess import Network
 from drone_mesh.mobility import Area, Mobility, tracks_of
 from drone_mesh.nrf24.emulator.links import IdealDisc, LinkModel, LogDistance
-from drone_mesh.nrf24.settings import RadioSettings
 
 # casus.yaml, layout 101: three rows of two behind a gateway
 GATEWAY = (-1.0, 0.0)
@@ -69,25 +64,6 @@ def test_layout_101_connects_with_the_hops_of_2019_and_detours_when_router_3_is_
         assert statistics.sent == statistics.acknowledged + statistics.lost
 
 
-def test_a_mesh_in_the_time_of_the_wall_ends_all_its_threads_when_it_stops():
-    before = set(threading.enumerate())
-    mesh = WallMesh(IdealDisc(9.0), RadioSettings(), seed=1)
-    mesh.add(0, -1.0, 0.0, gateway=True)
-    mesh.add(1, -3.0, 4.0, gateway=False)
-    names = {thread.name for thread in threading.enumerate()}
-    assert "mesh" in names
-    wait_until(mesh.all_connected)
-    mesh.stop()
-    assert set(threading.enumerate()) <= before
-
-
-def wait_until(condition, within_s=60.0):
-    end_s = time.monotonic() + within_s
-    while not condition():
-        assert time.monotonic() < end_s
-        time.sleep(0.05)
-
-
 def test_a_drone_takes_its_chip_along_and_a_restarted_node_comes_back():
     mesh = Network(3, radio="chips")
     mesh.add_fleet(gateways=1, routers=9, gridsize=3, spacing=6.0)
@@ -119,16 +95,6 @@ def test_a_drone_whose_chip_answers_no_more_does_not_fly_until_it_does(routing):
     assert mesh.location(3) == here
     chip.faults.miso_stuck_at = None
     assert mesh.run_until(mesh.all_connected, within_s=30.0)
-    mesh.stop()
-
-
-def test_a_mesh_with_a_key_works_on_chips():
-    mesh = Network(3, radio="chips", key=MeshKey(bytes(range(16))))
-    mesh.add_fleet(gateways=1, routers=4, gridsize=2, spacing=6.0)
-    assert mesh.run_until(mesh.all_connected, within_s=60.0)
-    mesh.power(3, False)
-    mesh.run_for(1.0)
-    assert not mesh.nodes[3].antenna.on()
     mesh.stop()
 
 
@@ -164,29 +130,14 @@ def test_26_nodes_on_one_channel_connect_and_stay_connected():
 
 
 @pytest.mark.slow
-def test_the_fast_model_agrees_with_the_chips():
-    """A minute of 26 nodes, three seeds; experiments/model.yaml shows more."""
-    chips, model = Counter(), Counter()
-    for seed in (1, 2, 3):
-        mesh = grid(26, seed)
-        mesh.run_for(60.0)
-        chips.update(frames=mesh.air.frames, collisions=mesh.air.collisions)
-        mesh.stop()
-        network = Network(seed=seed, radio="shared")
-        network.add_fleet(1, 25, 5, 6.0)
-        network.run_for(60.0)
-        model.update(frames=network.air.frames, collisions=network.air.collisions)
-    assert model["frames"] == pytest.approx(chips["frames"], rel=0.15)
-    collided = chips["collisions"] / chips["frames"]
-    assert model["collisions"] / model["frames"] == pytest.approx(collided, abs=0.05)
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize(
-    ("speed_m_s", "fading"), [(0.3, "none"), (0.3, "rician"), (0.0, "rayleigh")]
+    ("speed_m_s", "fading"),
+    [(0.0, "none"), (0.3, "none"), (0.3, "rician"), (0.0, "rayleigh")],
 )
-def test_the_fast_model_agrees_with_the_chips_where_drones_move_and_links_fade(speed_m_s, fading):
-    """Half a minute of 17 nodes, three seeds, after 20 s at rest."""
+def test_the_fast_model_agrees_with_the_chips_also_where_drones_move_and_links_fade(
+    speed_m_s, fading
+):
+    """Half a minute of 17 nodes after 20 s at rest; experiments/model.yaml shows more."""
 
     def run(radio):
         total = Counter()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from scenarios import events, fleet, flown, run_until
+from scenarios import events, fleet, flown, line, run_until
 
 from drone_mesh.communication.interfaces import OrderState
 from drone_mesh.communication.seals.keys import MeshKey
@@ -120,10 +120,7 @@ def test_without_another_gateway_no_drone_is_connected_and_none_flies_for_that(r
 @pytest.mark.slow
 @pytest.mark.parametrize("routing", TECHNIQUES)
 def test_a_gateway_that_is_gone_besides_is_looked_for(routing):
-    network = Network(seed=1, routing=routing)
-    network.add_gateway(0, 0.0, 0.0)
-    for node in (1, 2, 3):
-        network.add_router(node, 6.0 * node, 0.0)
+    network = line(3, seed=1, routing=routing)
     network.run_for(30.0)
     network.internet(0, False)
     network.run_for(30.0)

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import pytest
+from scenarios import placed
 
 from drone_mesh.drone.location import Location
-from drone_mesh.inprocess import Network
 
 
 @pytest.mark.parametrize("radio", ["disc", "shared"])
 def test_a_drone_whose_relay_was_ordered_away_steps_to_where_that_stood(radio):
-    network = Network(seed=1, radio=radio)
-    network.add_gateway(0, 0.0, 0.0)
-    network.add_router(1, 0.0, 6.0)
-    network.add_router(2, 0.0, 12.0)
+    network = placed([(0.0, 0.0), (0.0, 6.0), (0.0, 12.0)], seed=1, radio=radio)
     assert network.run_until(network.all_connected, within_s=120.0)
     network.run_for(60.0)
     network.order(1, 15.0, 6.0)

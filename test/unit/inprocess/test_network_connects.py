@@ -19,7 +19,6 @@ from scenarios import (
 )
 
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.routing.child_table_tree import ChildTableTree
 from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError
@@ -29,7 +28,7 @@ from drone_mesh.inprocess.drone import InProcessDrone
 SHORT = ("STARTED", "CONNECTED", "DISCONNECTED", "EMERGENCY", "FLIGHT_DECIDED", "LANDED")
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(3))
 def test_sixteen_routers_6_m_apart_are_connected_within_15_s_by_short_paths(seed):
     network = fleet(16, gridsize=4, seed=seed)
     assert network.run_until(network.all_connected, within_s=15.0)
@@ -69,7 +68,7 @@ def test_a_gateway_that_starts_last_connects_all():
     assert_hops_are_paths(network, above_shortest=0)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize(("loss", "within_s"), [(0.1, 15.0), (0.2, 30.0)])
 def test_nodes_also_connect_over_a_lossy_and_jittery_air(loss, within_s, seed):
     network = fleet(16, gridsize=4, seed=seed, loss=loss, jitter_s=0.02)
@@ -93,12 +92,6 @@ def test_all_stay_connected_for_an_hour_and_nothing_grows():
     assert network.air.delivered - before - in_ten_minutes == pytest.approx(
         5 * in_ten_minutes, rel=0.05
     )
-
-
-def test_two_nodes_that_are_too_far_apart_stay_apart():
-    network = line(1, spacing=9.0)  # in range is less than 9 m
-    network.run_for(30.0)
-    assert not network.connected(1)
 
 
 def test_layout_101_has_the_hops_of_the_original():
@@ -200,19 +193,6 @@ def test_in_a_quiet_network_no_packet_goes_round():
     watch = AirWatch(network)
     network.run_for(60.0)
     assert 0 < watch.most_often_sent_on() <= hops_across(network)
-
-
-class Stranger(ChildTableTree):
-    """A technique from outside the package: chosen as test_network_connects:Stranger."""
-
-
-def test_another_routing_technique_is_used_by_all_when_it_is_named():
-    network = fleet(4, gridsize=2, routing="test_network_connects:Stranger")
-    assert all(
-        type(node.component.control.routes).__name__ == "Stranger"
-        for node in network.nodes.values()
-    )
-    assert network.run_until(network.all_connected, within_s=1.0)
 
 
 def test_an_id_is_given_once():

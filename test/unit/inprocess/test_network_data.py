@@ -16,10 +16,6 @@ def test_nor_on_one_channel_that_all_nodes_share():
     assert {seed: problem for seed, problem in problems.items() if problem} == {}
 
 
-def test_the_same_seed_gives_the_same_run():
-    assert data_cases.fingerprint(7) == data_cases.fingerprint(7)
-
-
 def test_a_node_that_lost_its_gateway_is_silent_about_messages_until_it_has_one_again():
     network = Network(seed=3, radio="shared")
     network.add_gateway(0, 0.0, 0.0)

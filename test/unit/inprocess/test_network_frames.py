@@ -10,11 +10,9 @@ from scenarios import line
 from drone_mesh.communication.control.places import CommonFrame
 from drone_mesh.communication.interfaces import OrderState
 from drone_mesh.communication.wire.messages import IntroduceMessage, frame_digest, with_frame_digest
-from drone_mesh.communication.wire.packet_types import TYPES_WITH_PLACES
 from drone_mesh.inprocess.drone import InProcessDrone
 
 ONE, OTHER = 0x1234, 0x4321
-LOCATION, MOVE_TO_LOCATION, NODE_REPORT, LAST_PLACE, GATEWAY_PLACE = 1, 6, 66, 69, 125
 
 
 @pytest.fixture
@@ -117,8 +115,3 @@ def test_a_place_is_taken_only_from_a_neighbour_with_the_same_origin(own, heard,
     if heard is not None:
         frame.heard(2, heard)
     assert frame.refuses(2) is refused
-
-
-def test_these_types_of_packets_carry_places():
-    places = {LOCATION, MOVE_TO_LOCATION, NODE_REPORT, GATEWAY_PLACE, LAST_PLACE}
-    assert places == TYPES_WITH_PLACES

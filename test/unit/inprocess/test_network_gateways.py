@@ -40,7 +40,7 @@ def test_heartbeats_between_two_gateways_do_not_multiply():
     assert 2 * 10 - 2 <= len(counted) <= 2 * 10 + 2
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_preferred_gateways_side_by_side_do_not_flap(seed):
     network = fleet(16, gridsize=4, gateways=2, seed=seed)
     network.run_for(15.0)
@@ -51,7 +51,7 @@ def test_preferred_gateways_side_by_side_do_not_flap(seed):
     assert_hops_are_paths(network)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_preferred_gateways_far_apart_settle_on_the_near_one_and_do_not_flap(seed):
     network = long_line(seed)
     network.run_for(60.0)
@@ -77,7 +77,7 @@ def test_killing_one_gateway_moves_its_routers_to_the_other(dead):
     assert flown(network) == set()
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_killing_one_far_gateway_moves_its_routers_to_the_other(seed):
     network = long_line(seed)
     network.run_for(60.0)

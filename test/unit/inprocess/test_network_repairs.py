@@ -17,6 +17,7 @@ from scenarios import (
     layout,
     line,
     outage,
+    placed,
     run_until,
 )
 
@@ -39,12 +40,7 @@ def stands_beside(network, node, x, y):
 
 def diamond(seed=0):
     """Gateway 0, router 3 behind routers 1 and 2, and router 4 behind it."""
-    network = Network(seed=seed)
-    network.add_gateway(0, 0.0, 0.0)
-    network.add_router(1, 5.0, 4.0)
-    network.add_router(2, 5.0, -4.0)
-    network.add_router(3, 10.0, 0.0)
-    network.add_router(4, 18.0, 0.0)
+    network = placed([(0.0, 0.0), (5.0, 4.0), (5.0, -4.0), (10.0, 0.0), (18.0, 0.0)], seed=seed)
     network.run_for(20.0)
     assert [network.hops(node) for node in range(1, 5)] == [1, 1, 2, 3]
     return network
@@ -53,7 +49,7 @@ def diamond(seed=0):
 # Detours and partitions ----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_packets_take_a_detour_when_a_relay_dies(seed):
     network = diamond(seed)
     relay = network.nodes[3].component.get_route_to_gateway()
@@ -120,10 +116,7 @@ def test_on_a_shared_channel_a_key_gives_neighbours_time_for_a_handshake_before_
     key, asks_s
 ):
     """A drone that has landed asks twice who is there; without an answer it stays where it is."""
-    network = Network(seed=1, radio="shared", key=key)
-    network.add_gateway(0, 0.0, 0.0)
-    network.add_router(1, 7.0, 0.0)
-    network.add_router(2, 14.0, 0.0)
+    network = line(2, spacing=7.0, seed=1, radio="shared", key=key)
     network.run_for(60.0)
     network.power(1, False)
     component = network.nodes[2].component
@@ -140,7 +133,7 @@ def test_on_a_shared_channel_a_key_gives_neighbours_time_for_a_handshake_before_
 # The layouts of the original's experiments ---------------------------------------------------
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_layout_101_heals_first_by_a_detour_and_then_by_a_flight(seed):
     network = layout(101, seed=seed)
     network.run_for(20.0)
@@ -161,7 +154,7 @@ def test_layout_101_heals_first_by_a_detour_and_then_by_a_flight(seed):
     assert [at_s for at_s, node, _ in events(network, "DISCONNECTED") if node in (1, 2)] == []
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_layout_102_without_its_middle_finds_a_detour_without_a_flight(seed):
     network = layout(102, seed=seed)
     network.run_for(20.0)
@@ -175,7 +168,7 @@ def test_layout_102_without_its_middle_finds_a_detour_without_a_flight(seed):
     assert flown(network) == set()
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(3))
 def test_layout_201_without_node_2_brings_node_3_beside_its_place(seed):
     network = layout(201, seed=seed)
     network.run_for(20.0)
@@ -188,7 +181,7 @@ def test_layout_201_without_node_2_brings_node_3_beside_its_place(seed):
     assert flown(network) == {3}
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(3))
 def test_layout_202_without_node_1_is_whole_again_within_two_minutes(seed):
     network = layout(202, seed=seed)
     network.run_for(20.0)
@@ -232,10 +225,7 @@ def test_a_drone_that_never_knew_a_gateway_stays():
 
 def test_of_a_group_the_one_that_is_farthest_from_the_gateway_flies():
     """3 and 4 both lost relay 2, and only they can take its place."""
-    network = Network()
-    network.add_gateway(0, 0.0, 0.0)
-    for node, (x, y) in enumerate([(8.0, 0.0), (16.0, 0.0), (23.0, 3.0), (23.0, -4.0)], start=1):
-        network.add_router(node, x, y)
+    network = placed([(0.0, 0.0), (8.0, 0.0), (16.0, 0.0), (23.0, 3.0), (23.0, -4.0)])
     network.run_for(20.0)
     network.power(2, False)
     network.run_for(15.0)
@@ -251,10 +241,7 @@ def test_of_a_group_the_one_that_is_farthest_from_the_gateway_flies():
 @pytest.mark.parametrize("victim", [3, 4])
 @pytest.mark.parametrize("after_s", [0.0, 0.001, 0.003, 1.0])
 def test_a_neighbour_that_dies_during_a_negotiation_does_not_delay_it(victim, after_s):
-    network = Network()
-    network.add_gateway(0, 0.0, 0.0)
-    for node, (x, y) in enumerate([(8.0, 0.0), (16.0, 0.0), (23.0, 3.0), (23.0, -4.0)], start=1):
-        network.add_router(node, x, y)
+    network = placed([(0.0, 0.0), (8.0, 0.0), (16.0, 0.0), (23.0, 3.0), (23.0, -4.0)])
     network.run_for(20.0)
     network.power(2, False)
     while not events(network, "NEGOTIATION_STARTED"):
@@ -325,7 +312,7 @@ def test_a_gateway_that_comes_back_late_finds_all_that_flew_to_it(seed):
     assert run_until(network, network.all_connected, within_s=240.0)
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize(("gone_s", "within_s"), [(12.0, 20.0), (40.0, 45.0)])
 def test_after_an_outage_of_the_medium_all_are_connected_again(gone_s, within_s, seed):
     network = fleet(16, gridsize=4, seed=seed)
@@ -340,7 +327,7 @@ def test_after_an_outage_of_the_medium_all_are_connected_again(gone_s, within_s,
 # Many at once --------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_of_100_routers_30_die_and_all_that_have_a_path_are_back_within_30_s(seed):
     network = fleet(100, gridsize=10, seed=seed)
     network.run_for(21.0)
@@ -371,10 +358,7 @@ def test_a_drone_that_was_ordered_out_of_range_does_not_blame_its_medium():
 
 def with_a_relay_that_comes_and_goes():
     """Gateway 0, router 2 at rest, and between them relay 1, out of reach for 62 s of 147 s."""
-    network = Network(seed=1)
-    network.add_gateway(0, 0.0, 0.0)
-    network.add_router(1, 6.0, -6.0)
-    network.add_router(2, 12.0, 0.0)
+    network = placed([(0.0, 0.0), (6.0, -6.0), (12.0, 0.0)], seed=1)
     turns = [(73.3 * turn, 6.0, 16.0 if turn % 2 else -6.0, 0.0) for turn in range(6)]
     mobility = Mobility("trace", knots={1: turns})
     network.fly(tracks_of(mobility, {1: (6.0, -6.0, 0.0)}, [], Area(0.0, 0.0, 12.0, 12.0), seed=1))
@@ -400,10 +384,7 @@ def test_a_moving_neighbour_that_dies_is_replaced_all_the_same():
 
 def test_a_drone_lands_clear_of_one_that_died_a_second_after_it_had_connected():
     """Nobody had asked 3 for its place, and no drone in reach of the lost relay is left."""
-    network = Network(seed=1)
-    network.add_gateway(0, 0.0, 0.0)
-    for node, x, y in ((1, 8.0, 0.0), (2, 16.0, 0.0), (3, 16.0, 1.1), (4, 24.0, 0.0)):
-        network.add_router(node, x, y)
+    network = placed([(0.0, 0.0), (8.0, 0.0), (16.0, 0.0), (16.0, 1.1), (24.0, 0.0)], seed=1)
     assert network.run_until(network.all_connected, within_s=30.0)
     network.run_for(1.0)
     network.power(3, False)

@@ -8,7 +8,7 @@ from collections import Counter
 
 import pytest
 from air_watch import AirWatch
-from scenarios import events, fleet, hops_across, line, run_until
+from scenarios import events, hops_across, line, run_until
 
 from drone_mesh.inprocess import Network
 
@@ -181,17 +181,3 @@ def test_ten_thousand_random_packets_leave_a_network_that_heals():
             network.run_for(0.1)
     network.run_for(2.0)
     assert run_until(network, network.all_connected, within_s=150.0)
-
-
-def test_a_fleet_of_which_half_is_switched_off_and_on_at_random_is_whole_in_the_end():
-    network = fleet(24, gridsize=5, seed=3, loss=0.05)
-    network.run_for(20.0)
-    rng = random.Random(3)
-    for _switch in range(60):
-        node = rng.randrange(25)
-        network.power(node, not network.nodes[node].antenna.powered)
-        network.run_for(rng.random() * 2.0)
-    for node in network.nodes:
-        network.power(node, True)
-    network.run_for(NOTICED_S)
-    assert run_until(network, network.all_connected, within_s=PATIENCE_S)

@@ -112,16 +112,6 @@ def test_an_order_ends_the_pilots_flight():
     assert links(network) == links_by_distance(network)
 
 
-def test_the_same_seed_gives_the_same_motion_with_every_technique():
-    def places(routing):
-        network = fleet("disc", routing=routing)
-        fly(network)
-        network.run_for(30.0)
-        return [network.location(node) for node in network.nodes]
-
-    assert places("child_table_tree") == places("flooding")
-
-
 def test_a_track_of_a_drone_that_is_not_in_the_network_is_refused():
     network = fleet("disc", drones=3)
     track = Legs(legs_between([(0.0, (0.0, 0.0, 0.0))]))

@@ -10,8 +10,12 @@ import pytest
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import LocationUnknown
 from drone_mesh.inprocess.clock import VirtualClock
-from drone_mesh.inprocess.drone import InProcessDrone
-from drone_mesh.inprocess.positions import CORRELATED_S, PositionErrors, PositionReceiver
+from drone_mesh.inprocess.drone import (
+    CORRELATED_S,
+    InProcessDrone,
+    PositionErrors,
+    PositionReceiver,
+)
 
 HERE = Location(4.0, 3.0, 1.0)
 

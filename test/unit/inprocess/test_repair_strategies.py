@@ -5,13 +5,12 @@ from __future__ import annotations
 import random
 
 import pytest
-from scenarios import LAYOUTS, events, fleet, flown, layout, line, outage, run_until
+from scenarios import LAYOUTS, events, fleet, flown, layout, line, outage, placed, run_until
 
 from drone_mesh.communication.repair.interfaces import IRepairStrategy
 from drone_mesh.communication.repair.strategies import (
     REPAIR_STRATEGIES,
     Stay,
-    create_repair_strategy,
 )
 from drone_mesh.communication.routing.child_table_tree import ChildTableTree
 from drone_mesh.communication.wire.messages import GoToLocationMessage
@@ -113,10 +112,8 @@ def test_with_follow_no_link_inside_the_moving_part_is_lost():
 
 def alone_among_the_dead(repair):
     """The neighbours 2 and 3 of router 4 die together; router 1 is in reach of their places."""
-    network = Network(repair=repair)
-    network.add_gateway(0, 0.0, 0.0)
-    for node, x, y in ((1, 8.0, 0.0), (2, 15.0, 2.0), (3, 15.0, -2.0), (4, 23.0, 0.0)):
-        network.add_router(node, x, y)
+    places = [(0.0, 0.0), (8.0, 0.0), (15.0, 2.0), (15.0, -2.0), (23.0, 0.0)]
+    network = placed(places, repair=repair)
     network.run_for(20.0)
     for node in (2, 3):
         network.power(node, False)
@@ -194,16 +191,8 @@ def test_with_field_the_drones_move_towards_the_gateway_leg_by_leg():
     assert network.location(3).longitude < 8.0 + RANGE_M
 
 
-def test_a_users_own_strategy_is_created_by_its_module_and_class():
-    network = Network(repair="drone_mesh.communication.repair.strategies:Stay")
-    network.add_router(1, 0.0, 0.0)
-    assert isinstance(create_repair_strategy("stay"), IRepairStrategy)
-
-
 def test_a_network_takes_the_classes_of_a_technique_and_of_a_strategy():
-    network = Network(routing=ChildTableTree, repair=Stay)
-    network.add_gateway(0, 0.0, 0.0)
-    network.add_router(1, 5.0, 0.0)
+    network = line(1, spacing=5.0, routing=ChildTableTree, repair=Stay)
     assert run_until(network, network.all_connected, within_s=15.0)
     status = network.status()
     assert (status.routing, status.repair_strategy) == ("ChildTableTree", "Stay")
@@ -223,13 +212,6 @@ def test_what_is_no_class_of_a_part_is_refused_in_one_sentence(parts, why):
     with pytest.raises(ConfigurationError, match=why) as caught:
         Network(**parts)
     assert "\n" not in str(caught.value)
-
-
-def test_an_unknown_strategy_is_refused_with_the_known_names():
-    with pytest.raises(
-        ConfigurationError, match="unknown repair strategy 'hope': use one of field"
-    ):
-        Network(repair="hope")
 
 
 def _kinds(network, node):

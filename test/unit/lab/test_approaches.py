@@ -8,12 +8,10 @@ import pytest
 
 from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.drone.flight_path import FlightPath
-from drone_mesh.lab.approaches import approaches
 from drone_mesh.lab.flights import Leg
-from drone_mesh.lab.metrics.harm import close_ones, harm, left_placeless
-from drone_mesh.lab.scenario import Scenario
+from drone_mesh.lab.metrics.harm import approaches, close_ones, harm, left_placeless
+from drone_mesh.lab.scenario import Scenario, Streams
 from drone_mesh.lab.sequence import SequenceRun
-from drone_mesh.lab.streams import Streams
 from drone_mesh.state.model import EventRecord
 
 DECIDED, ORDERED = MeshEventKind.FLIGHT_DECIDED.value, MeshEventKind.FLIGHT_ORDERED.value

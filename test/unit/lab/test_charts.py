@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
-
-from drone_mesh.lab.run_report.charts import grouped, with_gaps
+from drone_mesh.lab.run_report.charts import grouped
 from drone_mesh.state.model import EventRecord
 
 
@@ -20,9 +18,3 @@ def test_events_close_to_each_other_share_a_label():
 def test_a_label_names_a_few_nodes_of_a_crowd():
     found = events(*((10.0, node) for node in range(6)))
     assert list(grouped(found, "off", close_s=5.0)) == [(10.0, "0, 1, 2, 3, … off")]
-
-
-def test_a_line_has_a_gap_where_there_is_no_value():
-    low, gap, high = with_gaps([0.0, None, 2])
-    assert (low, high) == (0.0, 2)
-    assert math.isnan(gap)

@@ -11,9 +11,9 @@ from typing import Callable
 import pytest
 
 from drone_mesh.lab.command import main
-from drone_mesh.lab.program import _program as typed
 from drone_mesh.lab.provenance import imported_code, own_code
 from drone_mesh.lab.store import read_failures, read_runs
+from drone_mesh.lab.terminal import _program as typed
 
 EXPERIMENT = """\
 name: mine
@@ -131,15 +131,6 @@ def test_status_tables_and_report_mark_a_cell_of_mixed_code_and_compare_refuses_
     assert "where one cell mixes them" in Path("out/report.html").read_text()
     assert lab("compare", "out", "repair=stay", "repair=edited_repair:Mine") == 1
     assert "a cell mixes runs of different code (" in capsys.readouterr().err
-
-
-def test_a_paired_table_names_its_baseline_in_the_header(
-    edit: Callable[[str, str], None], capsys: pytest.CaptureFixture[str]
-) -> None:
-    run()
-    capsys.readouterr()
-    lab("tables", "out", "--only", "paired")
-    assert "| seeds | difference to stay |" in capsys.readouterr().out
 
 
 def test_two_folders_are_compared_run_by_run(

@@ -14,9 +14,8 @@ from drone_mesh.lab.experiment import load_experiment
 from drone_mesh.lab.metrics import measure_all
 from drone_mesh.lab.network_sample import LinkWatch, NetworkSample
 from drone_mesh.lab.record import RunRecord
-from drone_mesh.lab.scenario import Scenario
+from drone_mesh.lab.scenario import Scenario, Streams
 from drone_mesh.lab.simulation import Simulation
-from drone_mesh.lab.streams import Streams
 
 
 def simulation(repetition: int = 0, **scenario: Any) -> Simulation:
@@ -48,22 +47,6 @@ def test_the_same_seed_gives_the_same_motion_in_every_cell() -> None:
     one = run(probes={"per_s": 0.0})
     other = run(routing="flooding", radio={"kind": "shared", "rate": "1M"})
     assert places(one) == places(other) != places(simulation(1).run())
-
-
-def test_gateways_move_if_they_may_and_a_share_of_the_drones_stands() -> None:
-    record = run(
-        mobility={"kind": "random_waypoint", "gateways": True, "share": 0.5},
-        probes={"per_s": 0.0},
-    )
-    moved = {n for n, place in record.end.places.items() if place != record.start.places[n]}
-    assert len(moved) == 6
-
-
-def test_drones_can_begin_at_the_places_of_the_layout() -> None:
-    begins = {"kind": "random_waypoint", "steady": False}
-    moving = simulation(mobility=begins).network
-    standing = simulation(mobility={"kind": "none"}).network
-    assert [moving.location(n) for n in range(12)] == [standing.location(n) for n in range(12)]
 
 
 def test_told_drones_get_their_legs_as_orders() -> None:
@@ -148,14 +131,6 @@ def test_links_that_come_and_go_are_counted_per_drone_and_minute() -> None:
     assert (watch.appeared, watch.disappeared, watch.link_s) == (1, 1, 30.0)
     assert (watch.drone_s, watch.router_s, watch.reachable_s) == (60.0, 40.0, 30.0)
     assert watch.served_s == 20.0
-
-
-def test_positions_can_be_unknown_to_the_mesh() -> None:
-    blind = simulation(positions={"known": False}, repair="stay")
-    blind.run()
-    assert blind.network.nodes[3].component.get_connected_to_gateway() in (True, False)
-    noisy = simulation(positions={"sigma_m": 0.5})
-    assert noisy.network.location(0) == noisy.network.nodes[0].drone.get_location()
 
 
 def test_a_trace_is_read_beside_the_experiment(tmp_path: Path) -> None:

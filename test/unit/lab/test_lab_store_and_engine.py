@@ -8,19 +8,18 @@ import json
 import math
 import os
 import resource
-import shutil
 import signal
 import sqlite3
 import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Any, Callable, Iterator
+from typing import Any, Callable
 
 import pytest
 
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.lab.campaign import Campaign, _is_narrow
+from drone_mesh.lab.campaign import _is_narrow
 from drone_mesh.lab.command import main
 from drone_mesh.lab.experiment import load_experiment
 from drone_mesh.lab.plan import Plan
@@ -53,10 +52,6 @@ def endless(record):
 def slow(record):
     time.sleep(0.1)
     return 1.0
-
-def namespace(record):
-    time.sleep(0.05)
-    return float(os.stat("/proc/self/ns/net").st_ino % 10**9)
 
 def deadly(record):
     os.kill(os.getpid(), signal.SIGKILL)
@@ -453,76 +448,6 @@ def test_a_killed_scheduler_loses_nothing(slow: Path, slow_rows: bytes, tmp_path
     assert measured(out) == slow_rows
 
 
-def ip(*words: str) -> bool:
-    done = subprocess.run(["ip", *words], capture_output=True, check=False)
-    return done.returncode == 0
-
-
-@pytest.fixture
-def namespaces() -> Iterator[list[tuple[str, str]]]:
-    """(name, address of this side) of two network namespaces, each on a cable of its own."""
-    if shutil.which("ip") is None:
-        pytest.skip("making network namespaces needs iproute2")
-    made = []
-    for number in (1, 2):
-        name, here, there = f"lab{os.getpid()}-{number}", f"lh{number}", f"lt{number}"
-        ready = ip("netns", "add", name)
-        made.append((name, f"10.213.{number}.1"))
-        steps = [
-            ("link", "add", here, "type", "veth", "peer", "name", there, "netns", name),
-            ("addr", "add", f"10.213.{number}.1/24", "dev", here),
-            ("link", "set", here, "up"),
-            ("-n", name, "addr", "add", f"10.213.{number}.2/24", "dev", there),
-            ("-n", name, "link", "set", there, "up"),
-            ("-n", name, "link", "set", "lo", "up"),
-        ]
-        if not ready or not all(ip(*step) for step in steps):
-            for one, _ in made:
-                ip("netns", "del", one)
-            pytest.skip("making network namespaces needs root")
-    yield made
-    for name, _ in made:
-        ip("netns", "del", name)  # its cable goes with it
-
-
-@pytest.mark.slow
-def test_workers_in_two_network_namespaces_share_a_batch(
-    experiment: Callable[..., Path], tmp_path: Path, namespaces: list[tuple[str, str]]
-) -> None:
-    text = SMALL.replace("seeds: 4", "seeds: 30") + "metrics: ['own_lab_parts:namespace']\n"
-    address_file = tmp_path / "scheduler.json"
-    environment = {**os.environ, "PYTHONPATH": str(ROOT / "src")}
-    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "env": environment}
-    processes = [
-        subprocess.Popen(
-            [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "0.0.0.0", "--port",
-             "0", "--no-dashboard", "--scheduler-file", str(address_file)], **quiet,
-        )
-    ]  # fmt: skip
-    try:
-        port = address_of(address_file).rpartition(":")[2]
-        for name, address in namespaces:
-            processes.append(
-                subprocess.Popen(
-                    ["ip", "netns", "exec", name, sys.executable, "-m",
-                     "distributed.cli.dask_worker", f"tcp://{address}:{port}", "--nthreads", "1",
-                     "--no-dashboard", "--no-nanny"], **quiet,
-                )
-            )  # fmt: skip
-        process = start(
-            experiment(text=text), tmp_path / "out", "--cluster", f"tcp://127.0.0.1:{port}"
-        )
-        output = finish(process)
-        assert process.returncode == 0, output
-    finally:
-        for one in processes:
-            one.kill()
-            one.wait()
-    rows = read_rows(tmp_path / "out/runs.csv")
-    assert len(rows) == 60
-    assert len({row["namespace"] for row in rows}) == 2
-
-
 SBATCH = """\
 #!/bin/sh
 job=$SLURM_STAND_IN/job.$$
@@ -596,12 +521,6 @@ def test_a_metric_that_is_infinite_in_one_run_asks_for_more_runs_and_ends_nothin
     assert not _is_narrow([math.inf, 1.0], None, 0.1)
     assert not _is_narrow([math.inf, 1.0], 0.5, None)
     assert _is_narrow([1.0, 1.0], None, 0.1)
-
-
-def test_a_campaign_counts_what_it_did(experiment: Callable[..., Path], tmp_path: Path) -> None:
-    campaign = Campaign(load_experiment(experiment()), tmp_path / "out", ["lab"])
-    campaign.run(0, None)
-    assert (campaign.completed, campaign.failures) == (8, 0)
 
 
 def test_a_results_folder_is_needed_to_repeat_a_run(

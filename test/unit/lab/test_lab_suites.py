@@ -11,13 +11,11 @@ import numpy as np
 import pytest
 
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.lab.experiment import load_experiment
+from drone_mesh.lab.experiment import load_experiment, write_template
 from drone_mesh.lab.ideal import IDEAL_RULES, Swarm, run_ideal
 from drone_mesh.lab.metrics import METRICS, listed
 from drone_mesh.lab.plan import Plan
-from drone_mesh.lab.scenario import Scenario
-from drone_mesh.lab.streams import Streams
-from drone_mesh.lab.template import write_template
+from drone_mesh.lab.scenario import Scenario, Streams
 from drone_mesh.lab.worker import execute
 
 EXPERIMENTS = Path(__file__).resolve().parents[3] / "experiments"

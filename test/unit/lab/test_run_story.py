@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import csv
 import re
-from dataclasses import replace
 
 import pytest
 
 from drone_mesh.drone.roles import Role
 from drone_mesh.lab.run_report.charts import outages_figure, phases_of
-from drone_mesh.lab.run_report.page import ROWS_SHOWN, render_page
+from drone_mesh.lab.run_report.page import (
+    ROWS_SHOWN,
+    key_numbers,
+    outages_in_words,
+    render_page,
+    repair_rows,
+    write_csv,
+)
 from drone_mesh.lab.run_report.story import NothingRecorded, RunStory, tell_story
-from drone_mesh.lab.run_report.tables import key_numbers, outages_in_words, repair_rows, write_csv
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
 
 
@@ -215,9 +220,3 @@ def test_the_page_says_how_many_nodes_had_no_outage_and_folds_a_long_table(page)
     assert "outages as a table" not in page
     long = render_page(crowd(ROWS_SHOWN + 3, 2), "run")
     assert f"<summary>All {ROWS_SHOWN + 1} outages as a table</summary>" in long
-
-
-def test_links_whose_ends_fly_apart_are_breaking_at_the_end():
-    moving = [replace(state(50.0 + n, x=12.0 + n), max_distance=9.0) for n in range(3)]
-    assert tell_story(moving, []).breaking == [(1, 2)]
-    assert tell_story(moving[:1] * 3, []).breaking == []

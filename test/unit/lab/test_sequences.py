@@ -16,14 +16,26 @@ from drone_mesh.lab.metrics.harm import (
     resting_close,
 )
 from drone_mesh.lab.plan import Plan
-from drone_mesh.lab.scenario import Scenario
+from drone_mesh.lab.scenario import Scenario, Streams
 from drone_mesh.lab.sequence import SequenceRun, run_sequence
-from drone_mesh.lab.streams import Streams
 from drone_mesh.lab.worker import execute
 
 SEQUENCES, AT_ONCE = 100, 10
 LARGEST = 14  # drones: a second for ten sequences; the suite runs meshes of up to 60
+LOSSES = ["silent_for_a_while", "links_cut", "cut_vertex_killed", "many_killed"]
 SUITE = Path(__file__).resolve().parents[3] / "experiments" / "sequences.yaml"
+
+
+def sequence(number, *incidents, density=(7.0, 9.0), drones=(8, 14), routing="child_table_tree"):
+    """The run of a sequence of these incidents."""
+    content = {
+        "sequence": {
+            "incidents": list(incidents), "density": list(density), "drones": list(drones),
+        },
+        "sample_s": 2,
+        "routing": routing,
+    }  # fmt: skip
+    return SequenceRun(Scenario.model_validate(content), Streams(0, number)).run()
 
 
 @pytest.mark.parametrize("first", range(0, SEQUENCES, AT_ONCE))
@@ -35,9 +47,7 @@ def test_no_sequence_ends_with_stacked_drones_or_a_needless_flight_or_a_node_giv
 
 @pytest.mark.parametrize("number", range(10))
 def test_no_drone_rests_at_the_place_of_one_that_was_silent_or_lost_a_link(number):
-    incidents = ["silent_for_a_while", "links_cut"]
-    content = {"sequence": {"incidents": incidents, "drones": [8, 14]}, "sample_s": 2}
-    record = SequenceRun(Scenario.model_validate(content), Streams(0, number)).run()
+    record = sequence(number, "silent_for_a_while", "links_cut")
     assert {item.action for item in record.happened} & {"silent", "cut"}
     assert resting_close(record) == 0
 
@@ -46,23 +56,14 @@ def test_no_drone_rests_at_the_place_of_one_that_was_silent_or_lost_a_link(numbe
 @pytest.mark.parametrize("number", [2259, 2369])
 def test_with_beacons_no_drone_rests_beside_one_whose_place_it_hears_rounded_or_not_at_all(number):
     """In one, two drones without a link took one place; in the other, one went to 6.6 m."""
-    incidents = ["silent_for_a_while", "links_cut", "cut_vertex_killed", "many_killed"]
-    content = {
-        "sequence": {"density": [5, 6.5], "incidents": incidents},
-        "sample_s": 2,
-        "routing": "beacon",
-    }
-    record = SequenceRun(Scenario.model_validate(content), Streams(0, number)).run()
+    record = sequence(number, *LOSSES, density=(5, 6.5), drones=(8, 60), routing="beacon")
     assert resting_close(record) == 0
 
 
 @pytest.mark.parametrize(("density", "number"), [([5, 6.5], 1520), ([7, 9], 1250)])
 def test_a_lone_drone_whose_link_to_the_gateway_failed_for_good_finds_others(density, number):
     """The next ones are 9.1 and 9.2 m from where it first lands beside the gateway."""
-    incidents = ["silent_for_a_while", "links_cut", "cut_vertex_killed", "many_killed"]
-    content = {"sequence": {"density": density, "incidents": incidents}, "sample_s": 2}
-    record = SequenceRun(Scenario.model_validate(content), Streams(0, number)).run()
-    assert record.left_behind == {}
+    assert sequence(number, *LOSSES, density=density, drones=(8, 60)).left_behind == {}
 
 
 def test_no_repair_is_expected_of_a_drone_whose_links_have_all_failed():
@@ -78,8 +79,7 @@ def test_no_repair_is_expected_of_a_drone_whose_links_have_all_failed():
 
 @pytest.mark.parametrize("number", range(8))
 def test_drones_that_know_where_the_gateway_moved_are_not_left_behind(number):
-    content = {"sequence": {"incidents": ["gateway_moved"], "drones": [8, 30]}, "sample_s": 2}
-    record = SequenceRun(Scenario.model_validate(content), Streams(0, number)).run()
+    record = sequence(number, "gateway_moved", drones=(8, 30))
     assert {item.action for item in record.happened} == {"gateway_moved"}
     assert left_able(record) == 0
     assert left_placeless(record) == 0
@@ -104,13 +104,7 @@ def test_an_unknown_incident_is_refused(tmp_path):
 @pytest.mark.parametrize("routing", ["beacon", "child_table_tree"])
 @pytest.mark.parametrize("number", [0, 2, 4])
 def test_mute_and_deaf_radios_cut_off_nobody_else_and_make_no_connected_drone_fly(number, routing):
-    incidents = ["goes_mute", "goes_deaf"]
-    content = {
-        "sequence": {"incidents": incidents, "drones": [8, 14]},
-        "sample_s": 2,
-        "routing": routing,
-    }
-    record = SequenceRun(Scenario.model_validate(content), Streams(0, number)).run()
+    record = sequence(number, "goes_mute", "goes_deaf", routing=routing)
     assert {item.action for item in record.happened} & {"mute", "deaf"}
     assert flew_connected(record) == left_able(record) == 0
     broken = {node for item in record.happened for node in item.nodes}

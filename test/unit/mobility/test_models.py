@@ -12,7 +12,7 @@ import pytest
 
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.mobility import KINDS, Area, Mobility, tracks_of
-from drone_mesh.mobility.group import reference_point, wander_s, wandering
+from drone_mesh.mobility.models import reference_point, wander_s, wandering
 from drone_mesh.mobility.track import Legs, Loop, Segment, Together, climbing, leg_to, rest
 
 AREA = Area(0.0, 0.0, 40.0, 40.0)

@@ -7,17 +7,17 @@ import statistics
 from typing import Iterable
 
 from drone_mesh.communication.events.observer import MeshEventKind
-from drone_mesh.lab.metrics.registry import NAN, metric, metrics, percentiles
+from drone_mesh.lab.metrics.registry import NAN, less, metric, metrics, more, percentiles
 from drone_mesh.lab.record import RunRecord
 from drone_mesh.state.model import EventRecord
 
 
-@metric("0/1", "all live routers are served again before the end", better="more", is_share=True)
+@more("0/1", "all live routers are served again before the end")
 def healed(run: RunRecord) -> float:
     return run.healed_at_s is not None
 
 
-@metric("0/1", "the fault left a live router without any path to a gateway", is_share=True)
+@metric("0/1", "the fault left a live router without any path to a gateway")
 def split(run: RunRecord) -> float:
     return NAN if run.after_fault is None else float(cut_off(run) > 0)
 
@@ -35,10 +35,11 @@ def victims(run: RunRecord) -> float:
     return len({n for item in run.happened if item.action in deadly for n in item.nodes})
 
 
-@metric(
-    "s", "from the fault until all live routers are served for 5 s; empty: not healed",
-    better="less", censored=True,
-)  # fmt: skip
+@less(
+    "s",
+    "from the fault until all live routers are served for 5 s; empty: not healed",
+    censored=True,
+)
 def t_total_s(run: RunRecord) -> float:
     if run.healed_at_s is None or run.fault_s is None:
         return NAN
@@ -91,27 +92,24 @@ def observed_s(run: RunRecord) -> float:
     return NAN if run.fault_s is None else run.end_s - run.fault_s
 
 
-@metric("s", "from the start until all routers are served for the first time", better="less")
+@less("s", "from the start until all routers are served for the first time")
 def connected_s(run: RunRecord) -> float:
     return next((sample.now_s for sample in run.samples if sample.share == 1.0), NAN)
 
 
-@metric(
-    "share", "served routers, mean over the time since all were served for the first time",
-    better="more",
-)  # fmt: skip
+@more("share", "served routers, mean over the time since all were served for the first time")
 def steady_share(run: RunRecord) -> float:
     first_s = connected_s(run)
     shares = [sample.share for sample in run.samples if sample.now_s >= first_s]
     return statistics.fmean(shares) if shares else 0.0
 
 
-@metric("share", "live routers that are served at the end", better="more")
+@more("share", "live routers that are served at the end")
 def connected_share(run: RunRecord) -> float:
     return run.samples[-1].share
 
 
-@metric("share", "served routers, mean over the time since the fault", better="more")
+@more("share", "served routers, mean over the time since the fault")
 def uptime(run: RunRecord) -> float:
     begin_s = 0.0 if run.fault_s is None else run.fault_s
     samples = [sample for sample in run.samples if sample.now_s >= begin_s]
@@ -130,14 +128,14 @@ def _first(events: Iterable[EventRecord], kind: MeshEventKind) -> float | None:
 # Outages of single routers ---------------------------------------------------------------------
 
 
-@metric("", "times that a live router was without service since the fault", better="less")
+@less("", "times that a live router was without service since the fault")
 def outages(run: RunRecord) -> float:
     return len(run.gaps())
 
 
 @metrics(
     "s",
-    better="less",
+    "less",
     outage_median_s="median length of these outages; one without end counts up to the end",
     outage_p95_s="95th percentile of their lengths",
     outage_max_s="length of the longest of these outages",

@@ -6,9 +6,11 @@ import statistics
 
 from drone_mesh.lab.metrics.registry import (
     NAN,
+    less,
     mean,
     metric,
     metrics,
+    more,
     per_drone_and_s,
     percentiles,
     ratio,
@@ -32,14 +34,14 @@ def reachable(run: RunRecord) -> float:
     return ratio(run.links.reachable_s, run.links.router_s)
 
 
-@metric("share", "time of these routers in which they are served", better="more")
+@more("share", "time of these routers in which they are served")
 def served(run: RunRecord) -> float:
     return ratio(run.links.served_s, run.links.reachable_s)
 
 
 @metrics(
     "share",
-    better="more",
+    "more",
     served_p5="the same share at the worst of 20 moments (5th percentile)",
     served_p50="the same share, median over time",
 )
@@ -49,7 +51,7 @@ def service(run: RunRecord) -> list[float]:
 
 @metrics(
     "s",
-    better="less",
+    "less",
     lapse_p50_s="median time that a router has a path and is not served",
     lapse_p99_s="99th percentile of these times",
 )
@@ -59,7 +61,7 @@ def lapses(run: RunRecord) -> list[float]:
 
 @metrics(
     "share",
-    better="more",
+    "more",
     connected_p5="connected routers of those with a path at the worst of 20 moments",
     connected_p50="the same share, median over time",
 )
@@ -69,7 +71,7 @@ def connection(run: RunRecord) -> list[float]:
 
 @metrics(
     "s",
-    better="less",
+    "less",
     unconnected_p50_s="median time that a router has a path and is not connected",
     unconnected_p99_s="99th percentile of these times",
 )
@@ -79,7 +81,7 @@ def unconnected(run: RunRecord) -> list[float]:
 
 @metrics(
     "share",
-    better="more",
+    "more",
     pdr_up="best-effort messages to the gateway that arrived in time, of drones with a path",
     pdr_down="the same from the gateway",
     pdr_echo="echoes of a gateway that a drone with a path answered in time",
@@ -94,7 +96,7 @@ def delivered(run: RunRecord) -> list[float]:
 
 @metrics(
     "ms",
-    better="less",
+    "less",
     delay_ms="median time of these messages that arrived, up and down, or between any nodes",
     delay_p95_ms="the time within which 95 % of them arrived",
 )
@@ -105,7 +107,7 @@ def delays(run: RunRecord) -> tuple[float, float]:
     return statistics.median(found) if found else NAN, p95_ms
 
 
-@metric("hops", "mean hops of an echo beyond the shortest path at its time", better="less")
+@less("hops", "mean hops of an echo beyond the shortest path at its time")
 def detours(run: RunRecord) -> float:
     return mean(probe.hops - probe.shortest for probe in run.probes if probe.hops is not None)
 
@@ -115,6 +117,6 @@ def frame_rate(run: RunRecord) -> float:
     return NAN if run.frames is None else per_drone_and_s(run, sum(run.frames.values()))
 
 
-@metric("1/s", "of these, frames that carry no data of users", better="less")
+@less("1/s", "of these, frames that carry no data of users")
 def control_frame_rate(run: RunRecord) -> float:
     return NAN if run.frames is None else per_drone_and_s(run, run.frames["control"])

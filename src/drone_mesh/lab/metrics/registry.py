@@ -20,7 +20,6 @@ class Metric(NamedTuple):
     definition: str
     measure: Measure  # NaN: undefined for this run, an empty cell
     better: str = ""  # "less", "more" or neither
-    is_share: bool = False  # every run yields 0 or 1
     censored: bool = False  # a time that is empty if the event did not happen
     family: str = ""  # in lists, one entry stands for all metrics of this name
 
@@ -31,6 +30,11 @@ METRICS: dict[str, Metric] = {}  # in the order of the columns
 def listed() -> dict[str, Metric]:
     """The metrics for a list, by name; those of a family appear once, under its name."""
     return {metric.family or name: metric for name, metric in METRICS.items()}
+
+
+def is_share(column: str) -> bool:
+    """Whether this column is a metric for which every run yields 0 or 1."""
+    return column in METRICS and METRICS[column].unit == "0/1"
 
 
 def is_censored(column: str) -> bool:
@@ -81,17 +85,16 @@ def metric(unit: str, definition: str, **about: object) -> Callable[[Measure], M
     return note
 
 
+less = functools.partial(metric, better="less")
+more = functools.partial(metric, better="more")
+
+
 def metrics(unit: str, better: str = "", **definitions: str) -> Callable[[Several], Several]:
     """Register several metrics, by name: the decorated function measures them, in this order."""
 
     def note(measure: Several) -> Several:
         for place, (name, definition) in enumerate(definitions.items()):
-            one = functools.partial(_nth, measure, place)
-            METRICS[name] = Metric(unit, definition, one, better)
+            METRICS[name] = Metric(unit, definition, lambda run, i=place: measure(run)[i], better)
         return measure
 
     return note
-
-
-def _nth(measure: Several, place: int, record: RunRecord) -> float:
-    return measure(record)[place]

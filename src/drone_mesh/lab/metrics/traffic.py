@@ -15,9 +15,11 @@ from drone_mesh.lab.metrics.registry import (
     METRICS,
     NAN,
     Metric,
+    less,
     mean,
     metric,
     metrics,
+    more,
     per_drone_and_s,
     ratio,
 )
@@ -27,21 +29,17 @@ NO_TRAFFIC = Traffic()
 DELIVERED_WITHIN_S = 10.0  # an order that arrives later counts as lost
 
 
-@metric(
-    "packets",
-    "packets handed to the radio; on the disc all tries, broadcasts once per receiver",
-    better="less",
-)
+@less("packets", "packets handed to the radio; on the disc all tries, broadcasts once per receiver")
 def packets(run: RunRecord) -> float:
     return sum(one.own + one.forwarded for one in run.traffic.values())
 
 
-@metric("1/s", "packets per drone and second", better="less")
+@less("1/s", "packets per drone and second")
 def packet_rate(run: RunRecord) -> float:
     return per_drone_and_s(run, packets(run))
 
 
-@metric("bytes", "32 bytes for each of these packets", better="less")
+@less("bytes", "32 bytes for each of these packets")
 def payload_bytes(run: RunRecord) -> float:
     return 32.0 * packets(run)
 
@@ -53,17 +51,17 @@ def air_load(run: RunRecord) -> float:
     return NAN if run.air is None else run.air.airtime_s / run.end_s
 
 
-@metric("frames", "receptions that another frame destroyed; shared radio only", better="less")
+@less("frames", "receptions that another frame destroyed; shared radio only")
 def frames_destroyed(run: RunRecord) -> float:
     return NAN if run.air is None else run.air.destroyed
 
 
-@metric("", "tries of the driver per packet with a receiver; shared radio only", better="less")
+@less("", "tries of the driver per packet with a receiver; shared radio only")
 def tries_per_packet(run: RunRecord) -> float:
     return NAN if run.air is None else ratio(run.air.tries, run.air.sent)
 
 
-@metric("packets", "packets that the driver gave up; shared radio only", better="less")
+@less("packets", "packets that the driver gave up; shared radio only")
 def given_up(run: RunRecord) -> float:
     return NAN if run.air is None else run.air.given_up
 
@@ -75,7 +73,7 @@ def orders(run: RunRecord) -> float:
 
 @metrics(
     "share",
-    better="more",
+    "more",
     order_delivery="orders whose drone set out within 10 s; empty: no orders",
     order_prompt="orders whose drone set out within 2 s; empty: no orders",
 )
@@ -84,7 +82,7 @@ def orders_in_time(run: RunRecord) -> list[float]:
     return [mean(delay <= most_s for delay in delays) for most_s in (DELIVERED_WITHIN_S, 2.0)]
 
 
-@metric("", "orders that neither arrived nor were reported as lost by the gateway", better="less")
+@less("", "orders that neither arrived nor were reported as lost by the gateway")
 def orders_unreported(run: RunRecord) -> float:
     reported = [
         (event.stamp_s, set(event.peers))
@@ -101,15 +99,13 @@ def orders_unreported(run: RunRecord) -> float:
     )
 
 
-@metric("ms", "median time from an order to its drone's departure", better="less")
+@less("ms", "median time from an order to its drone's departure")
 def order_delay_ms(run: RunRecord) -> float:
     delays = [delay for delay in _order_delays(run) if delay is not None]
     return 1000.0 * statistics.median(delays) if delays else NAN
 
 
-@metric(
-    "kbit/s", "users' data that arrived, from the first hand-in to the last arrival", better="more"
-)
+@more("kbit/s", "users' data that arrived, from the first hand-in to the last arrival")
 def data_rate(run: RunRecord) -> float:
     if not run.received:
         return 0.0 if run.messages else NAN
@@ -117,9 +113,7 @@ def data_rate(run: RunRecord) -> float:
     return sum(len(message.payload) for message in run.received) * 8 / seconds / 1000
 
 
-@metric(
-    "share", "users' messages that arrived; reliable ones: as their sender knows", better="more"
-)
+@more("share", "users' messages that arrived; reliable ones: as their sender knows")
 def data_delivered(run: RunRecord) -> float:
     if run.messages and run.messages[0].ticket.reliable:
         return mean(one.ticket.state is TicketState.DELIVERED for one in run.messages)
@@ -131,16 +125,12 @@ def taken_rate(run: RunRecord) -> float:
     return len(run.messages) / (run.end_s - run.messages_since_s)
 
 
-@metric("1/s", "users' messages that arrived", better="more")
+@more("1/s", "users' messages that arrived")
 def arrival_rate(run: RunRecord) -> float:
     return len(run.received) / (run.end_s - run.messages_since_s)
 
 
-@metric(
-    "",
-    "Jain's index of the share that arrived, over senders at equal hops; least of all hops",
-    better="more",
-)
+@more("", "Jain's index of the share that arrived, over senders at equal hops; least of all hops")
 def data_fairness(run: RunRecord) -> float:
     taken = Counter(one.sender for one in run.messages)
     arrived = Counter(message.sender for message in run.received)

@@ -10,7 +10,7 @@ from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.drone.roles import Role
-from drone_mesh.lab.run_report.drawing import figure_with_rows, svg_of
+from drone_mesh.lab.run_report.drawing import figure_with, svg_of
 from drone_mesh.lab.run_report.story import RunStory
 from drone_mesh.state.model import EventRecord
 from drone_mesh.state.outages import Outage
@@ -37,7 +37,7 @@ NAMED_ROW_IN = 0.16  # in lower rows the names of the nodes would overlap
 
 def timeline_figure(story: RunStory) -> str:
     """The connected share and the hops over time, with marks for events."""
-    figure, (share, hops) = figure_with_rows(4.2, rows=2, heights=(2, 1))
+    figure, (share, hops) = figure_with(4.2, rows=2, heights=(2, 1))
     times = [sample.stamp_s for sample in story.samples]
     connected = with_gaps(sample.connected_share for sample in story.samples)
     share.fill_between(times, connected, color=LIGHT.connected, alpha=0.15, lw=0)
@@ -68,7 +68,7 @@ def with_gaps(values: Iterable[float | None]) -> list[float]:
 def messages_figure(story: RunStory) -> str:
     """The number of messages that each node sent."""
     ids = sorted(story.messages_of)
-    figure, (axes,) = figure_with_rows(2.4)
+    figure, (axes,) = figure_with(2.4)
     gateways = {node.id for node in story.after.nodes if node.role == Role.GATEWAY}
     axes.bar(
         [str(node) for node in ids] if len(ids) <= MOST_BARS_NAMED else ids,
@@ -86,7 +86,7 @@ def outages_figure(story: RunStory) -> str:
     nodes = sorted({outage.node for outage in story.outages})
     row_in = min(ROW_IN, MOST_ROWS_IN / len(nodes))
     step = math.ceil(NAMED_ROW_IN / row_in)  # 1: every row has its name
-    figure, (axes,) = figure_with_rows(1.2 + row_in * len(nodes))
+    figure, (axes,) = figure_with(1.2 + row_in * len(nodes))
     end_s = story.samples[-1].stamp_s
     named: set[str] = set()
     for outage in story.outages:

@@ -34,31 +34,21 @@ def in_style() -> ContextManager[None]:
     return matplotlib.rc_context(_STYLE)
 
 
-def figure_with_rows(
-    height_in: float, rows: int = 1, heights: Sequence[float] = (1,)
+def figure_with(
+    height_in: float, rows: int = 1, columns: int = 1, heights: Sequence[float] = (1,)
 ) -> tuple[Figure, list[Axes]]:
-    """A figure with stacked axes that share their x axis."""
+    """A figure with axes that share their x axis; those in columns show the same area."""
     with in_style():
         figure = Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
-        axes = figure.subplots(
-            rows, 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": heights}
-        )
-    for one in axes[:, 0]:
-        one.spines[["top", "right"]].set_visible(False)
-        one.grid(axis="y")
+        grid = figure.subplots(
+            rows, columns, sharex=True, sharey=columns > 1, squeeze=False,
+            gridspec_kw={"height_ratios": heights},
+        )  # fmt: skip
+    for one in grid.ravel():
+        one.spines[["top", "right"]].set_visible(columns > 1)
+        one.grid(axis="y" if columns == 1 else "both")
         one.set_axisbelow(True)
-    return figure, list(axes[:, 0])
-
-
-def figure_with_columns(height_in: float, columns: int) -> tuple[Figure, list[Axes]]:
-    """A figure with axes side by side that show the same area."""
-    with in_style():
-        figure = Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
-        axes = figure.subplots(1, columns, sharex=True, sharey=True)
-    for one in axes:
-        one.grid()
-        one.set_axisbelow(True)
-    return figure, list(axes)
+    return figure, list(grid.ravel())
 
 
 def svg_of(figure: Figure) -> str:

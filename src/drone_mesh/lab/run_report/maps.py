@@ -1,20 +1,15 @@
-"""Maps of a run: the mesh before the first loss and at the end, with the paths flown.
-
-At the end also where each pilot flies its drone to, and the links that will soon break.
-"""
+"""Maps of a run: the mesh before the first loss and at the end, with the paths flown."""
 
 from __future__ import annotations
-
-from typing import Sequence
 
 from matplotlib.axes import Axes
 from matplotlib.transforms import ScaledTranslation
 
 from drone_mesh.drone.roles import Role
-from drone_mesh.lab.run_report.drawing import figure_with_columns, svg_of
+from drone_mesh.lab.run_report.drawing import figure_with, svg_of
 from drone_mesh.lab.run_report.story import RunStory
 from drone_mesh.state.condition import Condition, condition_of
-from drone_mesh.state.links import Link, LinkUse, links_by_use, shortest
+from drone_mesh.state.links import LinkUse, links_by_use, shortest
 from drone_mesh.state.model import MeshStatus, footprint, position_is_known
 from drone_mesh.view.palette import LIGHT
 from drone_mesh.view.scene import fan_offset, fan_out
@@ -31,30 +26,14 @@ def maps_figure(story: RunStory) -> str:
     """Positions before the first loss and at the end, and the paths flown between them."""
     (west, east), (south, north) = (_limits(story, axis) for axis in (0, 1))
     height_in = MAP_WIDTH_IN * (north - south) / (east - west) + TITLE_IN
-    figure, (before, after) = figure_with_columns(min(height_in, TALLEST_IN), 2)
+    figure, (before, after) = figure_with(min(height_in, TALLEST_IN), columns=2)
     before.set_xlim(west, east)
     before.set_ylim(south, north)
     draw_map(before, story.before, f"before, at {story.before.stamp_s:.0f} s")
     draw_map(after, story.after, f"after, at {story.after.stamp_s:.0f} s")
     for track in story.tracks.values():
         after.plot([p[0] for p in track], [p[1] for p in track], color=LIGHT.path, lw=1.2, ls=":")
-    draw_motion(after, story.after, story.breaking)
     return svg_of(figure)
-
-
-def draw_motion(axes: Axes, mesh: MeshStatus, breaking: Sequence[Link]) -> None:
-    """An arrow to where each drone is flown, and the links that will soon break."""
-    placed = {node.id: node for node in mesh.nodes if position_is_known(node)}
-    for low, high in shortest(set(breaking), list(placed.values()), MOST_LINKS):
-        xs, ys = zip(placed[low].position[:2], placed[high].position[:2])
-        axes.plot(xs, ys, color=LIGHT.flying, lw=LINK_WIDTH[LinkUse.ROUTE], ls="--", zorder=2)
-    for node in placed.values():
-        if len(node.heading):
-            (x, y), (to_x, to_y) = node.position[:2], node.heading[:2]
-            axes.annotate(
-                "", xy=(to_x, to_y), xytext=(x, y), zorder=2,
-                arrowprops={"arrowstyle": "->", "color": LIGHT.muted, "linewidth": 0.8},
-            )  # fmt: skip
 
 
 def _limits(story: RunStory, axis: int) -> tuple[float, float]:
@@ -65,7 +44,6 @@ def _limits(story: RunStory, axis: int) -> tuple[float, float]:
         for node in mesh.nodes
         if position_is_known(node)
     ]
-    positions += [node.heading[axis] for node in story.after.nodes if len(node.heading)]
     positions += [point[axis] for track in story.tracks.values() for point in track]
     low, high = min(positions, default=0.0), max(positions, default=0.0)
     room_m = max(LEAST_ROOM_M, ROOM_SHARE * (high - low))

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import dataclass
 from typing import Iterable, Mapping, Sequence
 
 from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.errors import MeshError
-from drone_mesh.state.links import Link, LinkForecast, known_links
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
 from drone_mesh.state.outages import MeshSample, Outage, find_outages, take_sample
 
 BLIP_S = 1.0  # a shorter outage was just the wait for an answer
-MOST_RECENT = 16  # states from which the motion at the end is measured
 
 
 class NothingRecorded(MeshError):
@@ -31,7 +28,6 @@ class RunStory:
     before: MeshStatus  # the last state before the first power-off or loss, else the first one
     after: MeshStatus  # the last state
     tracks: Mapping[int, Sequence[tuple[float, float]]]  # x, y in metres, of nodes that moved
-    breaking: Sequence[Link]  # at the end: links whose ends are about to fly out of range
     messages_of: Mapping[int, int]  # sent per node during the recording
 
 
@@ -43,14 +39,11 @@ def tell_story(states: Iterable[MeshStatus], events: Iterable[EventRecord]) -> R
     first_loss_s = _first_loss_s(records, real)
     samples: list[MeshSample] = []
     tracks: dict[int, list[tuple[float, float]]] = {}
-    recent: deque[MeshStatus] = deque(maxlen=MOST_RECENT)
     first = before = after = None
     for mesh in states:
         if after is not None and mesh.stamp_s < after.stamp_s:
             # Simulated time restarted: only the last run counts.
             samples, tracks, first, before = [], {}, None, None
-            recent.clear()
-        recent.append(mesh)
         after = mesh
         if first is None:
             first = before = mesh
@@ -71,21 +64,12 @@ def tell_story(states: Iterable[MeshStatus], events: Iterable[EventRecord]) -> R
         before,
         after,
         {node: track for node, track in tracks.items() if len(track) > 1},
-        _breaking(recent),
         {node.id: node.total_messages - sent_before.get(node.id, 0) for node in after.nodes},
     )
 
 
 def _is_blip(outage: Outage) -> bool:
     return outage.seconds is not None and outage.seconds < BLIP_S
-
-
-def _breaking(recent: Iterable[MeshStatus]) -> list[Link]:
-    forecast, breaking = LinkForecast(), []
-    for mesh in recent:
-        links = known_links(mesh.nodes)
-        breaking = forecast.update(links, mesh.nodes, mesh.stamp_s, mesh.max_distance)
-    return breaking
 
 
 def _first_loss_s(events: Sequence[EventRecord], outages: Sequence[Outage]) -> float | None:
