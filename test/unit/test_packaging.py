@@ -58,7 +58,7 @@ def test_each_file_of_the_python_package_is_installed(tmp_path: Path) -> None:
 def test_each_program_in_nodes_is_installed() -> None:
     cmake = (ROOT / "CMakeLists.txt").read_text(encoding="utf-8")
     cmake = cmake.replace("${PROJECT_NAME}", "drone_mesh")
-    programs = re.findall(r"^  (nodes/\w+)$", cmake, flags=re.MULTILINE)
+    programs = re.findall(r"^  (nodes/[\w-]+)$", cmake, flags=re.MULTILINE)
     assert programs == sorted(f"nodes/{path.name}" for path in (ROOT / "nodes").iterdir())
 
 

@@ -9,9 +9,8 @@ from pathlib import Path
 import rospy
 
 from drone_mesh.errors import MeshError
-from drone_mesh.lab.run_report.page import render_page
+from drone_mesh.lab.run_report.page import render_page, write_csv
 from drone_mesh.lab.run_report.story import NothingRecorded, tell_story
-from drone_mesh.lab.run_report.page import write_csv
 from drone_mesh.ros.graph.command_line import run_tool
 from drone_mesh.ros.views.bag import raise_any, read_events, read_states, readable
 from drone_mesh.ros.views.bag_file import BagDamaged, BagUnusable
