@@ -9,7 +9,7 @@ from drone_mesh.errors import ConfigurationError
 from drone_mesh.inprocess.clock import VirtualClock
 from drone_mesh.inprocess.interfaces import IInProcessAir
 from drone_mesh.inprocess.radio import InProcessAir
-from drone_mesh.inprocess.shared_air import SharedAir
+from drone_mesh.inprocess.shared_antenna import SharedChannel
 from drone_mesh.nrf24.emulator.links import IdealDisc, LinkModel, LogDistance
 from drone_mesh.nrf24.emulator.space import Fading
 from drone_mesh.nrf24.settings import RadioSettings, data_rate
@@ -49,9 +49,9 @@ def create_air(
         own_rng, bits_per_s = random.Random(rng.random()), settings.data_rate.value
         links = LogDistance.with_edge_at(max_distance_m, own_rng, bits_per_s=bits_per_s)
     links = links or IdealDisc(max_distance_m)
-    air: SharedAir | ChipAir
+    air: SharedChannel | ChipAir
     if radio == "shared":
-        air = SharedAir(VirtualClock(), links, settings, max_distance_m)
+        air = SharedChannel(VirtualClock(), links, settings, max_distance_m)
     elif radio == "chips":
         from drone_mesh.inprocess.chip_air import ChipAir  # needs greenlet
 

@@ -10,15 +10,16 @@ emulator.
 
 from __future__ import annotations
 
+import abc
 import math
-import random
+from dataclasses import dataclass
 from typing import Callable, Iterable
 
 from drone_mesh.channel.packet_queue import ALL_NODES, OutgoingPacket
 from drone_mesh.drone.flight_path import Vector
+from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.inprocess.clock import VirtualClock
-from drone_mesh.inprocess.interfaces import Host, IInProcessAir
-from drone_mesh.inprocess.shared_antenna import SharedAntenna, Transmission
+from drone_mesh.inprocess.interfaces import IInProcessAir, IInProcessAntenna
 from drone_mesh.nrf24.emulator.air import CAPTURE_DB, RPD_DBM, RPD_NS
 from drone_mesh.nrf24.emulator.links import Hop, LinkModel
 from drone_mesh.nrf24.emulator.space import Space
@@ -26,6 +27,38 @@ from drone_mesh.nrf24.registers import NS_PER_S
 from drone_mesh.nrf24.settings import RadioSettings
 
 MOST_GAIN_DB = 10.0  # Rayleigh fading exceeds it once in 22,000 blocks
+
+
+@dataclass(eq=False)
+class Transmission:
+    """One frame on the air."""
+
+    sender: SharedRadio
+    packet: OutgoingPacket
+    answers: SharedRadio | None  # an acknowledgement for that radio; None: the packet itself
+    start_s: float
+    end_s: float
+    others: list[Transmission]  # that overlap with it
+
+
+class SharedRadio(IInProcessAntenna):
+    """A radio as seen by the air."""
+
+    node_id: int
+    drone: IDroneEngine
+    listening_since_s: float | None  # None: it sends, switches over or has no power
+
+    @abc.abstractmethod
+    def recognises(self, frame: Transmission) -> bool:
+        """Whether the radio now listens for the address of that frame."""
+
+    @abc.abstractmethod
+    def frame_left(self, frame: Transmission) -> None:
+        """The radio's own frame has ended."""
+
+    @abc.abstractmethod
+    def frame_arrived(self, frame: Transmission) -> None:
+        """A frame for this radio has arrived undamaged."""
 
 
 class SharedAir(IInProcessAir):
@@ -58,23 +91,20 @@ class SharedAir(IInProcessAir):
         self._answer_s = settings.answer_frame_s
         self._packet_bits = round(self._packet_s * self._bits_per_s)
         self._answer_bits = round(self._answer_s * self._bits_per_s)
-        self._radios: dict[int, SharedAntenna] = {}
+        self._radios: dict[int, SharedRadio] = {}
         self._active: list[Transmission] = []
         self._power_dbm: dict[tuple[int, int], float] = {}  # sender, receiver; of standing pairs
-        self._reached: dict[tuple[int, bool], list[SharedAntenna]] = {}  # by a standing sender
+        self._reached: dict[tuple[int, bool], list[SharedRadio]] = {}  # by a standing sender
         self._flying: set[int] = set()
 
     # The radios on the air -------------------------------------------------------------------
 
-    def antenna(self, host: Host, rng: random.Random) -> SharedAntenna:
-        return SharedAntenna(self, host, rng)
-
-    def add(self, radio: SharedAntenna) -> None:
+    def add(self, radio: SharedRadio) -> None:
         """Add a radio."""
         self._radios[radio.node_id] = radio
         self._forget(radio.node_id)
 
-    def remove(self, radio: SharedAntenna) -> None:
+    def remove(self, radio: SharedRadio) -> None:
         """Remove a radio."""
         self._radios.pop(radio.node_id, None)
         self._forget(radio.node_id)
@@ -87,7 +117,7 @@ class SharedAir(IInProcessAir):
         self._reached.clear()
         self._power_dbm.clear()
 
-    def in_range(self, node: int) -> dict[int, SharedAntenna]:
+    def in_range(self, node: int) -> dict[int, SharedRadio]:
         if node not in self._radios:
             return {}
         return {radio.node_id: radio for radio in self._in_reach(node, faded=False)}
@@ -95,7 +125,7 @@ class SharedAir(IInProcessAir):
     # Frames ----------------------------------------------------------------------------------
 
     def transmit(
-        self, sender: SharedAntenna, packet: OutgoingPacket, answers: SharedAntenna | None = None
+        self, sender: SharedRadio, packet: OutgoingPacket, answers: SharedRadio | None = None
     ) -> None:
         """Start sending a frame now."""
         self.on_frame(packet)
@@ -123,7 +153,7 @@ class SharedAir(IInProcessAir):
             for receiver in self._in_reach(frame.sender.node_id, faded=True):
                 self._arrive(frame, receiver)
 
-    def _arrive(self, frame: Transmission, receiver: SharedAntenna) -> None:
+    def _arrive(self, frame: Transmission, receiver: SharedRadio) -> None:
         since_s = receiver.listening_since_s
         if since_s is None or since_s > frame.start_s or not receiver.recognises(frame):
             return
@@ -199,14 +229,14 @@ class SharedAir(IInProcessAir):
             self._power_dbm[sender, receiver] = power_dbm
         return power_dbm
 
-    def _noise_exceeds(self, dbm: float, frame: Transmission, receiver: SharedAntenna) -> bool:
+    def _noise_exceeds(self, dbm: float, frame: Transmission, receiver: SharedRadio) -> bool:
         """Whether there was more noise than that at some time during the frame."""
         span_ns = (round(frame.start_s * NS_PER_S), round(frame.end_s * NS_PER_S))
         place = receiver.drone.get_location().to_vector()
         noise_dbm = self.space.noise_dbm(place, self._carrier_mhz, self._bits_per_s, span_ns)
         return noise_dbm > dbm
 
-    def hears_power(self, radio: SharedAntenna) -> bool:
+    def hears_power(self, radio: SharedRadio) -> bool:
         """Whether noise or a frame of another radio is strong enough for RPD now."""
         now_ns = round(self.clock.now_s * NS_PER_S)
         strongest_dbm = self.space.noise_dbm(
@@ -220,7 +250,7 @@ class SharedAir(IInProcessAir):
             strongest_dbm = max(strongest_dbm, self._power(frame.sender.node_id, radio.node_id))
         return strongest_dbm > RPD_DBM
 
-    def _in_reach(self, node: int, faded: bool) -> list[SharedAntenna]:
+    def _in_reach(self, node: int, faded: bool) -> list[SharedRadio]:
         """The radios that may hear a node: on average, or when fading adds to the power."""
         faded = faded and self.space.fading is not None
         reached = self._reached.get((node, faded))
@@ -237,6 +267,7 @@ class SharedAir(IInProcessAir):
 
     def _reaches(self, node: int, other: int, more_db: float) -> bool:
         power_dbm = self._mean_power(node, other)
+        distance_m = self._distance_m(node, other)
         return power_dbm > -math.inf and self.space.links.reaches(
-            self._distance_m(node, other), power_dbm + more_db, self._bits_per_s
+            distance_m, power_dbm + more_db, self._bits_per_s
         )

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 import random
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from drone_mesh.channel.medium_access import Fate, MediumAccess
 from drone_mesh.channel.packet_queue import ALL_NODES, OutgoingPacket
@@ -21,12 +19,10 @@ from drone_mesh.communication.wire.messages import (
     receiver,
 )
 from drone_mesh.inprocess.clock import VirtualClock
-from drone_mesh.inprocess.interfaces import Host, IInProcessAntenna
+from drone_mesh.inprocess.interfaces import Host
+from drone_mesh.inprocess.shared_air import SharedAir, SharedRadio, Transmission
 from drone_mesh.nrf24.registers import FIFO_DEPTH, NS_PER_S, SETTLING_NS, ard_s
 from drone_mesh.nrf24.transceiver import CE_PULSE_S, TX_DELAY_S
-
-if TYPE_CHECKING:
-    from drone_mesh.inprocess.shared_air import SharedAir
 
 SETTLING_S = SETTLING_NS / NS_PER_S
 # Durations of the driver's SPI transfers at 8 MHz, as counted by the emulator.
@@ -36,25 +32,13 @@ LOAD_S = 50e-6  # from TX_DS to the rise of CE for the next packet of a train
 READ_S = 80e-6  # from the end of a frame until its payload is in the driver
 
 
-@dataclass(eq=False)
-class Transmission:
-    """One frame on the air."""
-
-    sender: SharedAntenna
-    packet: OutgoingPacket
-    answers: SharedAntenna | None  # an acknowledgement for that radio; None: the packet itself
-    start_s: float
-    end_s: float
-    others: list[Transmission]  # that overlap with it
-
-
-class SharedAntenna(IInProcessAntenna):
+class SharedAntenna(SharedRadio):
     """One node's radio."""
 
     def __init__(self, air: SharedAir, host: Host, rng: random.Random) -> None:
         self.node_id = host.node_id
         self.drone = host.drone
-        self.listening_since_s: float | None = None  # None: it sends, switches or has no power
+        self.listening_since_s: float | None = None
         self.access = MediumAccess(air.settings.access_rules, rng)
         self._air = air
         self._clock: VirtualClock = air.clock
@@ -172,7 +156,6 @@ class SharedAntenna(IInProcessAntenna):
             self._air.transmit(self, packet)
 
     def frame_left(self, frame: Transmission) -> None:
-        """The radio's own frame has ended."""
         now_s = self._clock.now_s
         if frame.answers is not None:
             if self._trying is None and self.powered:
@@ -233,13 +216,11 @@ class SharedAntenna(IInProcessAntenna):
     # Receiving -------------------------------------------------------------------------------
 
     def recognises(self, frame: Transmission) -> bool:
-        """Whether the radio now listens for the address of that frame."""
         if self._trying is None:
             return frame.answers is None
         return frame.answers is self and frame.packet is self._trying  # pipe 0, and no other
 
     def frame_arrived(self, frame: Transmission) -> None:
-        """A frame for this radio has arrived undamaged."""
         if frame.answers is self:
             if not self._answered:
                 self._answered = True
@@ -275,3 +256,10 @@ class SharedAntenna(IInProcessAntenna):
         payload = readdressed(packet.payload, self.node_id) if broadcast else packet.payload
         self._air.delivered += 1
         self._submit(lambda now_s: mesh.on_msg(payload, now_s))
+
+
+class SharedChannel(SharedAir):
+    """The air of a network on the fast model."""
+
+    def antenna(self, host: Host, rng: random.Random) -> SharedAntenna:
+        return SharedAntenna(self, host, rng)

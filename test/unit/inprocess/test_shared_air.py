@@ -14,7 +14,7 @@ from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.clock import VirtualClock
-from drone_mesh.inprocess.shared_air import SharedAir
+from drone_mesh.inprocess.shared_antenna import SharedChannel
 from drone_mesh.nrf24.emulator.links import IdealDisc, LogDistance, ScriptedLoss
 from drone_mesh.nrf24.settings import RadioSettings
 
@@ -53,7 +53,7 @@ class Rig:
         self.clock = VirtualClock()
         self.loses = lambda hop: False
         model = ScriptedLoss(links or IdealDisc(9.0), lambda hop: self.loses(hop))
-        self.air = SharedAir(self.clock, model, settings or RadioSettings(), 9.0)
+        self.air = SharedChannel(self.clock, model, settings or RadioSettings(), 9.0)
         self.meshes, self.antennas = [], []
         for node_id, x_m in enumerate(places_m):
             mesh = Mesh(node_id)
