@@ -227,6 +227,18 @@ class EveryInterfaceTest(unittest.TestCase):
         grounded = self.wait_heard("/Drones/grounded")
         self.assertEqual(set(grounded.reasons), {"crashed"})
         self.assertLessEqual(set(grounded.ids), {5, 6})
+        drone = grounded.ids[0]
+        self.wait_heard("/mesh/events", node=drone, kind="crashed")
+        self.mesh.wait("the state", 60, lambda: self.node(drone).why_not_fly == "crashed")
+        self.mesh.wait("the diagnostics", 60, lambda: self.trouble(drone).startswith("crashed"))
+        goals[drone].publish(msg.Location(latitude=3.0, longitude=3.0, height=0))
+        why = "the drone cannot fly: crashed"
+        self.wait_heard("/mesh/events", node=drone, kind="goal refused", detail=why)
+
+    def trouble(self, node: int) -> str:
+        """Of a node, in the latest diagnostics of the mesh."""
+        of = [s for array in self.heard["/diagnostics"] for s in array.status]
+        return next((s.message for s in of[::-1] if s.name == f"drone_mesh: node {node}"), "")
 
     # Orders ------------------------------------------------------------------------------------
 

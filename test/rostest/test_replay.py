@@ -18,22 +18,11 @@ import rostest
 import websockets.exceptions
 import websockets.sync.client
 from rosgraph_msgs.msg import Clock
-from rostest_support import WALL_LIMIT_S, program, wait_for
+from rostest_support import WALL_LIMIT_S, wait_for
 
-from drone_mesh.lab.command import main as lab_command
 from drone_mesh.msg import MeshState, NodeState, PacketSample
-from drone_mesh.ros.views.bag import read_events, read_states
 
 BEGIN_S, LENGTH_S = 100.0, 4.0
-LAB_RUN = """\
-name: trial
-seeds: 1
-base:
-  layout: {kind: line, drones: 3}
-  obstacles: {boxes: [{center: [0, 20, 1.5], size: [1, 2, 3]}]}
-  duration_s: 20
-  sample_s: 5
-"""
 PORT = 18182
 
 
@@ -81,23 +70,6 @@ class ReplayTest(unittest.TestCase):
         output, _ = self.launch(f"bag:={self.bag}").communicate(timeout=60)
         self.assertIn(f"replay: {self.bag}: contains no /mesh/state", output)
         self.assertNotIn("Traceback", output)
-
-    def test_1_a_run_of_the_lab_is_a_recording_too(self) -> None:
-        folder = self.bag.parent
-        (folder / "trial.yaml").write_text(LAB_RUN, encoding="utf-8")
-        out = str(folder / "out")
-        run = ["run", str(folder / "trial.yaml"), "--workers", "0", "--out", out]
-        self.assertEqual(lab_command(run), 0)
-        row = (folder / "out" / "runs.csv").read_text().splitlines()[1]
-        show = program("lab_run", out, row[:8], "--bag", str(self.bag))
-        shown = subprocess.run(show, capture_output=True, text=True, timeout=60, check=True)
-        self.assertIn("reproduces the run", shown.stdout)
-        states = list(read_states(self.bag))
-        self.assertEqual([state.stamp_s for state in states], [5.0, 10.0, 15.0, 20.0])
-        self.assertEqual([node.id for node in states[-1].nodes], [0, 1, 2])
-        self.assertEqual(states[-1].obstacles[0].size, (1.0, 2.0, 3.0))
-        connected = {event.node for event in read_events(self.bag) if event.kind == "connected"}
-        self.assertEqual(connected, {1, 2})
 
     def test_2_time_moves_forwards_from_the_first_state_to_the_last(self) -> None:
         rospy.init_node("test_replay")

@@ -28,7 +28,7 @@ from rostest_support import (
 )
 
 from drone_mesh.msg import HostReport, MeshEvent, MeshState, NodeState
-from drone_mesh.ros.views.bag import playable, read_events, read_states, topics_in_bag
+from drone_mesh.ros.views.bag import RecordedMesh
 from drone_mesh.srv import PowerSwitch, SetSpeed
 
 TOOLS = ("status", "snapshot", "report")
@@ -190,7 +190,7 @@ class ToolsTest(unittest.TestCase):
         heading, _columns, row = finished.stdout.splitlines()
         self.assertNotIn("routing", heading)
         self.assertRegex(row, r"^4 .* 1\.0, 2\.0, 0\.0 ")
-        (event,) = read_events(bag)
+        (event,) = RecordedMesh(bag).events()
         self.assertEqual((event.order, event.place, event.explanation()), (0, None, OLD_DETAIL))
         report = run_program("report", str(bag), "-o", f"{self.folder}/older.html")
         self.assertEqual(report.returncode, 0, report.stderr)
@@ -221,10 +221,12 @@ class ToolsTest(unittest.TestCase):
             self.assertAlmostEqual(longitude, 5.0005824, delta=1e-6)
             self.assertAlmostEqual(latitude, 52.0000809, delta=1e-6)
             self.assertAlmostEqual(height, 4.0, delta=0.01)
-        bag = playable(record, [])
+        bag = RecordedMesh(record).playable()
         self.assertEqual(bag, self.folder / "flight.jsonl.bag")
-        self.assertEqual(topics_in_bag(bag), ("/", {"/mesh/state", "/mesh/events"}))
-        self.assertEqual([mesh.stamp_s for mesh in read_states(bag)], [1.0, 2.0, 3.0, 4.0, 5.0])
+        self.assertEqual(RecordedMesh(bag).topics(), ("/", {"/mesh/state", "/mesh/events"}))
+        self.assertEqual(
+            [mesh.stamp_s for mesh in RecordedMesh(bag).states()], [1.0, 2.0, 3.0, 4.0, 5.0]
+        )
 
     def test_3_a_run_is_seen_live_and_recorded_and_told(self) -> None:
         recorder = subprocess.Popen(

@@ -118,7 +118,6 @@ def _parser() -> argparse.ArgumentParser:
     how = show.add_mutually_exclusive_group()
     how.add_argument("--page", type=Path, metavar="FILE", help="write a report page about the run")
     how.add_argument("--console", action="store_true", help="show it in the web console")
-    how.add_argument("--rviz", action="store_true", help="play it in rviz (needs ROS, a screen)")
     show.add_argument(
         "--port",
         type=whole(0, MAX_PORT),

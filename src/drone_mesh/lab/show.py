@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
-import shutil
-import sys
 import time
-from typing import NamedTuple, NoReturn, Sequence
+from typing import NamedTuple, Sequence
 
 from drone_mesh.errors import ConfigurationError, MeshError
 from drone_mesh.lab.plan import PlannedRun
@@ -62,9 +59,7 @@ def explain_hash(results: Results, shown: Replay) -> str:
 
 
 def show_run(options: argparse.Namespace) -> int:
-    """`lab show`: 0, or 1 if it was not the same run; with --rviz the exit code of lab_run."""
-    if options.rviz:
-        _show_in_rviz(options)
+    """`lab show`: 0, or 1 if it was not the same run."""
     results = load_results(options.results)
     results.loaded.announce_own_code()
     shown = replay(results, options.run_id)
@@ -81,15 +76,6 @@ def show_run(options: argparse.Namespace) -> int:
         print(verdict)
     row = results.rows.get(shown.planned.spec.run)
     return 0 if row is None or row["event_hash"] == shown.event_hash else 1
-
-
-def _show_in_rviz(options: argparse.Namespace) -> NoReturn:
-    """Runs a program of the ROS side, because this package does not import ROS."""
-    if shutil.which("rosrun") is None:
-        raise MeshError("--rviz needs ROS: rosrun not found; source its setup.bash first")
-    command = ["rosrun", "drone_mesh", "lab_run", str(options.results), options.run_id]
-    sys.stdout.flush()
-    os.execvp(command[0], command)
 
 
 def _print_story(shown: Replay) -> None:

@@ -9,8 +9,8 @@ import pybullet
 from drone_mesh.air.obstacles import Box
 from drone_mesh.drone.flight_path import Vector
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.world.body import GRAVITY_M_S2
-from drone_mesh.world.interfaces import PhysicalWorld
+from drone_mesh.world.dynamic_engine import GRAVITY_M_S2
+from drone_mesh.world.worlds import PhysicalWorld
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)  # unit quaternion, pybullet's order x y z w
 KINEMATIC = 0.0  # physics never moves a body of mass 0
@@ -66,6 +66,11 @@ class BulletWorld(PhysicalWorld):
         plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=self.client)
         self.ground = pybullet.createMultiBody(KINEMATIC, plane, physicsClientId=self.client)
 
+    def step(self) -> float:
+        now_s = super().step()
+        pybullet.stepSimulation(physicsClientId=self.client)
+        return now_s
+
     def add_box(self, size: Vector, centre: Vector) -> int:
         return _add(self.client, KINEMATIC, self._shape(size), centre)
 
@@ -105,9 +110,6 @@ class BulletWorld(PhysicalWorld):
         if self.client >= 0:
             pybullet.disconnect(physicsClientId=self.client)
             self.client = -1
-
-    def _advance(self) -> None:
-        pybullet.stepSimulation(physicsClientId=self.client)
 
     def _shape(self, size: Vector) -> int:
         """The collision shape of a box; boxes of equal size share it."""

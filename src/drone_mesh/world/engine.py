@@ -15,7 +15,7 @@ from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused
 from drone_mesh.mobility.pilot import TrackPilot
-from drone_mesh.world.interfaces import World
+from drone_mesh.world.worlds import World
 
 ARRIVED_M = 0.01  # on each axis
 PILOT_STEP_S = 0.1  # a pilot moves its drone ten times a second

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
-from typing import ClassVar, Iterable, Sequence
+from typing import ClassVar, Sequence
 
 from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.drone.fleet import MAX_DRONES, StartPlace
@@ -12,10 +12,9 @@ from drone_mesh.drone.flight_path import FlightPath, PlanFlight, Vector
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.roles import Role
 from drone_mesh.errors import ConfigurationError, FleetRefused, GoalRefused
-from drone_mesh.world.body import BodyLimits
-from drone_mesh.world.dynamic_engine import DynamicEngine
+from drone_mesh.world.dynamic_engine import BodyLimits, DynamicEngine
 from drone_mesh.world.engine import DroneEngine
-from drone_mesh.world.interfaces import PhysicalWorld, World
+from drone_mesh.world.worlds import PhysicalWorld, World
 
 HALF_WIDTH_M = 0.15  # from the centre of a drone's box to its corner, plus a margin
 
@@ -34,7 +33,7 @@ class VirtualDrone:
     ) -> None:
         """Create a drone on the ground at this place. World's thread.
 
-        With a `wind` (m/s) physics moves it, if the world has physics; else it follows its path.
+        With a `wind` (m/s) physics moves it, in a PhysicalWorld; without, it follows its path.
         `plan_flight` plans its flights.
         """
         self.node_id = place.node_id
@@ -93,8 +92,14 @@ class DroneFactory:
         self._for_flights: Obstacles | None = None
         self._plan_flight: PlanFlight = functools.partial(FlightPath, ceiling_m=cruise_height_m)
         if obstacles is not None:
-            check_starts(fleet, obstacles)
             self._for_flights = obstacles.for_flights(HALF_WIDTH_M)
+            for place in fleet:
+                if not _is_free(place, self._for_flights):
+                    raise ConfigurationError(
+                        f"obstacles: drone {place.node_id} would start in or against a box, at "
+                        f"x {place.longitude:g} m, y {place.latitude:g} m; move the box, or change "
+                        "spacing and gridsize"
+                    )
             self._plan_flight = self._for_flights.plan_flight
             for box in obstacles.boxes:
                 world.add_obstacle(box)
@@ -170,18 +175,6 @@ class DroneFactory:
         for drone in self.drones:
             if math.dist(centre, drone.engine.state.position) < 2 * HALF_WIDTH_M:
                 raise FleetRefused(f"invalid place: drone {drone.node_id} is there")
-
-
-def check_starts(fleet: Iterable[StartPlace], obstacles: Obstacles) -> None:
-    """Raise ConfigurationError if a drone would start in or against an obstacle."""
-    for_flights = obstacles.for_flights(HALF_WIDTH_M)
-    for place in fleet:
-        if not _is_free(place, for_flights):
-            raise ConfigurationError(
-                f"obstacles: drone {place.node_id} would start in or against a box, at "
-                f"x {place.longitude:g} m, y {place.latitude:g} m; move the box, or change spacing "
-                "and gridsize"
-            )
 
 
 def _is_free(place: StartPlace, for_flights: Obstacles) -> bool:

@@ -6,8 +6,7 @@ import importlib.util
 import logging
 
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.world.interfaces import World
-from drone_mesh.world.kinematic_world import KinematicWorld
+from drone_mesh.world.worlds import World
 
 _log = logging.getLogger(__name__)
 
@@ -22,7 +21,7 @@ def require_pybullet(purpose: str) -> None:
 
 
 def open_world(dynamic: bool) -> World:
-    """A BulletWorld. Without pybullet a KinematicWorld, in which a flight looks the same.
+    """A BulletWorld. Without pybullet a World without physics, in which a flight looks the same.
 
     Raises ConfigurationError if physics is to move the drones (`dynamic`) and pybullet is missing.
     """
@@ -30,7 +29,7 @@ def open_world(dynamic: bool) -> World:
         require_pybullet("flight dynamic")
     elif not _is_installed():
         _log.info("pybullet is not installed: the world is kinematic, and flight dynamic needs it")
-        return KinematicWorld()
+        return World()
     from drone_mesh.world.bullet_world import BulletWorld
 
     return BulletWorld()

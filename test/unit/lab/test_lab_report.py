@@ -185,11 +185,3 @@ def test_metrics_lists_all_of_them(capsys: pytest.CaptureFixture[str]) -> None:
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) == len(listed()) + 1  # and the types of packets
     assert {"own_TYPE", "fwd_TYPE", "TYPE:"} < {line.split()[0] for line in lines}
-
-
-def test_rviz_without_ros_gives_one_line(
-    results_folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setenv("PATH", str(results_folder))
-    assert main(["show", str(results_folder), "0", "--rviz"]) == 1
-    assert "lab: --rviz needs ROS: rosrun not found" in capsys.readouterr().err

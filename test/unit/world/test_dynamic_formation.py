@@ -12,9 +12,8 @@ from drone_mesh.formations.airspace import APART_M, SWAY_M
 from drone_mesh.formations.departures import AT_PLACE_M, Departures, FlightRules
 from drone_mesh.state.model import MeshStatus, NodeStatus
 from drone_mesh.state.observation import describe_drone
-from drone_mesh.world.body import BodyLimits
 from drone_mesh.world.bullet_world import BulletWorld
-from drone_mesh.world.dynamic_engine import DynamicEngine
+from drone_mesh.world.dynamic_engine import BodyLimits, DynamicEngine
 
 HALF_M = Role.ROUTER.size_m[2] / 2
 RULES = FlightRules(sway_m=SWAY_M)
@@ -32,8 +31,7 @@ def mesh(engines: dict[int, DynamicEngine], now_s: float) -> MeshStatus:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("turn", [1, 4])
-def test_dynamic_drones_that_change_places_stay_1_m_apart(turn):
+def test_dynamic_drones_that_change_places_stay_1_m_apart():
     places = [(2.0 * (n % 3), 2.0 * (n // 3), HALF_M) for n in range(9)]
     with BulletWorld() as world:
         engines = {}
@@ -41,8 +39,7 @@ def test_dynamic_drones_that_change_places_stay_1_m_apart(turn):
             box = world.add_body(Role.ROUTER.size_m, place, BodyLimits().mass_kg)
             engines[drone] = DynamicEngine(world, box, place, HALF_M, wind=(1.0, 0.5, 0.0))
         goals = {
-            drone: Location.from_vector((*places[(drone - 1 + turn) % 9][:2], 0.0))
-            for drone in engines
+            drone: Location.from_vector((*places[(drone + 3) % 9][:2], 0.0)) for drone in engines
         }
         nearest_m, under_order = math.inf, {}
         for tick in range(40_000):

@@ -9,8 +9,8 @@ import pytest
 from drone_mesh.drone.fleet import plan_fleet
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.world.factory import DroneFactory
-from drone_mesh.world.interfaces import PhysicalWorld
 from drone_mesh.world.physics import open_world, require_pybullet
+from drone_mesh.world.worlds import PhysicalWorld
 
 
 @pytest.fixture

@@ -10,11 +10,9 @@ from drone_mesh.drone.fleet import StartPlace
 from drone_mesh.drone.flight_path import FlightPath
 from drone_mesh.drone.roles import Role
 from drone_mesh.mobility.pilot import TrackPilot, along
-from drone_mesh.world.body import BodyLimits
 from drone_mesh.world.bullet_world import BulletWorld
-from drone_mesh.world.dynamic_engine import DynamicEngine
+from drone_mesh.world.dynamic_engine import BodyLimits, DynamicEngine
 from drone_mesh.world.factory import RouterDrone
-from drone_mesh.world.kinematic_world import KinematicWorld
 
 SQUARE = [(4.0, 0.0, 2.0), (4.0, 4.0, 2.0), (0.0, 4.0, 2.0), (0.0, 0.0, 2.0)]
 
@@ -23,8 +21,8 @@ def pilot(speed_m_s=1.0, loop=True):
     return TrackPilot(along(SQUARE, speed_m_s, loop), speed_m_s)
 
 
-def drone(world):
-    return RouterDrone(world, StartPlace(3, Role.ROUTER, 0.0, 0.0), (0.0, 0.0, 0.0)).engine
+def drone(world, wind=None):
+    return RouterDrone(world, StartPlace(3, Role.ROUTER, 0.0, 0.0), wind).engine
 
 
 def run(world, seconds, engine=None):
@@ -37,14 +35,18 @@ def run(world, seconds, engine=None):
     return places
 
 
-@pytest.fixture(params=["kinematic", "dynamic"])
-def world(request):
-    with KinematicWorld() if request.param == "kinematic" else BulletWorld() as world:
+@pytest.fixture
+def world():
+    with BulletWorld() as world:
         yield world
 
 
-def test_a_piloted_drone_passes_its_waypoints_at_one_height(world):
-    engine = drone(world)
+@pytest.fixture(params=[None, (0.0, 0.0, 0.0)], ids=["kinematic", "dynamic"])
+def engine(request, world):
+    return drone(world, request.param)
+
+
+def test_a_piloted_drone_passes_its_waypoints_at_one_height(world, engine):
     engine.fly_with(pilot())
     places = run(world, 40.0, engine)
     for waypoint in SQUARE:
@@ -53,8 +55,7 @@ def test_a_piloted_drone_passes_its_waypoints_at_one_height(world):
     assert engine.state.path is None  # it is on no ordered flight
 
 
-def test_an_order_pauses_the_pilot_who_takes_over_again_when_told(world):
-    engine = drone(world)
+def test_an_order_pauses_the_pilot_who_takes_over_again_when_told(world, engine):
     flown = pilot()
     engine.fly_with(flown)
     run(world, 6.0)
@@ -69,8 +70,7 @@ def test_an_order_pauses_the_pilot_who_takes_over_again_when_told(world):
     assert min(math.dist(place, SQUARE[1]) for place in places) < 0.5
 
 
-def test_a_pause_holds_the_drone_where_it_is(world):
-    engine = drone(world)
+def test_a_pause_holds_the_drone_where_it_is(world, engine):
     engine.fly_with(pilot())
     run(world, 8.0)
     engine.pause_pilot(True)
@@ -79,8 +79,7 @@ def test_a_pause_holds_the_drone_where_it_is(world):
     assert max(math.dist(place, places[0]) for place in places) < 0.1
 
 
-def test_without_a_pilot_the_drone_stays(world):
-    engine = drone(world)
+def test_without_a_pilot_the_drone_stays(world, engine):
     engine.fly_with(pilot())
     run(world, 6.0)
     engine.fly_with(None)
@@ -90,8 +89,7 @@ def test_without_a_pilot_the_drone_stays(world):
     assert places[0][2] > 1.0
 
 
-def test_a_kinematic_pilot_moves_the_drone_ten_times_a_second():
-    world = KinematicWorld()
+def test_a_kinematic_pilot_moves_the_drone_ten_times_a_second(world):
     engine = drone(world)
     states = []
     engine.add_listener(states.append)
@@ -100,14 +98,13 @@ def test_a_kinematic_pilot_moves_the_drone_ten_times_a_second():
     assert 45 <= len(states) <= 51
 
 
-def test_a_pilot_lets_physics_land_a_drone_whose_battery_is_low():
-    with BulletWorld() as world:
-        box = world.add_body((0.2, 0.2, 0.1), (0.0, 0.0, 0.05), BodyLimits().mass_kg)
-        engine = DynamicEngine(world, box, (0.0, 0.0, 0.05), 0.05, limits=BodyLimits(hover_s=30.0))
-        engine.fly_with(pilot())
-        run(world, 60.0)
-        assert engine.why_not_fly()
-        assert engine.get_location().height < 0.05
+def test_a_pilot_lets_physics_land_a_drone_whose_battery_is_low(world):
+    box = world.add_body((0.2, 0.2, 0.1), (0.0, 0.0, 0.05), BodyLimits().mass_kg)
+    engine = DynamicEngine(world, box, (0.0, 0.0, 0.05), 0.05, limits=BodyLimits(hover_s=30.0))
+    engine.fly_with(pilot())
+    run(world, 60.0)
+    assert engine.why_not_fly()
+    assert engine.get_location().height < 0.05
 
 
 def test_a_ceiling_lowers_a_flight_but_takes_no_longer():
@@ -120,8 +117,7 @@ def test_a_ceiling_lowers_a_flight_but_takes_no_longer():
     assert high.above_start[2] == 5.0
 
 
-def test_a_mission_that_has_ended_is_gone_and_one_that_an_order_ended_early_is_not(world):
-    engine = drone(world)
+def test_a_mission_that_has_ended_is_gone_and_one_that_an_order_ended_early_is_not(world, engine):
     engine.fly_with(pilot(speed_m_s=2.0, loop=False))
     run(world, 3.0)
     engine.pause_pilot(True)

@@ -16,7 +16,7 @@ import rospy
 
 from drone_mesh.errors import ConfigurationError, MeshError
 from drone_mesh.ros.graph import names
-from drone_mesh.ros.graph.bounded_master import (
+from drone_mesh.ros.graph.master import (
     ANSWER_TIMEOUT_S,
     NO_ANSWER,
     bounded_master,

@@ -12,11 +12,11 @@ from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.drone.flight_path import Vector
 from drone_mesh.drone.location import Location
 from drone_mesh.formations.layouts import Order
-from drone_mesh.msg import DroneInfo, MeshState, NodeState, Obstacle, RequestGatewayDroneFlight
 from drone_mesh.msg import Location as LocationMsg
 from drone_mesh.msg import MeshEvent as MeshEventMsg
+from drone_mesh.msg import MeshState, NodeState, Obstacle
 from drone_mesh.ros.graph import names
-from drone_mesh.srv import OrderFormationRequest, RequestGPSResponse
+from drone_mesh.srv import OrderFormationRequest
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus, ObstacleStatus
 
 _CODES = {kind.value: number for number, kind in enumerate(MeshEventKind)}  # as in MeshEvent.msg
@@ -38,14 +38,6 @@ def ros_time(seconds: float) -> rospy.Time:
     return rospy.Time(0, round(seconds * 1e9))
 
 
-# Positions ----------------------------------------------------------------------------------------
-
-
-def whole_metres(height: float) -> int:
-    """A height in metres, rounded to the integer that the int16 fields carry."""
-    return round(height)
-
-
 def location_of(message: PlaceMsg) -> Location:
     """The position in a message."""
     return Location(message.latitude, message.longitude, float(message.height))
@@ -62,43 +54,7 @@ def formation_request(
 
 def location_msg(latitude: float, longitude: float, height: float) -> LocationMsg:
     """A position in metres, its height rounded to whole metres."""
-    return LocationMsg(latitude, longitude, whole_metres(height))
-
-
-def gps_response(location: Location) -> RequestGPSResponse:
-    """The position of a drone's underside, its height rounded to whole metres."""
-    return RequestGPSResponse(location.latitude, location.longitude, whole_metres(location.height))
-
-
-def flight_order(node_id: int, goal: Location) -> RequestGatewayDroneFlight:
-    """The DroneManager's order to the gateways, its height rounded to whole metres."""
-    return RequestGatewayDroneFlight(
-        node_id, goal.latitude, goal.longitude, whole_metres(goal.height)
-    )
-
-
-# DroneInfo (docs/ros.md, "Sources of DroneInfo") -------------------------------------------
-
-
-def engine_info(node_id: int, position: Vector) -> DroneInfo:
-    """The DroneInfo of an engine: always a position, never a topic."""
-    return DroneInfo(nodeID=node_id, position=position, sub="", on=True)
-
-
-def power_off_info(node_id: int) -> DroneInfo:
-    """The DroneInfo of a node that has lost its power, with neither position nor topic."""
-    return DroneInfo(nodeID=node_id, position=NO_POSITION, sub="", on=False)
-
-
-def antenna_info(node_id: int, topic: str, on: bool, position: Vector) -> DroneInfo:
-    """The DroneInfo of an antenna: its topic, and where its drone's engine was last.
-
-    A simulator that follows the original design takes the position of each message of a known node.
-    """
-    return DroneInfo(nodeID=node_id, position=position, sub=topic, on=on)
-
-
-# State and events -------------------------------------------------------------------------------
+    return LocationMsg(latitude, longitude, round(height))
 
 
 def event_msg(event: EventRecord) -> MeshEventMsg:

@@ -30,6 +30,7 @@ class DirectPublisher(rospy.SubscribeListener):
 
         `headers`: further ones of its connections.
         """
+        self.had_subscriber = False  # set by a thread of rospy: the first one has connected
         self._timeval = struct.pack("@ll", 0, int(limit_s * 1e6))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SyntaxWarning)  # rospy warns about queue_size
@@ -44,6 +45,7 @@ class DirectPublisher(rospy.SubscribeListener):
 
     def peer_subscribe(self, _topic: str, _publish: object, _peer_publish: object) -> None:
         """A new subscriber (a thread of rospy): limit how long it can block."""
+        self.had_subscriber = True
         for connection in self.connections():
             if connection.socket is not None:
                 connection.socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, self._timeval)
@@ -51,6 +53,16 @@ class DirectPublisher(rospy.SubscribeListener):
     def publish(self, message: Message) -> None:
         """Send to all subscribers. Raises ROSException once the topic is closed."""
         self._publisher.publish(message)
+
+    def deliver(self, message: Message) -> bool:
+        """Like `publish`; returns False if there is no subscriber, or the topic is closed."""
+        if not self.has_subscriber():
+            return False
+        try:
+            self.publish(message)
+        except rospy.ROSException:
+            return False
+        return bool(self.connections())
 
     def has_subscriber(self) -> bool:
         """Whether any subscriber is connected and alive."""

@@ -12,7 +12,7 @@ import rospy
 
 from drone_mesh.configuration import FactoryConfiguration
 from drone_mesh.ros.graph import names
-from drone_mesh.ros.graph.present_drones import PresentDrones
+from drone_mesh.ros.graph.simulation import PresentDrones
 
 __all__ = ["drones_if_known"]  # for users; see docs/architecture.md
 

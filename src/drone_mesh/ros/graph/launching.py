@@ -20,7 +20,7 @@ from roslaunch.pmon import ProcessListener
 from drone_mesh.console import DEFAULT_PORT
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.errors import MeshError
-from drone_mesh.ros.graph.bounded_master import ANSWER_TIMEOUT_S, bounded_master
+from drone_mesh.ros.graph.master import ANSWER_TIMEOUT_S, bounded_master
 from drone_mesh.ros.graph.names import check_namespace
 from drone_mesh.web import LOOPBACK
 from drone_mesh.web.listening import listen, port_of

@@ -29,22 +29,10 @@ class ThrottledLog:
         self._throttle = Throttle(COMPLAINT_PERIOD_S)
         self.counts = self._throttle.counts
 
-    def warning(self, reason: str, text: str) -> None:
+    def note(self, reason: str, text: str, level: int = logging.WARNING) -> None:
         """Count `reason`; log it with `text` unless it was logged within the last period."""
-        self._complain(logging.WARNING, reason, text)
-
-    def info(self, reason: str, text: str) -> None:
-        """Like `warning`, at level info."""
-        self._complain(logging.INFO, reason, text)
-
-    def error(self, reason: str, text: str) -> None:
-        """Like `warning`, at level error."""
-        self._complain(logging.ERROR, reason, text)
-
-    def _complain(self, level: int, reason: str, text: str) -> None:
-        now_s = time.monotonic()
         with self._lock:
-            is_due = self._throttle.count(reason, now_s)
+            is_due = self._throttle.count(reason, time.monotonic())
             count = self.counts[reason]
         if is_due:
             self._log.log(level, "%s: %s (%d so far)", reason, text, count)

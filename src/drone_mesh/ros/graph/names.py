@@ -6,6 +6,8 @@ docstrings write them as they are without a namespace: /mesh/state.
 
 from __future__ import annotations
 
+from typing import Callable
+
 from drone_mesh.air.node_table import AirError, check_topic
 from drone_mesh.errors import ConfigurationError
 
@@ -79,56 +81,16 @@ def host_param(host: str) -> str:
     return f"drone_mesh/hosts/{host.strip('/')}"
 
 
-def drone_frame(node_id: int) -> str:
-    """tf frame of a drone, at its underside."""
-    return f"drone_{node_id}"
+OfNode = Callable[[int], str]  # the name of one node or drone, by its id
 
-
-def node_topic(node_id: int) -> str:
-    """NRF24: simulator -> antenna."""
-    return f"Node/{node_id}"
-
-
-def debug_topic(node_id: int) -> str:
-    """NodeDebugInfo: antenna -> users."""
-    return f"Nodes/{node_id}/debug"
-
-
-def power_switch(node_id: int) -> str:
-    """PowerSwitch, offered by the antenna."""
-    return f"Nodes/{node_id}/powerSwitch"
-
-
-def internet_switch(node_id: int) -> str:
-    """PowerSwitch, offered by a gateway: whether its internet works."""
-    return f"Nodes/{node_id}/internetSwitch"
-
-
-def send_service(node_id: int) -> str:
-    """SendData: users -> node."""
-    return f"Nodes/{node_id}/send"
-
-
-def received_topic(node_id: int) -> str:
-    """ReceivedData: node -> users."""
-    return f"Nodes/{node_id}/received"
-
-
-def goal_topic(node_id: int) -> str:
-    """Location: connector -> engine."""
-    return f"Drones/{node_id}/goal"
-
-
-def mission_service(node_id: int) -> str:
-    """FlyMission, offered by the engine."""
-    return f"Drones/{node_id}/mission"
-
-
-def fly_action(node_id: int) -> str:
-    """Fly, an action: users -> fly_actions."""
-    return f"Drones/{node_id}/fly"
-
-
-def gps_service(node_id: int) -> str:
-    """RequestGPS, offered by the engine."""
-    return f"Drones/{node_id}/gps"
+drone_frame: OfNode = "drone_{}".format  # tf frame, at the drone's underside
+node_topic: OfNode = "Node/{}".format  # NRF24: simulator -> antenna
+debug_topic: OfNode = "Nodes/{}/debug".format  # NodeDebugInfo: antenna -> users
+power_switch: OfNode = "Nodes/{}/powerSwitch".format  # PowerSwitch, offered by the antenna
+internet_switch: OfNode = "Nodes/{}/internetSwitch".format  # PowerSwitch, offered by a gateway
+send_service: OfNode = "Nodes/{}/send".format  # SendData: users -> node
+received_topic: OfNode = "Nodes/{}/received".format  # ReceivedData: node -> users
+goal_topic: OfNode = "Drones/{}/goal".format  # Location: connector -> engine
+mission_service: OfNode = "Drones/{}/mission".format  # FlyMission, offered by the engine
+gps_service: OfNode = "Drones/{}/gps".format  # RequestGPS, offered by the engine
+fly_action: OfNode = "Drones/{}/fly".format  # Fly, an action: users -> fly_actions

@@ -11,7 +11,7 @@ import threading
 
 import rospy
 
-from drone_mesh.ros.graph.bounded_master import NO_ANSWER, bounded_master
+from drone_mesh.ros.graph.master import NO_ANSWER, bounded_master
 from drone_mesh.stopping import StopRequest
 
 MASTER_TIMEOUT_S = 2.0  # wall: asked twice, a master that is silent for so long hangs
@@ -32,10 +32,9 @@ def _end_without_dead_master() -> None:
             bounded_master(rospy.get_name(), MASTER_TIMEOUT_S).getPid()
         except socket.timeout:
             continue
-        except NO_ANSWER:  # it has ended, and nobody waits for it
-            return
-        else:
-            return
+        except NO_ANSWER:
+            pass  # it has ended, and nobody waits for it
+        return
     print(f"{rospy.get_name()}: the ROS master does not answer: ending without it", file=sys.stderr)
     os._exit(1)
 

@@ -19,7 +19,7 @@ from rosgraph.network import (
 from rospy.impl.validators import ParameterInvalid
 
 from drone_mesh.errors import MeshError
-from drone_mesh.ros.graph.bounded_master import NO_ANSWER, bounded_master
+from drone_mesh.ros.graph.master import NO_ANSWER, bounded_master
 
 CALL_TIMEOUT_S = 2  # wall seconds without an answer until a service is gone
 SINGLE_CALL_TIMEOUT_S = 10  # the same for `call_once`: the DroneManager may wait for a gateway

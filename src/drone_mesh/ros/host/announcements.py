@@ -12,7 +12,6 @@ from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.drone.flight_path import Vector
 from drone_mesh.msg import DroneInfo
 from drone_mesh.ros.graph import names
-from drone_mesh.ros.graph.conversions import antenna_info
 
 PlaceOf = Callable[[int], Vector]
 """The position that the engine of this drone reported last, metres; NO_POSITION if none did."""
@@ -75,7 +74,7 @@ class Announcements:
         place = self._place_of(node_id)
         topic = rospy.resolve_name(names.node_topic(node_id))
         with self._announcing:
-            self._publish(antenna_info(node_id, topic, antenna.on(), place))
+            self._publish(DroneInfo(node_id, place, topic, antenna.on()))
 
     def announce_all_to_new_simulator(self) -> None:
         """Announce all antennas: a new simulator has not registered any."""

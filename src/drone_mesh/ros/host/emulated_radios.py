@@ -18,12 +18,10 @@ from drone_mesh.nrf24.emulator.clock import WallClock
 from drone_mesh.nrf24.emulator.links import LogDistance
 from drone_mesh.nrf24.high_level import NRF24HighLevelInterface
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
-from drone_mesh.nrf24.registers import NS_PER_S
 from drone_mesh.nrf24.settings import DataRate, RadioSettings
 from drone_mesh.ros.graph import names
-from drone_mesh.ros.graph.packet_samples import PacketSamples
-from drone_mesh.ros.host.antenna_panel import AntennaPanel
-from drone_mesh.ros.host.radios import Radios
+from drone_mesh.ros.graph.periodic import PacketSamples
+from drone_mesh.ros.host.radios import AntennaPanel, Radios
 from drone_mesh.world.engine import DroneState
 from drone_mesh.world.factory import VirtualDrone
 
@@ -102,7 +100,6 @@ class EmulatedRadios(Radios):
         self._air = Air(self._wall_clock, links, random.Random(f"{seed} air"))
         self._settings = RadioSettings(data_rate=rate)
         self._seed = seed
-        self._airtime_s, self._measured_s = 0.0, 0.0
         self._samples = PacketSamples()
         self._chips: dict[int, EmulatedChip] = {}
         self._antennas: dict[int, EmulatedNRF24] = {}
@@ -120,24 +117,6 @@ class EmulatedRadios(Radios):
         chip = EmulatedChip(self._air, f"node {drone.node_id}", drone.engine.state.position)
         drone.engine.add_listener(functools.partial(_carry, chip))
         self._chips[drone.node_id] = chip
-
-    def figures(self) -> dict[str, float]:
-        """Figures of the air and all radios. One thread."""
-        with self._wall_clock.access():
-            frames, collisions = self._air.frames, self._air.collisions
-            airtime_s, now_s = self._air.airtime_s, self._wall_clock.now_ns / NS_PER_S
-        share = (airtime_s - self._airtime_s) / max(now_s - self._measured_s, 1e-9)
-        self._airtime_s, self._measured_s = airtime_s, now_s
-        radios = [antenna.statistics() for antenna in list(self._antennas.values())]
-        tries, sent = (sum(r.tries for r in radios), sum(r.sent for r in radios))
-        return {
-            "frames": frames,
-            "collisions": collisions,
-            "airtime share": round(share, 3),
-            "tries per packet": round(1 + tries / max(sent, 1), 2),
-            "packets waiting": sum(radio.waiting for radio in radios),
-            "packets given up": sum(radio.lost for radio in radios),
-        }
 
     def start(self) -> None:
         self._samples.start()

@@ -6,15 +6,15 @@ from typing import Callable
 
 import rospy
 
-from drone_mesh.communication.events.observer import MeshEvent
 from drone_mesh.communication.node.component import MeshnetworkComponent
 from drone_mesh.drone.roles import Role
+from drone_mesh.execution import ExecutorSlot
 from drone_mesh.msg import HostReport, NodeState
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import event_msg, ros_time
 from drone_mesh.ros.graph.periodic import Periodic
-from drone_mesh.ros.graph.run import Run, run_headers
-from drone_mesh.ros.host.node_snapshots import NodeSnapshots, Worker
+from drone_mesh.ros.graph.simulation import Run, run_headers
+from drone_mesh.ros.host.node_snapshots import NodeSnapshots
 from drone_mesh.state.observation import EventBatcher
 
 REPORT_PERIOD_S = 0.5  # wall time; an event is seen soon
@@ -37,6 +37,8 @@ class HostReports(Periodic):
         super().__init__("host reports", REPORT_PERIOD_S)
         self._snapshots: NodeSnapshots[NodeState] = NodeSnapshots(REPORT_PERIOD_S)
         self._batcher = EventBatcher()
+        self.drop = self._snapshots.drop  # stops reporting on a node
+        self.observe = self._batcher.observe  # the observer of all components of this process
         self._publisher = rospy.Publisher(
             names.REPORTS_TOPIC, HostReport, headers=run_headers(run), queue_size=REPORTS_QUEUE
         )
@@ -45,20 +47,12 @@ class HostReports(Periodic):
         self,
         role: Role,
         component: MeshnetworkComponent,
-        worker: Worker,
+        worker: ExecutorSlot,
         antenna_on: Callable[[], bool],
     ) -> None:
         """Report on this node, which `worker` drives, from now on."""
         node_id = component.get_node_id()
         self._snapshots.add(component, worker, lambda: NodeState(id=node_id, role=role), antenna_on)
-
-    def drop(self, node_id: int) -> None:
-        """Stop reporting on this node."""
-        self._snapshots.drop(node_id)
-
-    def observe(self, event: MeshEvent) -> None:
-        """The observer of all components of this process."""
-        self._batcher.observe(event)
 
     def stop(self) -> None:
         super().stop()
@@ -69,9 +63,8 @@ class HostReports(Periodic):
         # Events wait for a subscriber; published without one they would be lost.
         if not self._publisher.get_num_connections():
             return
-        now_s = rospy.get_time()
         report = HostReport(host=rospy.get_name())
-        report.header.stamp = ros_time(now_s)
+        report.header.stamp = ros_time(rospy.get_time())
         report.nodes = self._snapshots.collect()
-        report.events = [event_msg(event) for event in self._batcher.drain()]
+        report.events = list(map(event_msg, self._batcher.drain()))
         self._publisher.publish(report)

@@ -10,16 +10,18 @@ from typing import Callable, Mapping
 from drone_mesh.drone.roles import Role
 from drone_mesh.errors import MeshError
 from drone_mesh.execution import ExecutorSlot, MeshExecutor
-from drone_mesh.ros.graph.figures import LOST_IN_RANGE, WORST_LAG, FiguresPublisher
+from drone_mesh.ros.graph.periodic import LOST_IN_RANGE, WORST_LAG, FiguresPublisher
 from drone_mesh.ros.graph.waiting import comes_true
 from drone_mesh.ros.host.announcements import PlaceOf
-from drone_mesh.ros.host.flown_drones import GroundedDrones
+from drone_mesh.ros.host.engines import GroundedDrones, SilentEngines
 from drone_mesh.ros.host.host_reports import HostReports
-from drone_mesh.ros.host.mesh_settings import MeshSettings
 from drone_mesh.ros.host.radios import Radios
-from drone_mesh.ros.host.silent_engines import SilentEngines
 from drone_mesh.ros.host.virtual_nrf24 import VirtualRadios
-from drone_mesh.ros.host.virtual_raspberry_pi import VIRTUAL_RASPBERRY_PIS, VirtualRaspberryPi
+from drone_mesh.ros.host.virtual_raspberry_pi import (
+    VIRTUAL_RASPBERRY_PIS,
+    MeshSettings,
+    VirtualRaspberryPi,
+)
 
 RADIOS_TIMEOUT_S = 10.0  # wall seconds to wait for a simulator before starting nodes
 
@@ -42,7 +44,7 @@ class MeshHost:
         place_of: PlaceOf,
         radios: Radios | None = None,
     ) -> None:
-        """`clock` gives simulated seconds; the code that advances it calls `time_advanced`.
+        """`clock` gives simulated seconds; what advances it calls `executor.time_advanced`.
 
         `on_failure` is called with the reason when a node cannot start. `place_of` is called in
         any thread. `radios`: virtual ones by default.
@@ -83,10 +85,6 @@ class MeshHost:
         """Packets that this process handed over, minus those that its nodes have processed."""
         return self._radios.under_way
 
-    def time_advanced(self) -> None:
-        """The clock has advanced."""
-        self.executor.time_advanced()
-
     def wait_for_radios(self, give_up: Callable[[], bool]) -> None:
         """Return when packets can be sent, after RADIOS_TIMEOUT_S, or when `give_up` returns True.
 
@@ -98,9 +96,9 @@ class MeshHost:
 
     def start_nodes(self, nodes: Mapping[int, Role]) -> None:
         """Start these nodes, given by id and role, in this order."""
-        begun_s = time.monotonic()
         if not nodes:
             return
+        begun_s = time.monotonic()
         for node_id, role in nodes.items():
             slot = self.executor.slot()
             slot.submit(functools.partial(self._start_node, node_id, role, slot))
@@ -144,7 +142,6 @@ class MeshHost:
         return {
             WORST_LAG: 0.0 if self._radios.in_wall_time else self.executor.take_worst_lag_s(),
             LOST_IN_RANGE: self._radios.never_handed_over,
-            **self._radios.figures(),
         }
 
     def _start_node(self, node_id: int, role: Role, slot: ExecutorSlot, now_s: float) -> None:

@@ -4,21 +4,15 @@ from __future__ import annotations
 
 import functools
 import queue
-from typing import Callable, Generic, Protocol, TypeVar
+from typing import Callable, Generic, TypeVar
 
 from drone_mesh.communication.node.component import MeshnetworkComponent
+from drone_mesh.execution import ExecutorSlot
 from drone_mesh.state.model import NodeStatus
 from drone_mesh.state.observation import describe_component
 
 S = TypeVar("S", bound=NodeStatus)
 _Fill = Callable[[Callable[[int], None], float], None]  # called with what to tell, and the time
-
-
-class Worker(Protocol):
-    """The thread that drives a node."""
-
-    def submit(self, function: Callable[[float], None]) -> None:
-        """Run `function(now_s)` there, after all earlier submissions."""
 
 
 class NodeSnapshots(Generic[S]):
@@ -30,7 +24,7 @@ class NodeSnapshots(Generic[S]):
     def __init__(self, wait_s: float) -> None:
         """`wait_s`: wall seconds without a new state after which `take` stops waiting."""
         self._wait_s = wait_s
-        self._fills: dict[int, tuple[Worker, _Fill]] = {}
+        self._fills: dict[int, tuple[ExecutorSlot, _Fill]] = {}
         self._latest: dict[int, S] = {}
 
     def __len__(self) -> int:
@@ -39,12 +33,11 @@ class NodeSnapshots(Generic[S]):
     def add(
         self,
         component: MeshnetworkComponent,
-        worker: Worker,
+        worker: ExecutorSlot,
         new: Callable[[], S],
         antenna_on: Callable[[], bool],
     ) -> None:
-        """Describe this node from now on, each time in a state made by `new`."""
-
+        """Describe this node from now on, in its `worker`, each time in a state made by `new`."""
         node_id = component.get_node_id()
 
         def fill(done: Callable[[int], None], now_s: float) -> None:

@@ -4,26 +4,112 @@ from __future__ import annotations
 
 import logging
 import math
+import struct
 import threading
-from typing import Sequence
+from typing import Any, Sequence
 
 import rospy
 from std_msgs.msg import Bool
 
+from drone_mesh.communication.wire.messages import readdressed, receiver, sender
 from drone_mesh.execution import MeshExecutor
 from drone_mesh.msg import DroneInfo
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.logs import ThrottledLog
-from drone_mesh.ros.graph.persistent_service import ServiceGone, ServiceRefused
+from drone_mesh.ros.graph.persistent_service import (
+    PersistentService,
+    Request,
+    Response,
+    ServiceClass,
+    ServiceGone,
+    ServiceRefused,
+    ServiceUnknown,
+)
 from drone_mesh.ros.host.announcements import Announcements, PlaceOf, probe_of
 from drone_mesh.ros.host.radios import Radios
-from drone_mesh.ros.host.simulator_connection import SimulatorConnection
+from drone_mesh.srv import AreaScan, Broadcast, WirelessMessage, WirelessMessages
 
 POLL_PERIOD_S = 0.1  # wall seconds between two attempts to reach a simulator
 ANNOUNCE_AGAIN_AFTER = 20  # polls; an unregistered antenna is announced again
 POLLS_PER_ROUND = 50  # each antenna is announced at least once in so many polls
+_LENGTH = struct.Struct("<I")  # of an array, as ROS serialises it
 
 _log = logging.getLogger(__name__)
+
+
+class SimulatorConnection:
+    """Hands packets to a simulator. Every call raises ServiceGone or ServiceRefused.
+
+    A simulator needs only the services of the specification, `message` and `othersinRange`;
+    `messages` and `broadcast` save calls if it offers them.
+
+    For the executor's worker only, except `is_connected`, which any thread may call.
+    """
+
+    def __init__(self) -> None:
+        """Connect. Raises ServiceGone."""
+        self._services: list[PersistentService[Any, Any]] = []  # those that are open
+        try:
+            self._message = self._connect(names.MESSAGE_SERVICE, WirelessMessage)
+            self._messages = self._if_offered(names.MESSAGES_SERVICE, WirelessMessages)
+            self._broadcast = self._if_offered(names.BROADCAST_SERVICE, Broadcast)
+            if self._broadcast is None:
+                self._others = self._connect(names.OTHERS_IN_RANGE_SERVICE, AreaScan)
+        except ServiceGone:
+            self.close()
+            raise
+        self.simulator = self._message.server  # the name of its node; empty if unknown
+
+    def is_connected(self) -> bool:
+        """Whether all connections are still open at the other end."""
+        return all(service.is_connected() for service in self._services)
+
+    def close(self) -> None:
+        """Close all connections."""
+        for service in self._services:
+            service.close()
+
+    def send(self, payload: bytes) -> bool:
+        """Hand over a packet for the node in its byte 3. True: that node received it."""
+        # The fields of a WirelessMessageRequest and of its response are single bytes.
+        fields = bytes((sender(payload), receiver(payload))) + payload
+        return self._message.call_bytes(fields) != b"\0"
+
+    def send_all(self, payloads: Sequence[bytes]) -> list[bool]:
+        """Hand over packets of one sender; returns for each whether it was received."""
+        if self._messages is None or len(payloads) < 2:
+            return [self.send(payload) for payload in payloads]
+        packets = b"".join(payloads)
+        # The fields of a WirelessMessagesRequest.
+        fields = bytes((sender(payloads[0]),)) + _LENGTH.pack(len(packets)) + packets
+        answer = self._messages.call_bytes(fields)
+        return [bool(taken) for taken in answer[_LENGTH.size :]]
+
+    def broadcast(self, payload: bytes) -> int:
+        """Hand over a packet for every node in range; returns how many received it."""
+        asker = bytes((sender(payload),))
+        if self._broadcast is not None:
+            # The fields of a BroadcastRequest; the answer: an array of the nodes that received it.
+            return len(self._broadcast.call_bytes(asker + payload)) - _LENGTH.size
+        others = self._others.call_bytes(asker)[_LENGTH.size :]
+        return sum(self.send(readdressed(payload, node_id)) for node_id in others)
+
+    def _connect(
+        self, name: str, service_class: ServiceClass[Request, Response]
+    ) -> PersistentService[Request, Response]:
+        service = PersistentService(name, service_class)
+        service.connect()
+        self._services.append(service)
+        return service
+
+    def _if_offered(
+        self, name: str, service_class: ServiceClass[Request, Response]
+    ) -> PersistentService[Request, Response] | None:
+        try:
+            return self._connect(name, service_class)
+        except ServiceUnknown as error:
+            _log.info("the simulator does not offer %s, using single messages: %s", name, error)
+            return None
 
 
 class SimulatorLink(Radios, rospy.SubscribeListener):
@@ -96,40 +182,43 @@ class SimulatorLink(Radios, rospy.SubscribeListener):
     def send_all(self, payloads: Sequence[bytes]) -> list[bool]:
         """Hand over packets of one sender; returns for each whether it was received."""
         connection = self._connection
-        if connection is None:
-            if payloads:
-                self._throttled_log.error("packet not sent", "no simulator")
-                self.never_handed_over += len(payloads)
-            return [False] * len(payloads)
         try:
-            if len(payloads) > 1:
+            if connection is not None:
                 taken = connection.send_all(payloads)
-            else:
-                taken = [connection.send(payload) for payload in payloads]
-            self.under_way += sum(taken)
-            return taken
+                self.under_way += sum(taken)
+                return taken
+            self._without_simulator(len(payloads))
         except ServiceRefused as error:
-            self._throttled_log.warning("packet refused", str(error))
+            self._throttled_log.note("packet refused", str(error))
         except ServiceGone as error:
-            self.never_handed_over += len(payloads)
-            self._lost(connection, error)
+            self._without_simulator(len(payloads), connection, error)
         return [False] * len(payloads)
 
     def broadcast(self, payload: bytes) -> None:
         """Hand over a packet for every node in range of the sender in its byte 1."""
         connection = self._connection
-        if connection is None:
-            self._throttled_log.error("packet not sent", "no simulator")
-            self.never_handed_over += 1
-            return
         try:
-            self.under_way += connection.broadcast(payload)
-        except ServiceRefused:
-            # A new simulator, to which this antenna will soon be announced: not worth a log line.
-            self._throttled_log.counts["broadcast refused"] += 1
+            if connection is not None:
+                self.under_way += connection.broadcast(payload)
+            else:
+                self._without_simulator(1)
+        except ServiceRefused as error:  # a new simulator, to which it will soon be announced
+            _log.debug("broadcast refused: %s", error)
         except ServiceGone as error:
-            self.never_handed_over += 1
+            self._without_simulator(1, connection, error)
+
+    def _without_simulator(
+        self,
+        packets: int,
+        connection: SimulatorConnection | None = None,
+        error: ServiceGone | None = None,
+    ) -> None:
+        """So many packets were not handed over, because of the error of this connection."""
+        self.never_handed_over += packets
+        if connection is not None and error is not None:
             self._lost(connection, error)
+        elif packets:
+            self._throttled_log.note("packet not sent", "no simulator", logging.ERROR)
 
     def _probe(self, _now_s: float) -> None:
         """Send the probe of each antenna that the simulator may not have registered yet."""
@@ -179,10 +268,7 @@ class SimulatorLink(Radios, rospy.SubscribeListener):
         with self._lock:
             self._connection = connection
         self.antennas.announce_all_to_new_simulator()
-        if len(self.antennas):
-            _log.info("connected to the simulator; announced %d antennas", len(self.antennas))
-        else:
-            _log.info("connected to the simulator")
+        _log.info("connected to the simulator; announced %d antennas", len(self.antennas))
 
     def _lost(self, connection: SimulatorConnection, error: ServiceGone) -> None:
         if rospy.is_shutdown():

@@ -16,7 +16,7 @@ from drone_mesh.execution import ExecutorSlot, PacketInbox
 from drone_mesh.msg import NRF24
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.host.announcements import probe_of
-from drone_mesh.ros.host.antenna_panel import AntennaPanel
+from drone_mesh.ros.host.radios import AntennaPanel
 from drone_mesh.ros.host.simulator_link import SimulatorLink
 
 

@@ -1,25 +1,74 @@
-"""VirtualRaspberryPi, a simulated drone's computer (docs/ros.md, "Virtual Raspberry Pi")."""
+"""VirtualRaspberryPi, a simulated drone's computer, and the settings that all of them share.
+
+docs/ros.md, "Virtual Raspberry Pi".
+"""
 
 from __future__ import annotations
 
 import abc
+import os
 import random
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Callable, ClassVar
 
+from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.communication.events.observer import MeshObserver, Observers
 from drone_mesh.communication.interfaces import IInternetConnection, IWirelessCommunication
 from drone_mesh.communication.node.assembly import Security, assemble_node
+from drone_mesh.communication.node.node_configuration import NodeConfiguration
+from drone_mesh.communication.seals.keys import MeshKey, read_key_file
+from drone_mesh.configuration import FactoryConfiguration
 from drone_mesh.drone.roles import Role
+from drone_mesh.errors import ConfigurationError, naming_argument
 from drone_mesh.execution import ExecutorSlot
 from drone_mesh.internet import DEFAULT_PORT
 from drone_mesh.internet.http_settings import HttpSettings
+from drone_mesh.internet.mqtt_topics import PASSWORD_VARIABLE, Broker, parse_broker
 from drone_mesh.internet.on_demand import SeveralInternets, http_internet, mqtt_internet
-from drone_mesh.ros.host.engine_connector import RosDroneEngineConnector
-from drone_mesh.ros.host.internet_mock import RosInternetMock
-from drone_mesh.ros.host.mesh_settings import MeshSettings
-from drone_mesh.ros.host.silent_engines import SilentEngines
-from drone_mesh.ros.host.users_of_node import UsersOfNode
+from drone_mesh.ros.graph.simulation import Run
+from drone_mesh.ros.host.engines import RosDroneEngineConnector, SilentEngines
+from drone_mesh.ros.host.node_access import RosInternetMock, UsersOfNode
 from drone_mesh.users.desk import UsersDesk
+
+
+@dataclass(frozen=True)
+class MeshSettings:
+    """Settings of every node of a simulation: the configuration, with the objects that it names."""
+
+    configuration: FactoryConfiguration
+    run: Run
+    node: NodeConfiguration
+    obstacles: Obstacles | None
+    broker: Broker  # with "mqtt"
+    key: MeshKey | None  # None: packets are not sealed
+
+    @classmethod
+    def from_configuration(
+        cls, configuration: FactoryConfiguration, run: Run, obstacles: Obstacles | None = None
+    ) -> MeshSettings:
+        """The settings of this configuration, in this run. Raises ConfigurationError.
+
+        `obstacles`: nodes refuse orders to places that these make unreachable.
+        """
+        return cls(
+            configuration,
+            run,
+            configuration.node,
+            obstacles=obstacles,
+            key=_mesh_key(configuration.key),
+            broker=parse_broker(configuration.broker, os.environ.get(PASSWORD_VARIABLE, "")),
+        )
+
+
+def _mesh_key(file: str) -> MeshKey | None:
+    if not file:
+        return None
+    with naming_argument("key: ", file):
+        keys = read_key_file(Path(file))
+        if not isinstance(keys, MeshKey):
+            raise ConfigurationError(f"{file}: holds the keys of one node; expected a mesh key")
+    return keys
 
 
 class VirtualRaspberryPi(abc.ABC):

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import logging
-from typing import Callable, NamedTuple, Sequence
+from typing import Callable, Iterator, Sequence
 
 import actionlib
 import rospy
@@ -19,13 +20,13 @@ from drone_mesh.formations.standing_orders import PartState
 from drone_mesh.msg import FlightOrderAnswer, RequestGatewayDroneFlight
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import start_node
-from drone_mesh.ros.graph.conversions import flight_order, location_of
+from drone_mesh.ros.graph.conversions import location_of
 from drone_mesh.ros.graph.fleet_parameter import drones_if_known
 from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
-from drone_mesh.ros.graph.master_watch import MasterWatch
+from drone_mesh.ros.graph.master import MasterWatch
 from drone_mesh.ros.graph.orderly_stop import OrderlyStop
 from drone_mesh.ros.graph.parameters import manager_layouts, or_exit
-from drone_mesh.ros.graph.present_drones import PresentDrones
+from drone_mesh.ros.graph.simulation import PresentDrones
 from drone_mesh.ros.graph.waiting import comes_true
 from drone_mesh.ros.services.order_answers import OrderAnswers, Outcomes
 from drone_mesh.ros.services.order_summary import OrderSummary
@@ -37,13 +38,6 @@ NO_GATEWAY = "no gateway is running to take the order"
 ORDERS_IN_QUEUE = 512  # two whole fleets
 
 _log = logging.getLogger(__name__)
-
-
-class _Ordered(NamedTuple):
-    """The outcome of one order, in words."""
-
-    why_not: str  # empty: a gateway has sent it
-    warning: str  # who will lose the mesh by it; empty: nobody
 
 
 class DroneManager:
@@ -92,17 +86,18 @@ class DroneManager:
     ) -> srv.RequestDroneFlightResponse:
         """Status 1: a gateway has the order; 2: no gateway has a route; 0: there is no gateway."""
         why_not, _warning = self._order_one(Order(request.ID, location_of(request)), False)
-        if why_not == NO_GATEWAY:
-            return srv.RequestDroneFlightResponse(status=0)
-        return srv.RequestDroneFlightResponse(status=2 if why_not else 1)
+        return srv.RequestDroneFlightResponse({"": 1, NO_GATEWAY: 0}.get(why_not, 2))
 
     def _order_flight(self, request: srv.OrderFlightRequest) -> srv.OrderFlightResponse:
         order = Order(request.id, location_of(request))
         why_not, warning = self._order_one(order, request.allow_shared_place)
         return srv.OrderFlightResponse(success=not why_not, message=why_not or warning)
 
-    def _order_one(self, order: Order, allow_shared_place: bool) -> _Ordered:
-        """Raises ServiceException: the order was refused."""
+    def _order_one(self, order: Order, allow_shared_place: bool) -> tuple[str, str]:
+        """Why no gateway sends it, else empty; and who loses the mesh by it, in words.
+
+        Raises ServiceException: the order was refused.
+        """
         drone, _goal = order
         _check(order)
         fleet = drones_if_known()
@@ -112,7 +107,7 @@ class DroneManager:
             )
         if not self._gateway_is_there():
             _log.warning("drone %d: order dropped: no gateway is running", drone)
-            return _Ordered(NO_GATEWAY, "")
+            return NO_GATEWAY, ""
         warning = self._standing.lost_routes([order]).in_words()
         outcomes = self._order([order], fleet, allow_shared_place)
         for answer in outcomes.refused.values():
@@ -121,9 +116,9 @@ class DroneManager:
             self._standing.ordered(order)
             if warning:
                 _log.warning("drone %d ordered to %s: %s", drone, order.goal.in_words(), warning)
-            return _Ordered("", warning)
+            return "", warning
         _log.warning("drone %d: no gateway has a route to it", drone)
-        return _Ordered(f"no gateway has a route to drone {drone}", "")
+        return f"no gateway has a route to drone {drone}", ""
 
     def _set_to_casus(self, request: srv.CasusRequest) -> srv.CasusResponse:
         self._order_case(request.caseID, at_once=True)
@@ -133,16 +128,13 @@ class DroneManager:
         return self._order_case(request.caseID, request.at_once)
 
     def _order_formation(self, request: srv.OrderFormationRequest) -> srv.OrderFormationResponse:
-        orders = _formation(request)
-        _check_gateways(request)
-        answer = self._carry_out(request.name, orders, request.at_once)
-        return srv.OrderFormationResponse(
-            **{name: getattr(answer, name) for name in answer.__slots__}
-        )
+        answer = self._carry_out(request.name, _formation(request), request.at_once)
+        return srv.OrderFormationResponse(*map(answer.__getattribute__, answer.__slots__))
 
     def _preview_layout(self, request: srv.PreviewLayoutRequest) -> srv.PreviewLayoutResponse:
         orders = self._orders_of(request.caseID)
-        _check_apart(orders)
+        with _refusing():
+            check_apart(dict(orders), flight_rules().clearance_m)
         known, missing = _in_fleet(orders, drones_if_known())
         found = self._standing.preview(known, request.at_once)
         if found is None:
@@ -160,9 +152,8 @@ class DroneManager:
 
     def _withdraw_layout(self, request: srv.WithdrawLayoutRequest) -> srv.WithdrawLayoutResponse:
         words = self._standing.withdraw(request.id)
-        if words is None:
-            return srv.WithdrawLayoutResponse(False, f"there is no standing order {request.id}")
-        return srv.WithdrawLayoutResponse(True, words)
+        unknown = f"there is no standing order {request.id}"
+        return srv.WithdrawLayoutResponse(words is not None, words or unknown)
 
     def _order_case(
         self, case: int, at_once: bool, handle: actionlib.ServerGoalHandle | None = None
@@ -177,7 +168,8 @@ class DroneManager:
         handle: actionlib.ServerGoalHandle | None = None,
     ) -> srv.OrderLayoutResponse:
         """Make a standing order of these. Raises ServiceException for places that are too near."""
-        _check_apart(orders)
+        with _refusing():
+            check_apart(dict(orders), flight_rules().clearance_m)
         fleet = drones_if_known()
         known, missing = _in_fleet(orders, fleet)
         if not self._gateway_is_there():
@@ -218,16 +210,14 @@ class DroneManager:
         return OrderSummary(outcomes.sent, no_route, missing, reasons, later, there, flying)
 
     def _orders_of(self, case: int) -> list[Order]:
-        try:
+        with _refusing():
             return self._layouts.orders(case)
-        except UnknownCase as error:
-            raise rospy.ServiceException(str(error)) from None
 
     def _publish(self, orders: Sequence[Order], allow_shared_place: bool = False) -> None:
         checked = not (allow_shared_place and self._sharing.get_num_connections())
         topic = self._gateways if checked else self._sharing  # a gateway of 2019 only has the first
         for node_id, goal in orders:
-            topic.publish(flight_order(node_id, goal))
+            topic.publish(node_id, goal.latitude, goal.longitude, round(goal.height))
 
     def _order_all(
         self, orders: Sequence[Order], fleet: PresentDrones | None, missing: Sequence[int]
@@ -245,16 +235,12 @@ class DroneManager:
             if answer.outcome == FlightOrderAnswer.PLACE_TAKEN and answer.taken_by in members
         }
         again = self._order([o for o in orders if o.node_id in leaving], fleet, True)
-        refused = {**outcomes.refused, **again.refused}
+        stay = {d: a for d, a in outcomes.refused.items() if d not in leaving}
         return OrderSummary(
             outcomes.sent + again.sent,
             outcomes.no_route + again.no_route,
             missing,
-            {
-                drone: answer.reason
-                for drone, answer in refused.items()
-                if drone not in leaving or drone in again.refused
-            },
+            {drone: answer.reason for drone, answer in {**stay, **again.refused}.items()},
         )
 
     def _order(
@@ -301,11 +287,6 @@ def _formation(request: srv.OrderFormationRequest) -> list[Order]:
     orders = [Order(*item) for item in sorted(goals.items(), reverse=True)]
     for order in orders:
         _check(order)
-    return orders
-
-
-def _check_gateways(request: srv.OrderFormationRequest) -> None:
-    """Raises ServiceException for gateways that the request does not name as such."""
     fleet = drones_if_known()
     moved = set(request.drones) - set(request.gateways)
     unnamed = sorted(moved.intersection(fleet.gateways if fleet else ()))
@@ -314,22 +295,22 @@ def _check_gateways(request: srv.OrderFormationRequest) -> None:
             f"would move {'gateway' if len(unnamed) == 1 else 'gateways'} {ids_in_words(unnamed)}: "
             "a gateway flies only if it is named as one (--gateway; gateways in OrderFormation)"
         )
+    return orders
 
 
 def _check(order: Order) -> None:
     """Raises ServiceException for an order that no drone can be given."""
     if order.node_id > MAX_NODE_ID:
         raise rospy.ServiceException(f"invalid drone id {order.node_id}: must be 0..{MAX_NODE_ID}")
-    try:
+    with _refusing():
         check_goal(*order.goal)
-    except GoalRefused as error:
-        raise rospy.ServiceException(str(error)) from None
 
 
-def _check_apart(orders: Sequence[Order]) -> None:
+@contextlib.contextmanager
+def _refusing() -> Iterator[None]:
     try:
-        check_apart(dict(orders), flight_rules().clearance_m)
-    except GoalRefused as error:
+        yield
+    except (GoalRefused, UnknownCase) as error:
         raise rospy.ServiceException(str(error)) from None
 
 

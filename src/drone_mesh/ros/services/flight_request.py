@@ -5,7 +5,6 @@ from __future__ import annotations
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import MeshError
 from drone_mesh.ros.graph import names
-from drone_mesh.ros.graph.conversions import whole_metres
 from drone_mesh.ros.graph.persistent_service import ServiceGone, ServiceRefused, call_once
 from drone_mesh.srv import OrderFlight, OrderFlightRequest
 
@@ -23,8 +22,8 @@ def request_flight(drone: int, goal: Location, allow_shared_place: bool = False)
 
     Raises FlightNotOrdered. Any thread.
     """
-    height = whole_metres(goal.height)
-    request = OrderFlightRequest(drone, goal.latitude, goal.longitude, height, allow_shared_place)
+    place = goal.latitude, goal.longitude, round(goal.height)
+    request = OrderFlightRequest(drone, *place, allow_shared_place)
     try:
         answer = call_once(names.ORDER_FLIGHT_SERVICE, OrderFlight, request)
     except ServiceGone as error:

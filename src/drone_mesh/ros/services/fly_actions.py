@@ -14,43 +14,22 @@ import rospy
 
 from drone_mesh.communication.interfaces import OrderState
 from drone_mesh.drone.location import Location
-from drone_mesh.msg import (
-    FlyAction,
-    FlyFeedback,
-    FlyResult,
-    MeshEvent,
-    MeshState,
-    NodeState,
-)
+from drone_mesh.msg import FlyAction, FlyFeedback, FlyResult, MeshEvent, MeshState, NodeState
 from drone_mesh.ros.graph import names
-from drone_mesh.ros.graph.bounded_master import NO_ANSWER
 from drone_mesh.ros.graph.command_line import start_node
 from drone_mesh.ros.graph.conversions import event_record, location_of
 from drone_mesh.ros.graph.fleet_parameter import drones_if_known
 from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
-from drone_mesh.ros.graph.master_watch import MasterWatch
+from drone_mesh.ros.graph.master import NO_ANSWER, MasterWatch
 from drone_mesh.ros.graph.orderly_stop import OrderlyStop
-from drone_mesh.ros.graph.run import Run, run_of
-from drone_mesh.ros.services.flight_request import (
-    FlightNotOrdered,
-    FlightRefused,
-    request_flight,
-)
+from drone_mesh.ros.graph.simulation import Run, run_of
+from drone_mesh.ros.services.flight_request import FlightNotOrdered, FlightRefused, request_flight
 from drone_mesh.state.orders import CLOCKS_DIFFER_S, OrderProgress
 
 POLL_PERIOD_S = 1.0  # wall; how often the drones are compared with the actions
 SENT_WITHIN_S = 30.0  # wall; a gateway reports an order within a second
 
 _log = logging.getLogger(__name__)
-
-_OUTCOMES = {
-    OrderState.ARRIVED: FlyResult.ARRIVED,
-    OrderState.REFUSED: FlyResult.REFUSED,
-    OrderState.NO_ROUTE: FlyResult.NO_ROUTE,
-    OrderState.GIVEN_UP: FlyResult.GIVEN_UP,
-    OrderState.REPLACED: FlyResult.REPLACED,
-    OrderState.LOST_CONTACT: FlyResult.LOST_CONTACT,
-}
 
 
 class _Flight:
@@ -64,10 +43,6 @@ class _Flight:
         self.progress = OrderProgress(drone, self.goal, since_s)
         self.begun_s = time.monotonic()
         self.warning = ""  # who will lose the mesh by it, in words
-
-    def state_in_words(self, node: NodeState) -> str:
-        """The state of the order, and the warning."""
-        return "; ".join(filter(None, (self.progress.in_words(node), self.warning)))
 
 
 class FlyActions:
@@ -150,10 +125,9 @@ class FlyActions:
         server = self._servers.pop(drone)
         server.started = False
         # Not its stop(), which expects the thread that this node does without.
-        for topic in (server.goal_sub, server.cancel_sub, server.status_pub):
+        subscribers = (server.goal_sub, server.cancel_sub)
+        for topic in (*subscribers, server.status_pub, server.feedback_pub, server.result_pub):
             topic.unregister()
-        for publisher in (server.feedback_pub, server.result_pub):
-            publisher.unregister()
 
     def _begin(self, drone: int, handle: actionlib.ServerGoalHandle) -> None:
         flight = _Flight(handle, drone, rospy.get_time() - CLOCKS_DIFFER_S)
@@ -195,7 +169,7 @@ class FlyActions:
             if flight.progress.is_over:
                 arrived = flight.progress.state is OrderState.ARRIVED
                 words = "" if arrived else flight.progress.in_words()
-                self._end(flight, _OUTCOMES[flight.progress.state], words)
+                self._end(flight, getattr(FlyResult, flight.progress.state.name), words)
 
     def _take_state(self, state: MeshState) -> None:
         before, self._run = self._run, run_of(state)
@@ -209,7 +183,7 @@ class FlyActions:
             if node is not None:
                 x, y, z = node.position
                 left_m = Location.from_vector(node.position).distance_m(flight.goal)
-                words = flight.state_in_words(node)
+                words = "; ".join(filter(None, (flight.progress.in_words(node), flight.warning)))
                 flight.handle.publish_feedback(FlyFeedback(words, y, x, z, left_m))
 
     def _end(self, flight: _Flight, outcome: int, why: str) -> None:
@@ -230,8 +204,6 @@ class FlyActions:
 def main() -> None:
     """Run the node."""
     start_node(FlyActions.__doc__, "fly_actions", disable_signals=True)
-    # Otherwise rospy would shut down inside its signal handler, on top of whatever this thread was
-    # doing then, and could wait for a thread that waits for this one.
     show_library_logs_on_rosout()
     with OrderlyStop() as stop:
         actions = FlyActions()

@@ -29,7 +29,7 @@ class OrderSummary:
         """One line, for example: ordered 16 of 17 drones; drone 17 is not in this fleet."""
         others = self.no_route, self.not_in_fleet, self.refused, self.later, self.there, self.flying
         total = len(self.sent) + sum(map(len, others))
-        parts = [f"ordered {len(self.sent)} of {_counted(total, 'drone')}"]
+        parts = [f"ordered {len(self.sent)} of {total} drone{'' if total == 1 else 's'}"]
         if self.there:
             verb, noun = ("is", "its place") if len(self.there) == 1 else ("are", "their places")
             parts.append(f"{drones_in_words(self.there)} {verb} at {noun}")
@@ -45,7 +45,3 @@ class OrderSummary:
             verb = "is" if len(self.not_in_fleet) == 1 else "are"
             parts.append(f"{drones_in_words(self.not_in_fleet)} {verb} not in this fleet")
         return "; ".join(parts)
-
-
-def _counted(number: int, noun: str) -> str:
-    return f"{number} {noun}{'' if number == 1 else 's'}"

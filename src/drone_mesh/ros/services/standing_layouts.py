@@ -28,11 +28,11 @@ from drone_mesh.msg import (
     MeshState,
 )
 from drone_mesh.ros.graph import names
-from drone_mesh.ros.graph.bounded_master import NO_ANSWER
 from drone_mesh.ros.graph.conversions import event_record, mesh_status
 from drone_mesh.ros.graph.fleet_parameter import get_fleet_parameter
+from drone_mesh.ros.graph.master import NO_ANSWER
 from drone_mesh.ros.graph.parameters import configured_obstacles
-from drone_mesh.ros.graph.run import Run, run_of
+from drone_mesh.ros.graph.simulation import Run, run_of
 from drone_mesh.state.model import MeshStatus
 
 _QUEUE = 1000  # events that may wait
@@ -133,8 +133,7 @@ class StandingLayouts:
                 self._handles[number] = handle
             first = orders
             if self._mesh is not None:
-                sent = self._orders.update(self._mesh, rules)
-                first = [Order(drone, goal) for drone, goal in sent]
+                first = [Order(*one) for one in self._orders.update(self._mesh, rules)]
             (progress,) = [p for p in self._orders.all_progress() if p.number == number]
             start = LayoutStart(progress, first, self._mesh is not None)
         self._show()
@@ -189,9 +188,8 @@ class StandingLayouts:
         rules = FlightRules() if is_idle else flight_rules()
         with self._lock:
             self._mesh = mesh
-            wanted = self._orders.update(mesh, rules)
-        if wanted:
-            self._order([Order(drone, goal) for drone, goal in wanted])
+            wanted = [Order(*one) for one in self._orders.update(mesh, rules)]
+        self._order(wanted)
         self._show()
 
     def _goal_came(self, handle: actionlib.ServerGoalHandle) -> None:
@@ -282,19 +280,14 @@ def _store(left: str) -> None:
 
 def _tell(handle: actionlib.ServerGoalHandle, progress: StandingProgress) -> None:
     words = progress.in_words()
+    arrived, flying = progress.drones[PartState.ARRIVED], progress.drones[PartState.FLYING]
     if not progress.is_over:
-        arrived, flying = (
-            bytes(progress.drones[state]) for state in (PartState.ARRIVED, PartState.FLYING)
-        )
-        handle.publish_feedback(LayoutFeedback(progress.number, arrived, flying, words))
+        feedback = LayoutFeedback(progress.number, bytes(arrived), bytes(flying), words)
+        handle.publish_feedback(feedback)
         return
-    total = sum(len(drones) for drones in progress.drones.values())
-    complete = len(progress.drones[PartState.ARRIVED]) == total
-    result = LayoutResult(progress.number, complete, words)
-    if complete:
-        handle.set_succeeded(result, words)
-    else:
-        handle.set_aborted(result, words)
+    complete = len(arrived) == sum(map(len, progress.drones.values()))
+    end = handle.set_succeeded if complete else handle.set_aborted
+    end(LayoutResult(progress.number, complete, words), words)
 
 
 def flight_rules() -> FlightRules:

@@ -20,38 +20,14 @@ from drone_mesh.msg import NRF24, DroneInfo
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import start_node
 from drone_mesh.ros.graph.direct_publisher import DirectPublisher
-from drone_mesh.ros.graph.figures import DELIVERED, LOST_IN_RANGE, FiguresPublisher
 from drone_mesh.ros.graph.logs import ThrottledLog, show_library_logs_on_rosout
-from drone_mesh.ros.graph.master_watch import MasterWatch
-from drone_mesh.ros.graph.packet_samples import PacketSamples
+from drone_mesh.ros.graph.master import MasterWatch
 from drone_mesh.ros.graph.parameters import configured_obstacles, factory_configuration, or_exit
+from drone_mesh.ros.graph.periodic import DELIVERED, LOST_IN_RANGE, FiguresPublisher, PacketSamples
 
 STUCK_RECEIVER_S = 0.2  # a receiver that does not read for this long is disconnected
 
 _log = logging.getLogger(__name__)
-
-
-class AntennaTopic(DirectPublisher):
-    """Publishes: the topic of one antenna, usually /Node/<id> (NRF24). Any thread."""
-
-    def __init__(self, topic: str) -> None:
-        self.has_listened = False  # set by rospy's thread: the first receiver has connected
-        super().__init__(topic, NRF24, STUCK_RECEIVER_S)
-
-    def peer_subscribe(self, topic: str, publish: object, peer_publish: object) -> None:
-        """A receiver has connected (a thread of rospy)."""
-        self.has_listened = True
-        super().peer_subscribe(topic, publish, peer_publish)
-
-    def deliver(self, message: NRF24) -> bool:
-        """Publish this packet; returns False if there is no receiver."""
-        if not self.has_subscriber():
-            return False
-        try:
-            self.publish(message)
-        except rospy.ROSException:  # the topic has been closed
-            return False
-        return bool(self.connections())
 
 
 class WirelessSignalSimulator:
@@ -79,7 +55,7 @@ class WirelessSignalSimulator:
         self._nodes = NodeTable(max_distance_m, obstacles)
         self._lock = threading.Lock()
         self._opening = threading.Lock()
-        self._antenna_topics: dict[str, AntennaTopic] = {}
+        self._antenna_topics: dict[str, DirectPublisher] = {}
         self._topics: dict[int, str] = {}  # the topic of each registered node; under _opening
         self._throttled_log = ThrottledLog(_log)
         self._delivered = self._lost = 0
@@ -106,7 +82,7 @@ class WirelessSignalSimulator:
             else:
                 self._note(info)
         except AirError as error:
-            self._throttled_log.warning("DroneInfo dropped", str(error))
+            self._throttled_log.note("DroneInfo dropped", str(error))
 
     def _antenna_info(self, info: DroneInfo) -> None:
         self._check_topic_type(info)
@@ -114,7 +90,7 @@ class WirelessSignalSimulator:
             self._note(info)
             old_topic = self._open(info.nodeID, info.sub)
         if old_topic is not None:
-            self._throttled_log.warning(
+            self._throttled_log.note(
                 "topic changed", f"node {info.nodeID}: from {old_topic} to {info.sub}"
             )
 
@@ -129,7 +105,7 @@ class WirelessSignalSimulator:
             return None
         self._topics[node_id] = topic
         if topic not in self._antenna_topics:
-            self._antenna_topics[topic] = AntennaTopic(topic)
+            self._antenna_topics[topic] = DirectPublisher(topic, NRF24, STUCK_RECEIVER_S)
         # An antenna's usual topic stays open: redirecting its packets for a moment must not
         # cost it the connection.
         usual = (_usual_topic(node) for node in self._topics)
@@ -153,9 +129,8 @@ class WirelessSignalSimulator:
             return srv.WirelessMessageResponse(False)
         if request.from_ == request.to:  # an antenna's probe for its own registration
             listener = self._antenna_topics.get(topic)
-            return srv.WirelessMessageResponse(
-                listener is not None and listener.deliver(request.message)
-            )
+            taken = listener is not None and listener.deliver(request.message)
+            return srv.WirelessMessageResponse(taken)
         return srv.WirelessMessageResponse(self._carry(topic, request.message))
 
     def _messages(self, request: srv.WirelessMessagesRequest) -> srv.WirelessMessagesResponse:
@@ -167,22 +142,18 @@ class WirelessSignalSimulator:
         packets = [joined[at : at + PAYLOAD_BYTES] for at in range(0, len(joined), PAYLOAD_BYTES)]
         with self._lock:
             topics = [self._nodes.link(request.from_, receiver(packet)) for packet in packets]
+        hops = zip(packets, topics)
         return srv.WirelessMessagesResponse(
-            [
-                topic is not None and self._carry(topic, NRF24(packet))
-                for packet, topic in zip(packets, topics)
-            ]
+            [topic is not None and self._carry(topic, NRF24(packet)) for packet, topic in hops]
         )
 
     def _broadcast(self, request: srv.BroadcastRequest) -> srv.BroadcastResponse:
-        packet = request.message.payload
-        return srv.BroadcastResponse(
-            [
-                node
-                for node, topic in self._topics_in_range(request.from_)
-                if topic is not None and self._carry(topic, NRF24(readdressed(packet, node)))
-            ]
-        )
+        packet, topics = request.message.payload, self._topics_in_range(request.from_)
+
+        def takes(node: int, topic: str | None) -> bool:
+            return topic is not None and self._carry(topic, NRF24(readdressed(packet, node)))
+
+        return srv.BroadcastResponse([node for node, topic in topics if takes(node, topic)])
 
     def _others_in_range(self, request: srv.AreaScanRequest) -> srv.AreaScanResponse:
         topics = self._topics_in_range(request.id)
@@ -208,7 +179,7 @@ class WirelessSignalSimulator:
         with self._lock:
             if delivered:
                 self._delivered += 1
-            elif listener is not None and listener.has_listened:
+            elif listener is not None and listener.had_subscriber:
                 self._lost += 1  # before that, it has not joined the air yet
         return delivered
 

@@ -34,7 +34,7 @@ class RosControls(MeshControls):
     """Any thread; each call opens a connection of its own and closes it."""
 
     def power(self, node: int, on: bool) -> str:
-        _call(names.power_switch(node), srv.PowerSwitch, srv.PowerSwitchRequest(power=on))
+        _call(names.power_switch(node), srv.PowerSwitch, power=on)
         return f"node {node} is {'on' if on else 'off'}"
 
     def fly(self, node: int, x: float, y: float, z: float, allow_shared_place: bool = False) -> str:
@@ -47,18 +47,16 @@ class RosControls(MeshControls):
         return f"{done}; {warning}" if warning else done
 
     def layout(self, case: int) -> str:
-        request = srv.OrderLayoutRequest(caseID=case)
-        answer = _call(names.ORDER_LAYOUT_SERVICE, srv.OrderLayout, request)
+        answer = _call(names.ORDER_LAYOUT_SERVICE, srv.OrderLayout, caseID=case)
         return _outcome(f"layout {case}", answer)
 
     def formation(self, name: str, orders: Sequence[Order], gateways: Sequence[int]) -> str:
         request = formation_request(name, orders, gateways=gateways)
-        answer = _call(names.ORDER_FORMATION_SERVICE, srv.OrderFormation, request)
+        answer = _ask(names.ORDER_FORMATION_SERVICE, srv.OrderFormation, request)
         return _outcome(name, answer)
 
     def preview(self, case: int) -> FormationPreview:
-        request = srv.PreviewLayoutRequest(caseID=case)
-        answer = _call(names.PREVIEW_LAYOUT_SERVICE, srv.PreviewLayout, request)
+        answer = _call(names.PREVIEW_LAYOUT_SERVICE, srv.PreviewLayout, caseID=case)
         return FormationPreview(
             answer.duration,
             list(answer.out_of_reach),
@@ -68,25 +66,21 @@ class RosControls(MeshControls):
         )
 
     def speed(self, paused: bool, factor: float) -> str:
-        request = srv.SetSpeedRequest(paused=paused, real_time_factor=factor)
-        _done(_call(names.SPEED_SERVICE, srv.SetSpeed, request))
+        _done(_call(names.SPEED_SERVICE, srv.SetSpeed, paused=paused, real_time_factor=factor))
         if paused:
             return "paused"
-        return (
-            f"simulated time runs at {factor:g} times real time"
-            if factor
-            else "simulated time resumes"
-        )
+        how = f"runs at {factor:g} times real time" if factor else "resumes"
+        return f"simulated time {how}"
 
     def add(self, node: int | None, gateway: bool, x: float, y: float) -> str:
         wanted = srv.AddDroneRequest.LOWEST_FREE if node is None else node
-        request = srv.AddDroneRequest(id=wanted, gateway=gateway, latitude=y, longitude=x)
-        return _done(_call(names.ADD_DRONE_SERVICE, srv.AddDrone, request))
+        where = {"latitude": y, "longitude": x}
+        return _done(
+            _call(names.ADD_DRONE_SERVICE, srv.AddDrone, id=wanted, gateway=gateway, **where)
+        )
 
     def remove(self, node: int) -> str:
-        return _done(
-            _call(names.REMOVE_DRONE_SERVICE, srv.RemoveDrone, srv.RemoveDroneRequest(id=node))
-        )
+        return _done(_call(names.REMOVE_DRONE_SERVICE, srv.RemoveDrone, id=node))
 
     def mission(self, nodes: Sequence[int], mission: Mission) -> str:
         waypoints = [
@@ -96,7 +90,7 @@ class RosControls(MeshControls):
             srv.FlyMissionRequest.FLY, waypoints, mission.speed_m_s, mission.loop
         )
         for node in nodes:
-            _done(_call(names.mission_service(node), srv.FlyMission, request))
+            _done(_ask(names.mission_service(node), srv.FlyMission, request))
         who = f"drone {nodes[0]}" if len(nodes) == 1 else f"{len(nodes)} drones"
         return f"the mission of {who} has begun"
 
@@ -104,7 +98,7 @@ class RosControls(MeshControls):
         drones = drones_if_known()
         request = srv.FlyMissionRequest(action=_ACTIONS[action])
         done = sum(
-            _call(names.mission_service(node), srv.FlyMission, request).success
+            _ask(names.mission_service(node), srv.FlyMission, request).success
             for node in (drones.roles if drones else ())
         )
         if not done:
@@ -138,7 +132,11 @@ def _done(answer: _Answer) -> str:
     return answer.message
 
 
-def _call(name: str, service_class: ServiceClass[Request, Response], request: Request) -> Response:
+def _call(name: str, service_class: ServiceClass[Request, Response], **fields: object) -> Response:
+    return _ask(name, service_class, service_class._request_class(**fields))
+
+
+def _ask(name: str, service_class: ServiceClass[Request, Response], request: Request) -> Response:
     try:
         return call_once(name, service_class, request)
     except ServiceGone as error:

@@ -25,13 +25,12 @@ from drone_mesh.errors import ConfigurationError, naming_argument
 from drone_mesh.formations.layouts import FIELD_CASE, GRID_CASE, Layouts
 from drone_mesh.msg import MeshEvent, MeshState, PacketSample
 from drone_mesh.ros.graph import names
-from drone_mesh.ros.graph.bounded_master import master_answers
 from drone_mesh.ros.graph.command_line import end_launch, start_node
 from drone_mesh.ros.graph.conversions import event_record, mesh_status
 from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
-from drone_mesh.ros.graph.master_watch import MasterWatch
+from drone_mesh.ros.graph.master import MasterWatch, master_answers
 from drone_mesh.ros.graph.parameters import earth_origin, manager_layouts
-from drone_mesh.ros.graph.run import Run, run_of
+from drone_mesh.ros.graph.simulation import Run, run_of
 from drone_mesh.ros.views.console_controls import RosControls
 from drone_mesh.ros.views.recording import Recording
 from drone_mesh.ros.views.state_source import OLD_STATE_S

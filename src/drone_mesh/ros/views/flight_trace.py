@@ -13,16 +13,7 @@ from drone_mesh.errors import ConfigurationError, MeshError
 from drone_mesh.mobility.trace_files import write_csv
 from drone_mesh.ros.graph.command_line import run_tool
 from drone_mesh.ros.graph.parameters import earth_origin
-from drone_mesh.ros.views.bag import (
-    by_run,
-    chosen_run,
-    no_states,
-    origin_in,
-    raise_any,
-    read_states,
-    readable,
-)
-from drone_mesh.ros.views.bag_file import BagDamaged, BagUnusable
+from drone_mesh.ros.views.bag import BagUnusable, RecordedMesh
 from drone_mesh.ros.views.state_source import add_run
 from drone_mesh.state.model import known_positions
 
@@ -54,38 +45,31 @@ def main() -> None:
     run_tool("flight_trace", lambda: _run(options))
 
 
-def positions_in_bag(path: Path, run: int | None, damage: list[BagDamaged]) -> list[Position]:
-    """Each known position of each drone in a run, in seconds from its start. Raises BagUnusable.
-
-    What is damaged is left out and added to `damage`.
-    """
+def positions_in(recorded: RecordedMesh, run: int | None) -> list[Position]:
+    """Each known position of each drone in a run, in seconds from its start. Raises BagUnusable."""
     positions: list[Position] = []
     number, start_s = 0, 0.0
-    for this, state in by_run(readable(read_states(path), damage)):
-        if this != number and (run is None or this == run):
-            positions, start_s = [], state.stamp_s
+    for this, state in recorded.by_run():
         if run is None or this == run:
-            positions += (
-                (stamp_s - start_s, node, place)
-                for stamp_s, node, place in known_positions([state])
-            )
+            if this != number:
+                positions, start_s = [], state.stamp_s
+            for stamp_s, node, place in known_positions([state]):
+                positions.append((stamp_s - start_s, node, place))
         number = this
-    if not number:
-        raise damage[0] if damage else no_states(path)
-    chosen_run(path, number, run)
+    recorded.chosen_run(number, run)
     return positions
 
 
 def _run(options: argparse.Namespace) -> int:
-    bag, trace = options.bag, options.trace
-    damage: list[BagDamaged] = []
+    recorded, trace = RecordedMesh(options.bag), options.trace
     write_earth = WRITERS.get(trace.suffix.lower().lstrip("."))
-    origin = earth_origin(options.origin, is_live=False) if options.origin else origin_in(bag)
+    given = options.origin
+    origin = earth_origin(given, is_live=False) if given else RecordedMesh(options.bag).origin()
     if write_earth and origin is None:
         raise ConfigurationError(f"{trace}: needs --origin LAT,LON,ALT: where x 0, y 0 is")
-    positions = positions_in_bag(bag, options.run, damage)
+    positions = positions_in(recorded, options.run)
     if not positions:
-        raise BagUnusable(f"{bag}: no position of a drone is known")
+        raise BagUnusable(f"{options.bag}: no position of a drone is known")
     try:
         if write_earth and origin is not None:
             trace.write_text(write_earth(tracks_of(positions), origin), encoding="utf-8")
@@ -95,5 +79,5 @@ def _run(options: argparse.Namespace) -> int:
         raise MeshError(f"{trace}: {error.strerror}") from error
     drones = len({node for _at_s, node, _place in positions})
     print(f"{trace}: {drones} drones, {positions[-1][0]:.1f} s")
-    raise_any(damage)
+    recorded.raise_damage()
     return 0

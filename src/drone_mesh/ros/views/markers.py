@@ -46,7 +46,9 @@ LINK_OPACITY = {LinkUse.ROUTE: 1.0, LinkUse.KNOWN: 0.6, LinkUse.LOST: 1.0}
 PATH_WIDTH_M = 0.06
 OBSTACLE_OPACITY = 0.85
 
+_Place = Sequence[float]
 _Positions = Dict[int, Tuple[float, float, float]]
+_Line = Tuple[_Place, ...]
 
 
 class MarkerMaker:
@@ -80,13 +82,12 @@ class MarkerMaker:
             self._add_rotors(nodes, positions, state.header.stamp.to_sec())
         for use, links in links_by_use(nodes, lost).items():
             lines = [(positions[a], positions[b]) for a, b in shortest(links, nodes, MOST_LINKS)]
-            colour = _colour(DARK.of_link(use), LINK_OPACITY[use])
-            self._add_lines(f"links: {use.name.lower()}", lines, colour, LINK_WIDTH_M[use])
+            looks = DARK.of_link(use), LINK_WIDTH_M[use], LINK_OPACITY[use]
+            self._add_lines(f"links: {use.name.lower()}", lines, *looks)
         breaking = [(positions[a], positions[b]) for a, b in shortest(set(soon), nodes, MOST_LINKS)]
-        self._add_lines("links: soon", breaking, _colour(DARK.flying), LINK_WIDTH_M[LinkUse.ROUTE])
-        flown, ahead = _path_lines(nodes, positions), _heading_lines(nodes, positions)
-        self._add_lines("flight paths", flown, _colour(DARK.path), PATH_WIDTH_M)
-        self._add_lines("headings", ahead, _colour(DARK.muted), PATH_WIDTH_M)
+        self._add_lines("links: soon", breaking, DARK.flying, LINK_WIDTH_M[LinkUse.ROUTE])
+        self._add_lines("flight paths", _path_lines(nodes, positions), DARK.path, PATH_WIDTH_M)
+        self._add_lines("headings", _heading_lines(nodes, positions), DARK.muted, PATH_WIDTH_M)
         self._add_ids(nodes, positions)
         self._add_legend(positions)
         for marker in self._made:
@@ -94,32 +95,26 @@ class MarkerMaker:
         return MarkerArray(self._made)
 
     def _add_boxes(self, nodes: Sequence[NodeStatus], role: Role, positions: _Positions) -> None:
-        x_m, y_m, z_m = (TIMES_LARGER * edge_m for edge_m in role.size_m)
-        colours = [DARK.of_node(role, condition_of(node)) for node in nodes]
-        content = [(positions[node.id], colour) for node, colour in zip(nodes, colours)]
-        marker = self._changed(f"{role.word}s", 0, content)
+        scale = [TIMES_LARGER * edge_m for edge_m in role.size_m]
+        content = [(positions[n.id], DARK.of_node(role, condition_of(n))) for n in nodes]
+        marker = self._changed(f"{role.word}s", 0, content, Marker.CUBE_LIST, scale)
         if marker:
-            marker.type = Marker.CUBE_LIST
-            marker.scale.x, marker.scale.y, marker.scale.z = x_m, y_m, z_m
-            marker.points = [_point(positions[node.id], up=z_m / 2) for node in nodes]
-            marker.colors = [_colour(colour) for colour in colours]
+            marker.points = [_point(place, up=scale[2] / 2) for place, _colour in content]
+            marker.colors = [_colour(colour) for _place, colour in content]
 
     def _add_drones(self, nodes: Sequence[NodeStatus], positions: _Positions) -> None:
         """Add two markers per drone, frame and lamp, because a mesh in rviz has one colour."""
         for node in nodes:
             colour = DARK.of_node(node.role, condition_of(node))
-            flying = _is_in_flight(node)
-            frame, lamp = MESHES + frame_file(flying), MESHES + lamp_file(Role(node.role))
-            looks = (("frames", frame, FRAME_COLOUR), ("lamps", lamp, colour))
-            for name, mesh, tint in looks:
+            frame = MESHES + frame_file(_is_in_flight(node))
+            lamp = MESHES + lamp_file(Role(node.role))
+            for name, mesh, tint in (("frames", frame, FRAME_COLOUR), ("lamps", lamp, colour)):
                 content = [positions[node.id], mesh, tint]
-                marker = self._changed(name, node.id, content)
+                scale = [TIMES_LARGER] * 3
+                marker = self._changed(name, node.id, content, Marker.MESH_RESOURCE, scale, tint)
                 if marker:
-                    marker.type = Marker.MESH_RESOURCE
                     marker.mesh_resource = mesh
-                    marker.scale.x = marker.scale.y = marker.scale.z = TIMES_LARGER
-                    marker.color = _colour(tint)
-                    marker.pose.position = _point(positions[node.id], up=0.0)
+                    marker.pose.position = _point(positions[node.id])
         self._delete_gone(("frames", "lamps"), nodes)
 
     def _add_rotors(
@@ -127,11 +122,10 @@ class MarkerMaker:
     ) -> None:
         """The blades of all drones in flight, as one marker; they turn in simulated time."""
         flying = [positions[node.id] for node in nodes if _is_in_flight(node)]
-        marker = self._changed("rotors", 0, [time_s, *flying] if flying else [])
+        content = [time_s, *flying] if flying else []
+        scale = [TIMES_LARGER * BLADE_WIDTH_M]
+        marker = self._changed("rotors", 0, content, Marker.LINE_LIST, scale, FRAME_COLOUR)
         if marker:
-            marker.type = Marker.LINE_LIST
-            marker.scale.x = TIMES_LARGER * BLADE_WIDTH_M
-            marker.color = _colour(FRAME_COLOUR)
             blades = [
                 (TIMES_LARGER * x, TIMES_LARGER * y)
                 for number, motor in enumerate(MOTORS)
@@ -144,55 +138,51 @@ class MarkerMaker:
 
     def _add_obstacles(self, boxes: Sequence[ObstacleStatus]) -> None:
         for number, box in enumerate(boxes):
-            marker = self._changed("obstacles", number, [tuple(box.center)])
+            content = [tuple(box.center)]
+            marker = self._changed(
+                "obstacles", number, content, Marker.CUBE, box.size, DARK.obstacle, OBSTACLE_OPACITY
+            )
             if marker:
-                marker.type = Marker.CUBE
-                marker.scale.x, marker.scale.y, marker.scale.z = box.size
-                marker.color = _colour(DARK.obstacle, OBSTACLE_OPACITY)
-                marker.pose.position = _point(box.center, up=0.0)
+                marker.pose.position = _point(box.center)
                 marker.pose.orientation.z = math.sin(box.yaw / 2)
                 marker.pose.orientation.w = math.cos(box.yaw / 2)
 
     def _add_lines(
-        self, name: str, lines: Sequence[tuple[Sequence[float], ...]],
-        colour: ColorRGBA, width_m: float,
-    ) -> None:  # fmt: skip
-        marker = self._changed(name, 0, lines)
+        self, name: str, lines: Sequence[_Line], colour: Colour, width_m: float, opacity: float = 1
+    ) -> None:
+        marker = self._changed(name, 0, lines, Marker.LINE_LIST, [width_m], colour, opacity)
         if marker:
-            marker.type = Marker.LINE_LIST
-            marker.scale.x = width_m
-            marker.color = colour
             marker.points = [_point(end, up=0.05) for line in lines for end in line]
 
     def _add_ids(self, nodes: Sequence[NodeStatus], positions: _Positions) -> None:
         for node in nodes:
-            marker = self._changed("ids", node.id, [positions[node.id]])
-            if marker:
-                marker.type = Marker.TEXT_VIEW_FACING
-                marker.scale.z = LABEL_M
-                marker.color = _colour(DARK.ink)
-                marker.text = str(node.id)
-                height_m = TIMES_LARGER * Role(node.role).size_m[2]
-                marker.pose.position = _point(positions[node.id], up=height_m + 1.2 * LABEL_M)
+            up = TIMES_LARGER * Role(node.role).size_m[2] + 1.2 * LABEL_M
+            self._add_text("ids", node.id, [positions[node.id]], str(node.id), LABEL_M, up)
         self._delete_gone(("ids",), nodes)
 
+    def _add_text(
+        self,
+        name: str,
+        number: int,
+        content: Sequence[_Place],
+        text: str,
+        height_m: float,
+        up: float = 0.0,
+    ) -> None:
+        """`content`: first the place of the text."""
+        scale = (0.0, 0.0, height_m)
+        marker = self._changed(name, number, content, Marker.TEXT_VIEW_FACING, scale, DARK.ink)
+        if marker:
+            marker.text = text
+            marker.pose.position = _point(content[0], up)
+
     def _add_legend(self, positions: _Positions) -> None:
-        rows = legend_rows(positions.values()) if positions else []
-        for number, row in enumerate(rows):
-            swatch = self._changed("legend colours", number, [row])
+        for number, row in enumerate(legend_rows(positions.values()) if positions else []):
+            scale = (row.height_m, row.height_m * row.thickness, 0.02)
+            swatch = self._changed("legend colours", number, [row], Marker.CUBE, scale, row.colour)
             if swatch:
-                swatch.type = Marker.CUBE
-                swatch.scale.x, swatch.scale.y = row.height_m, row.height_m * row.thickness
-                swatch.scale.z = 0.02
-                swatch.color = _colour(row.colour)
-                swatch.pose.position = _point(row.place, up=0.0)
-            text = self._changed("legend", number, [row])
-            if text:
-                text.type = Marker.TEXT_VIEW_FACING
-                text.scale.z = row.height_m
-                text.color = _colour(DARK.ink)
-                text.text = row.text
-                text.pose.position = _point(row.text_place, up=0.0)
+                swatch.pose.position = _point(row.place)
+            self._add_text("legend", number, [row.text_place], row.text, row.height_m)
 
     def _delete_gone(self, names: Sequence[str], nodes: Sequence[NodeStatus]) -> None:
         present = {node.id for node in nodes}
@@ -200,19 +190,32 @@ class MarkerMaker:
             if name in names and number not in present:
                 self._changed(name, number, [])
 
-    def _changed(self, name: str, number: int, content: Sequence[object]) -> Marker | None:
+    def _changed(
+        self,
+        name: str,
+        number: int,
+        content: Sequence[object],
+        kind: int = 0,
+        scale: Sequence[float] = (),
+        colour: Colour | None = None,
+        opacity: float = 1.0,
+    ) -> Marker | None:
         """A marker to fill in, or None: unchanged, or deleted because `content` is empty."""
         key = (name, number)
         if self._shown.get(key, []) == content:
             return None
         self._shown[key] = content
-        marker = Marker(ns=name, id=number)
+        marker = Marker(ns=name, id=number, type=kind)
         marker.pose.orientation.w = 1.0
         self._made.append(marker)
         if not content:
             del self._shown[key]
             marker.action = Marker.DELETE
             return None
+        for axis, size in zip("xyz", scale):
+            setattr(marker.scale, axis, size)
+        if colour is not None:
+            marker.color = _colour(colour, opacity)
         return marker
 
 
@@ -221,19 +224,12 @@ def _is_in_flight(node: NodeStatus) -> bool:
     return len(node.path) > 0 or len(node.heading) > 0
 
 
-def _path_lines(
-    nodes: Sequence[NodeStatus], positions: _Positions
-) -> list[tuple[Sequence[float], ...]]:
-    lines: list[tuple[Sequence[float], ...]] = []
-    for node in nodes:
-        way = [positions[node.id], *waypoints(node.path)]
-        lines += zip(way, way[1:])
-    return lines
+def _path_lines(nodes: Sequence[NodeStatus], positions: _Positions) -> list[_Line]:
+    ways = [[positions[node.id], *waypoints(node.path)] for node in nodes]
+    return [line for way in ways for line in zip(way, way[1:])]
 
 
-def _heading_lines(
-    nodes: Sequence[NodeStatus], positions: _Positions
-) -> list[tuple[Sequence[float], ...]]:
+def _heading_lines(nodes: Sequence[NodeStatus], positions: _Positions) -> list[_Line]:
     return [(positions[node.id], tuple(node.heading)) for node in nodes if len(node.heading)]
 
 
@@ -241,5 +237,5 @@ def _colour(colour: Colour, opacity: float = 1.0) -> ColorRGBA:
     return ColorRGBA(*rgb(colour), opacity)
 
 
-def _point(position: Sequence[float], up: float) -> Point:
+def _point(position: Sequence[float], up: float = 0.0) -> Point:
     return Point(position[0], position[1], position[2] + up)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import queue
 import time
-from typing import Callable, Iterable
+from typing import Callable
 
 import rospy
 from geometry_msgs.msg import TransformStamped
@@ -16,9 +16,8 @@ from drone_mesh.msg import MeshState
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import start_node
 from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
-from drone_mesh.ros.graph.master_watch import MasterWatch
+from drone_mesh.ros.graph.master import MasterWatch
 from drone_mesh.ros.views.markers import MarkerMaker
-from drone_mesh.ros.views.moved_frames import MovedFrames
 from drone_mesh.state.model import NodeStatus, position_is_known
 
 Send = Callable[[object], None]
@@ -35,7 +34,7 @@ class MeshMarkers:
 
     def __init__(self) -> None:
         self._maker = MarkerMaker()
-        self._moved = MovedFrames()
+        self._sent: rospy.Time | None = None  # the stamp of the latest frames
         self._new_viewers, self._new_listeners = _Newcomers(), _Newcomers()
         self._markers = rospy.Publisher(
             names.MARKERS_TOPIC, MarkerArray, subscriber_listener=self._new_viewers, queue_size=10
@@ -46,23 +45,22 @@ class MeshMarkers:
         rospy.Subscriber(names.STATE_TOPIC, MeshState, self._show, queue_size=1)
 
     def _show(self, state: MeshState) -> None:
-        now_s = time.monotonic()
-        stamp = state.header.stamp
-        newcomers = self._new_listeners.drain()
-        moved = self._moved.select(state.nodes, stamp.to_sec(), now_s)
-        if moved:
-            self._frames.publish(_frames(moved, stamp))
-        if newcomers:  # earlier subscribers have these frames already, perhaps with the same stamp
-            sent = {node.id for node in moved}
-            known = [node for node in state.nodes if position_is_known(node)]
-            rest = _frames([node for node in known if node.id not in sent], stamp)
+        stamp, newcomers = state.header.stamp, self._new_listeners.drain()
+        frames = TFMessage(
+            [_transform(node, stamp) for node in state.nodes if position_is_known(node)]
+        )
+        # Once per stamp: tf2 warns about a second one, and a paused simulation has but one.
+        if stamp != self._sent:
+            self._sent = stamp
+            self._frames.publish(frames)
+        else:
             for send in newcomers:
-                send(rest)
+                send(frames)
         if self._markers.get_num_connections() == 0:
             return
         if self._new_viewers.drain():
             self._maker.forget_shown()
-        markers = self._maker.markers(state, now_s)
+        markers = self._maker.markers(state, time.monotonic())
         if markers.markers:
             self._markers.publish(markers)
 
@@ -84,10 +82,6 @@ class _Newcomers(rospy.SubscribeListener):
             while True:
                 taken.append(self._new.get_nowait())
         return taken
-
-
-def _frames(nodes: Iterable[NodeStatus], stamp: rospy.Time) -> TFMessage:
-    return TFMessage(transforms=[_transform(node, stamp) for node in nodes])
 
 
 def _transform(node: NodeStatus, stamp: rospy.Time) -> TransformStamped:

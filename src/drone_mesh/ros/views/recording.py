@@ -12,8 +12,7 @@ from typing import Sequence
 
 from drone_mesh.console.history import History
 from drone_mesh.console.runner import ConsoleRunner
-from drone_mesh.ros.views.bag import read_events, read_packets, read_states, readable
-from drone_mesh.ros.views.bag_file import BagDamaged, BagUnusable
+from drone_mesh.ros.views.bag import BagUnusable, RecordedMesh
 from drone_mesh.state.model import MeshStatus
 
 STATES_AT_ONCE = 10  # 254 nodes keep the server's loop busy for some 50 ms
@@ -41,25 +40,24 @@ class Recording:
 
     def _run(self) -> None:
         begun_s = time.monotonic()
+        recorded = RecordedMesh(self._path)
         try:
-            damage: list[BagDamaged] = []
-            found = readable(read_events(self._path), damage)
-            events = sorted(found, key=lambda event: event.stamp_s)
+            events = sorted(recorded.events(), key=lambda event: event.stamp_s)
             self._runner.in_loop(lambda: self._history.add_events(events))
-            states = readable(read_states(self._path), damage)
-            while not self._stopped.is_set():
-                batch = list(itertools.islice(states, STATES_AT_ONCE))
-                if not batch:
-                    packets = list(readable(read_packets(self._path), damage))
-                    for error in damage:
-                        _log.warning("%s", error)
-                    self._runner.in_loop(partial(self._history.add_packets, packets))
-                    took_s = time.monotonic() - begun_s
-                    _log.info("%s: completely on the time line after %.1f s", self._path, took_s)
-                    return
+            states = recorded.states()
+            while batch := list(itertools.islice(states, STATES_AT_ONCE)):
                 self._hand_over(batch)
+                if self._stopped.is_set():
+                    return
+            packets = list(recorded.packets())
         except BagUnusable as error:
             _log.warning("the time line stays empty: %s", error)
+            return
+        for damage in recorded.damage:
+            _log.warning("%s", damage)
+        self._runner.in_loop(partial(self._history.add_packets, packets))
+        took_s = time.monotonic() - begun_s
+        _log.info("%s: completely on the time line after %.1f s", self._path, took_s)
 
     def _hand_over(self, states: Sequence[MeshStatus]) -> None:
         """Add these states in the loop and wait for it, so that no work piles up there."""

@@ -12,17 +12,11 @@ from drone_mesh.errors import MeshError
 from drone_mesh.lab.run_report.page import render_page, write_csv
 from drone_mesh.lab.run_report.story import NothingRecorded, tell_story
 from drone_mesh.ros.graph.command_line import run_tool
-from drone_mesh.ros.views.bag import raise_any, read_events, read_states, readable
-from drone_mesh.ros.views.bag_file import BagDamaged, BagUnusable
+from drone_mesh.ros.views.bag import BagUnusable, RecordedMesh
 
 
 def main() -> None:
     """Entry point of nodes/report."""
-    options = _parser().parse_args(rospy.myargv()[1:])
-    run_tool("report", lambda: _run(options))
-
-
-def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="rosrun drone_mesh report",
         description="Writes an HTML report of a run that launch/record.launch recorded: the "
@@ -42,17 +36,16 @@ def _parser() -> argparse.ArgumentParser:
         "--csv", type=Path, metavar="FOLDER", help="also write the numbers to this folder, as CSV"
     )
     parser.add_argument("--title", help="heading of the report (default: name of the bag)")
-    return parser
+    options = parser.parse_args(rospy.myargv()[1:])
+    run_tool("report", lambda: _run(options))
 
 
 def _run(options: argparse.Namespace) -> int:
     page = options.output or options.bag.with_suffix(".html")
     print(f"reading {options.bag} ...", file=sys.stderr)
-    damage: list[BagDamaged] = []
-    states = readable(read_states(options.bag), damage)
-    events = readable(read_events(options.bag), damage)
+    recorded = RecordedMesh(options.bag)
     try:
-        story = tell_story(states, events)
+        story = tell_story(recorded.states(), recorded.events())
     except NothingRecorded as error:
         raise BagUnusable(f"{options.bag}: {error}") from error
     print("drawing ...", file=sys.stderr)
@@ -64,5 +57,5 @@ def _run(options: argparse.Namespace) -> int:
         raise MeshError(f"{error.filename}: {error.strerror}") from error
     for path in written:
         print(path)
-    raise_any(damage)
+    recorded.raise_damage()
     return 0

@@ -7,10 +7,8 @@ import re
 from pathlib import Path
 
 from drone_mesh.errors import MeshError
-from drone_mesh.ros.graph.command_line import join_graph, run_tool
-from drone_mesh.ros.views.bag import raise_any
-from drone_mesh.ros.views.bag_file import BagDamaged
-from drone_mesh.ros.views.state_source import live_state, parse_with_bag, state_in_bag
+from drone_mesh.ros.graph.command_line import run_tool
+from drone_mesh.ros.views.state_source import chosen_state, parse_with_bag
 from drone_mesh.view.scene import scene_of
 from drone_mesh.world.physics import require_pybullet
 
@@ -20,11 +18,6 @@ SMALLEST, LARGEST = 200, 8000  # pixels
 
 def main() -> None:
     """Entry point of nodes/snapshot."""
-    options = parse_with_bag(_parser())
-    run_tool("snapshot", lambda: _run(options))
-
-
-def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="rosrun drone_mesh snapshot",
         description="Writes a picture of drones, links and flights. Needs no screen.",
@@ -38,7 +31,8 @@ def _parser() -> argparse.ArgumentParser:
         metavar="WxH",
         help=f"size in pixels (default: {DEFAULT_SIZE[0]}x{DEFAULT_SIZE[1]})",
     )
-    return parser
+    options = parse_with_bag(parser)
+    run_tool("snapshot", lambda: _run(options))
 
 
 def _png(text: str) -> Path:
@@ -62,16 +56,10 @@ def _run(options: argparse.Namespace) -> int:
     require_pybullet("snapshot")
     from drone_mesh.view.snapshot import render
 
-    damage: list[BagDamaged] = []
-    if options.bag is None:
-        join_graph("mesh_snapshot")
-        mesh = live_state()
-    else:
-        mesh = state_in_bag(options.bag, options.at, options.run, damage)
-    try:
-        render(scene_of(mesh), options.picture, options.size)
-    except (OSError, ValueError) as error:
-        raise MeshError(f"{options.picture}: {error}") from error
-    print(options.picture)
-    raise_any(damage)
+    with chosen_state(options, "mesh_snapshot") as mesh:
+        try:
+            render(scene_of(mesh), options.picture, options.size)
+        except (OSError, ValueError) as error:
+            raise MeshError(f"{options.picture}: {error}") from error
+        print(options.picture)
     return 0

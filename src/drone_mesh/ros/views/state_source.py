@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Iterator
 
 import rospy
 
@@ -12,9 +14,9 @@ from drone_mesh.arguments import MOST, decimal, whole
 from drone_mesh.errors import MeshError, naming_argument
 from drone_mesh.msg import MeshState
 from drone_mesh.ros.graph import names
+from drone_mesh.ros.graph.command_line import join_graph
 from drone_mesh.ros.graph.conversions import mesh_status
-from drone_mesh.ros.views.bag import by_run, chosen_run, no_states, read_states, readable
-from drone_mesh.ros.views.bag_file import BagDamaged, BagUnusable
+from drone_mesh.ros.views.bag import BagUnusable, RecordedMesh
 from drone_mesh.state.model import MeshStatus
 
 WAIT_S = 5.0  # wall time for a live state: it is latched, so it arrives at once or not at all
@@ -77,31 +79,39 @@ class _Run:
     found: MeshStatus | None = None
 
 
-def state_in_bag(
-    path: Path, at_s: float | None, run: int | None, damage: list[BagDamaged]
-) -> MeshStatus:
-    """The last state of a run in a bag, or the last one up to `at_s`. Raises BagUnusable.
+@contextlib.contextmanager
+def chosen_state(options: argparse.Namespace, name: str) -> Iterator[MeshStatus]:
+    """The state that these options of `parse_with_bag` choose; a live one as this ROS node.
 
-    What else is damaged in the bag is added to `damage`.
+    At the end raises BagUnusable if anything is damaged in the bag.
     """
+    if options.bag is None:
+        join_graph(name)
+        yield live_state()
+        return
+    recorded = RecordedMesh(options.bag)
+    yield _state_in(recorded, options.at, options.run)
+    recorded.raise_damage()
+
+
+def _state_in(recorded: RecordedMesh, at_s: float | None, run: int | None) -> MeshStatus:
+    """The last state of a run in a bag, or the last one up to `at_s`. Raises BagUnusable."""
     runs: dict[int, _Run] = {}
-    with naming_argument("--bag ", path):
-        for number, mesh in by_run(readable(read_states(path), damage)):
+    with naming_argument("--bag ", recorded.path):
+        for number, mesh in recorded.by_run():
             this = runs.setdefault(number, _Run(mesh.stamp_s, mesh.stamp_s))
             this.last_s = mesh.stamp_s
             if at_s is None or mesh.stamp_s <= at_s:
                 this.found = mesh
-        if not runs:
-            raise damage[0] if damage else no_states(path)
-        this = runs[chosen_run(path, len(runs), run)]
+        this = runs[recorded.chosen_run(len(runs), run)]
         if this.found is None:
             raise BagUnusable(
-                f"{path}: no state up to {at_s:g} s; the recording starts at "
+                f"{recorded.path}: no state up to {at_s:g} s; the recording starts at "
                 f"{this.first_s:.1f} s of simulated time"
             )
         if at_s is not None and at_s > this.last_s + SPARE_S:
             raise BagUnusable(
-                f"{path}: no state at {at_s:g} s; the recording ends at {this.last_s:.1f} s of "
-                "simulated time"
+                f"{recorded.path}: no state at {at_s:g} s; the recording ends at "
+                f"{this.last_s:.1f} s of simulated time"
             )
     return this.found

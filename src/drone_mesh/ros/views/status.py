@@ -12,19 +12,15 @@ import rospy
 
 from drone_mesh.msg import MeshState
 from drone_mesh.ros.graph import names
-from drone_mesh.ros.graph.bounded_master import master_answers
 from drone_mesh.ros.graph.command_line import join_graph, run_tool
 from drone_mesh.ros.graph.conversions import mesh_status
-from drone_mesh.ros.graph.master_watch import MasterWatch
-from drone_mesh.ros.views.bag import raise_any
-from drone_mesh.ros.views.bag_file import BagDamaged
+from drone_mesh.ros.graph.master import MasterWatch, master_answers
 from drone_mesh.ros.views.state_source import (
     OLD_STATE_S,
     WAIT_S,
     NoState,
-    live_state,
+    chosen_state,
     parse_with_bag,
-    state_in_bag,
 )
 from drone_mesh.state.condition import all_connected, find_trouble
 from drone_mesh.state.model import MeshStatus
@@ -36,11 +32,6 @@ CLEAR_SCREEN = "\x1b[H\x1b[2J"
 
 def main() -> None:
     """Entry point of nodes/status."""
-    options = parse_with_bag(_parser())
-    run_tool("status", lambda: _run(options))
-
-
-def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="rosrun drone_mesh status",
         description="Prints the state of the mesh as a table.",
@@ -54,26 +45,22 @@ def _parser() -> argparse.ArgumentParser:
         default="auto",
         help="auto (default): on a terminal, unless NO_COLOR is set",
     )
-    return parser
+    options = parse_with_bag(parser)
+    run_tool("status", lambda: _run(options))
 
 
 def _run(options: argparse.Namespace) -> int:
     colours = options.colour == "always" or (
         options.colour == "auto" and sys.stdout.isatty() and "NO_COLOR" not in os.environ
     )
-    if options.bag is not None:
-        damage: list[BagDamaged] = []
-        result = _show(state_in_bag(options.bag, options.at, options.run, damage), colours)
-        raise_any(damage)
-        return result
-    join_graph("mesh_status")
-    if options.watch:
+    if options.watch and options.bag is None:
         return _watch(colours)
-    return _show(live_state(), colours)
+    with chosen_state(options, "mesh_status") as mesh:
+        print(mesh_table(mesh, colours))
+    return _code(mesh)
 
 
-def _show(mesh: MeshStatus, colours: bool) -> int:
-    print(mesh_table(mesh, colours))
+def _code(mesh: MeshStatus) -> int:
     return 0 if all_connected(find_trouble(mesh.nodes)) else 1
 
 
@@ -86,6 +73,7 @@ def _watch(colours: bool) -> int:
         latest[:] = [(mesh_status(message), time.monotonic())]
         came.set()
 
+    join_graph("mesh_status")
     rospy.Subscriber(names.STATE_TOPIC, MeshState, keep, queue_size=1)
     MasterWatch().start()  # states arrive again after a restart of the master
     if not came.wait(WAIT_S):
@@ -102,4 +90,4 @@ def _watch(colours: bool) -> int:
             print(f"{CLEAR_SCREEN if colours else ''}{text}", flush=True)
             time.sleep(WATCH_PERIOD_S)
     except KeyboardInterrupt:
-        return 0 if all_connected(find_trouble(latest[0][0].nodes)) else 1
+        return _code(latest[0][0])

@@ -5,41 +5,123 @@ from __future__ import annotations
 import logging
 import time
 from collections import deque
-from dataclasses import replace
+from contextlib import ExitStack
+from dataclasses import dataclass, fields, replace
+from typing import Callable, Mapping, Sequence
 
 import rospy
 
+from drone_mesh.air.obstacles import Obstacles
+from drone_mesh.arguments import is_whole
+from drone_mesh.configuration import FactoryConfiguration
+from drone_mesh.drone.fleet import StartPlace, plan_fleet
 from drone_mesh.drone.flight_path import Vector
+from drone_mesh.drone.goal import MAX_HEIGHT_M
+from drone_mesh.errors import ConfigurationError
+from drone_mesh.formations.missions import Mission
 from drone_mesh.nrf24.settings import data_rate
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import start_node
 from drone_mesh.ros.graph.conversions import NO_POSITION
 from drone_mesh.ros.graph.fleet_parameter import set_fleet_parameter
 from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
-from drone_mesh.ros.graph.master_watch import MasterWatch
+from drone_mesh.ros.graph.master import MasterWatch
 from drone_mesh.ros.graph.orderly_stop import OrderlyStop
-from drone_mesh.ros.graph.parameters import or_exit
+from drone_mesh.ros.graph.parameters import (
+    configured_missions,
+    configured_obstacles,
+    factory_configuration,
+    manager_layouts,
+    or_exit,
+)
+from drone_mesh.ros.graph.simulation import new_run
 from drone_mesh.ros.host.emulated_radios import EmulatedRadios
 from drone_mesh.ros.host.mesh_host import MeshHost
-from drone_mesh.ros.world.drone_views import drone_views
+from drone_mesh.ros.host.virtual_raspberry_pi import MeshSettings
 from drone_mesh.ros.world.engine_server import EngineServers, ExternalEngines
-from drone_mesh.ros.world.factory_parameters import FactoryParameters
 from drone_mesh.ros.world.fleet_changes import FleetChanges
-from drone_mesh.ros.world.mesh_state import MeshStatePublisher, WorldView
+from drone_mesh.ros.world.mesh_state import MeshStatePublisher, WorldView, drone_views
 from drone_mesh.ros.world.pilots import start_pilots
 from drone_mesh.ros.world.world_runner import WorldRunner
 from drone_mesh.state.links import LostLinks, known_links
 from drone_mesh.state.model import EventRecord, MeshStatus
 from drone_mesh.state.observation import describe_obstacles
 from drone_mesh.view.scene import Scene, scene_of
-from drone_mesh.view.window_process import WindowProcess
+from drone_mesh.view.window_process import WindowProcess, require_screen
 from drone_mesh.world.factory import DroneFactory
-from drone_mesh.world.interfaces import World
-from drone_mesh.world.physics import open_world
+from drone_mesh.world.physics import open_world, require_pybullet
+from drone_mesh.world.worlds import World
 
 MQTT_SENDER = {0: "with internet mqtt it sends the messages published on the broker"}
 
 _log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class FactoryParameters:
+    """A configuration that can be built."""
+
+    configuration: FactoryConfiguration
+    settings: MeshSettings
+    fleet: Sequence[StartPlace]
+    obstacles: Obstacles | None
+    missions: Mapping[int, Mission]
+    hosts: int  # 1: the nodes run in this process; otherwise in others
+
+    @classmethod
+    def read(cls) -> FactoryParameters:
+        """The private parameters over the configuration file. Raises ConfigurationError."""
+        configuration = factory_configuration(*(key.name for key in fields(FactoryConfiguration)))
+        fleet = plan_fleet(
+            configuration.gateways,
+            configuration.routers,
+            configuration.gridsize,
+            configuration.spacing,
+        )
+        obstacles = configured_obstacles(configuration)
+        if obstacles is not None and configuration.cruise_height < MAX_HEIGHT_M:
+            raise ConfigurationError(
+                "argument: cruise_height does not go with obstacles: flights cross over boxes"
+            )
+        missions = configured_missions(configuration)
+        if configuration.drones == "external" and (missions or configuration.mobility != "none"):
+            raise ConfigurationError(
+                "argument: missions and mobility need drones builtin: others fly external drones"
+            )
+        unknown = sorted(missions.keys() - {place.node_id for place in fleet})
+        if unknown:
+            raise ConfigurationError(f"missions: there is no drone {unknown[0]}")
+        if configuration.gui:
+            require_screen("gui")
+            require_pybullet("gui")
+        # With a bad layout file the manager would be restarted for ever; this ends the launch.
+        manager_layouts()
+        hosts = str(rospy.get_param("~hosts", "") or 1)
+        if not (is_whole(hosts) and int(hosts) >= 0):
+            raise ConfigurationError(
+                f"argument: invalid hosts {hosts!r}: expected a whole number, 0 or more"
+            )
+        if configuration.radio == "nrf24":
+            _check_emulated_radio(configuration, int(hosts))
+        settings = MeshSettings.from_configuration(configuration, new_run(), obstacles)
+        return cls(configuration, settings, fleet, obstacles, missions, int(hosts))
+
+
+def _check_emulated_radio(configuration: FactoryConfiguration, hosts: int) -> None:
+    if configuration.obstacles:
+        raise ConfigurationError(
+            "argument: obstacles need radio virtual: the emulated chips ignore boxes"
+        )
+    if hosts != 1:
+        raise ConfigurationError(
+            f"argument: invalid hosts {hosts}: must be 1 with radio nrf24: all emulated chips "
+            "share one air in one process"
+        )
+    if configuration.real_time_factor != 1.0:
+        raise ConfigurationError(
+            f"invalid real_time_factor {configuration.real_time_factor:g}: must be 1 with radio "
+            "nrf24, since the emulated chips run in wall time"
+        )
 
 
 class RosSimulation:
@@ -48,15 +130,14 @@ class RosSimulation:
     def __init__(self, parameters: FactoryParameters, world: World) -> None:
         """Create the drones. Nothing runs yet."""
         self._parameters = parameters
+        self._configuration = configuration = parameters.configuration
         self._world = world
         self._happened: deque[EventRecord] = deque()  # events of the drones; any thread fills it
-        configuration = parameters.configuration
+        wind = (configuration.wind_x, configuration.wind_y, 0.0)
         self._factory = DroneFactory(
             world,
             parameters.fleet,
-            (configuration.wind_x, configuration.wind_y, 0.0)
-            if configuration.flight == "dynamic"
-            else None,
+            wind if configuration.flight == "dynamic" else None,
             parameters.obstacles,
             configuration.cruise_height,
         )
@@ -75,24 +156,51 @@ class RosSimulation:
 
     def run(self, stop: OrderlyStop) -> None:
         """Offer the engines, start the nodes, and step the world until `stop` is requested."""
+        parameters, configuration = self._parameters, self._configuration
+        run, drones = parameters.settings.run, self._factory.drones
         engines = None
-        if self._parameters.configuration.drones == "external":
+        if configuration.drones == "external":
             ExternalEngines(self._factory)
         else:
-            engines = EngineServers(
-                self._factory, self._parameters.settings.run, self._happened.append
-            )
-            for drone in self._factory.drones:
+            engines = EngineServers(self._factory, run, self._happened.append)
+            for drone in drones:
                 if stop.requested():
                     return
                 engines.offer(drone)
-        radios = self._make_radios()
-        host = self._start_host(radios, stop)
-        try:
-            self._step(host, radios, engines, stop)
-        finally:
-            if host is not None:
-                host.stop()
+        radios, host = self._make_radios(), None
+        with ExitStack() as ends:
+            if parameters.hosts == 1:
+                host = MeshHost(
+                    parameters.settings,
+                    lambda: self._world.now_s,
+                    stop.fail,
+                    self._place_of,
+                    radios,
+                )
+                ends.callback(host.stop)
+                host.start()
+                if drones:
+                    host.wait_for_radios(stop.requested)
+                host.start_nodes({drone.node_id: drone.role for drone in drones})
+            runner = WorldRunner(self._world, run, configuration.real_time_factor, host)
+            state = MeshStatePublisher(run, self._view_of(runner), self._happened)
+            state.start()
+            ends.callback(state.stop)
+            watch = MasterWatch(names.FLEET_PARAM, names.SIM_TIME_PARAM)
+            needed = MQTT_SENDER if configuration.internet == "mqtt" else {}
+            changes = FleetChanges(
+                self._factory, runner, state, engines, host, radios, watch, needed
+            )
+            ends.callback(changes.stop)
+            if rospy.has_param(names.STANDING_PARAM):  # of a world that has ended
+                rospy.delete_param(names.STANDING_PARAM)
+            set_fleet_parameter(configuration)  # last: hosts wait for it
+            watch.start()
+            if configuration.gui:
+                window = self._window(state)
+                window.start()
+                ends.callback(window.stop)
+            runner.run(stop.requested)
 
     def _place_of(self, node_id: int) -> Vector:
         """Where the engine of this drone is; NO_POSITION if there is none (yet, or any more)."""
@@ -101,44 +209,19 @@ class RosSimulation:
 
     def _make_radios(self) -> EmulatedRadios | None:
         """The emulated chips; None: the radio is virtual."""
-        configuration = self._parameters.configuration
+        configuration = self._configuration
         if configuration.radio == "nrf24":
-            return EmulatedRadios(
-                self._factory.drones,
-                configuration.max_distance,
-                data_rate(configuration.data_rate),
-                configuration.seed,
-            )
+            rate = data_rate(configuration.data_rate)
+            range_m, seed = configuration.max_distance, configuration.seed
+            return EmulatedRadios(self._factory.drones, range_m, rate, seed)
         _log.info("radio virtual: an ideal disc, range %g m", configuration.max_distance)
         return None
 
-    def _start_host(self, radios: EmulatedRadios | None, stop: OrderlyStop) -> MeshHost | None:
-        """Start the nodes of this process; returns None if other processes run them."""
-        if self._parameters.hosts != 1:
-            return None
-        world = self._world
-        host = MeshHost(
-            self._parameters.settings, lambda: world.now_s, stop.fail, self._place_of, radios
-        )
-        host.start()
-        if self._factory.drones:
-            host.wait_for_radios(stop.requested)
-        host.start_nodes({drone.node_id: drone.role for drone in self._factory.drones})
-        return host
-
-    def _step(
-        self,
-        host: MeshHost | None,
-        radios: EmulatedRadios | None,
-        engines: EngineServers | None,
-        stop: OrderlyStop,
-    ) -> None:
-        configuration, world = self._parameters.configuration, self._world
-        run = self._parameters.settings.run
-        runner = WorldRunner(world, run, configuration.real_time_factor, host)
-        obstacles = self._parameters.obstacles
+    def _view_of(self, runner: WorldRunner) -> Callable[[], WorldView]:
+        """What makes the world's share of a state."""
+        configuration, obstacles = self._configuration, self._parameters.obstacles
         settings = MeshStatus(
-            world.now_s,
+            self._world.now_s,
             (),
             configuration.max_distance,
             routing=str(configuration.node.routing),
@@ -147,38 +230,12 @@ class RosSimulation:
             shape=configuration.shape,
         )
 
-        def read_view() -> WorldView:
-            factor, paused = runner.wanted_factor, runner.paused
-            now = replace(settings, stamp_s=world.now_s, real_time_factor=factor, paused=paused)
-            return now, drone_views(self._factory.drones, now.stamp_s)
+        def read() -> WorldView:
+            now_s, factor = self._world.now_s, runner.wanted_factor
+            now = replace(settings, stamp_s=now_s, real_time_factor=factor, paused=runner.paused)
+            return now, drone_views(self._factory.drones, now_s)
 
-        state = MeshStatePublisher(run, read_view, self._happened)
-        state.start()
-        watch = MasterWatch(names.FLEET_PARAM, names.SIM_TIME_PARAM)
-        changes = FleetChanges(
-            self._factory,
-            runner,
-            state,
-            engines,
-            host,
-            radios,
-            watch,
-            MQTT_SENDER if configuration.internet == "mqtt" else {},
-        )
-        if rospy.has_param(names.STANDING_PARAM):  # of a world that has ended
-            rospy.delete_param(names.STANDING_PARAM)
-        set_fleet_parameter(configuration)  # last: hosts wait for it
-        watch.start()
-        window = self._window(state) if configuration.gui else None
-        if window is not None:
-            window.start()
-        try:
-            runner.run(stop.requested)
-        finally:
-            if window is not None:
-                window.stop()
-            changes.stop()
-            state.stop()
+        return read
 
     def _window(self, state: MeshStatePublisher) -> WindowProcess:
         """A window that is not started yet; it shows current positions and the latest state."""
@@ -207,4 +264,4 @@ def main() -> None:
     parameters = or_exit(FactoryParameters.read)
     dynamic = parameters.configuration.flight == "dynamic"
     with OrderlyStop() as stop, or_exit(lambda: open_world(dynamic)) as world:
-        RosSimulation(parameters, world).run(stop)
+        or_exit(lambda: RosSimulation(parameters, world)).run(stop)

@@ -15,9 +15,9 @@ from drone_mesh.formations.missions import Mission
 from drone_mesh.msg import DroneInfo
 from drone_mesh.msg import Location as LocationMsg
 from drone_mesh.ros.graph import names
-from drone_mesh.ros.graph.conversions import NO_POSITION, engine_info, gps_response, power_off_info
+from drone_mesh.ros.graph.conversions import NO_POSITION
 from drone_mesh.ros.graph.logs import ThrottledLog
-from drone_mesh.ros.graph.run import Run, is_left_behind
+from drone_mesh.ros.graph.simulation import Run, is_left_behind
 from drone_mesh.state.model import EventRecord
 from drone_mesh.world.engine import DroneState
 from drone_mesh.world.factory import DroneFactory, VirtualDrone
@@ -55,12 +55,8 @@ class EngineServer:
         `report` publishes the drone's position. `happened` is called in any thread with each of its
         events.
         """
-        self._happened = happened
-        self._drone = drone
-        self._node_id = drone.node_id
-        self._run = run
-        self._engine = drone.engine
-        self._report = report
+        self._drone, self._node_id, self._engine = drone, drone.node_id, drone.engine
+        self._run, self._report, self._happened = run, report, happened
         # The world's thread:
         self._reported_s = -math.inf
         self._reported = (False, False)  # whether it flew, whether it was flat
@@ -108,7 +104,7 @@ class EngineServer:
         try:
             self._engine.set_goal(goal.latitude, goal.longitude, goal.height)
         except GoalRefused as error:
-            self._throttled_log.warning(f"drone {self._node_id} refused a goal", str(error))
+            self._throttled_log.note(f"drone {self._node_id} refused a goal", str(error))
             self._observed(MeshEventKind.GOAL_REFUSED, rospy.get_time(), str(error))
 
     def _observed(self, kind: MeshEventKind, now_s: float, detail: str) -> None:
@@ -117,7 +113,8 @@ class EngineServer:
             _log.warning("drone %d: %s%s", self._node_id, kind.value, detail and f", {detail}")
 
     def _gps(self, _request: srv.RequestGPSRequest) -> srv.RequestGPSResponse:
-        return gps_response(self._engine.get_location())
+        latitude, longitude, height = self._engine.get_location()
+        return srv.RequestGPSResponse(latitude, longitude, round(height))
 
     def _moved(self, state: DroneState) -> None:
         kind = (state.is_flying, self._engine.is_flat)
@@ -138,17 +135,14 @@ class EngineServers(rospy.SubscribeListener):
         self, factory: DroneFactory, run: Run, happened: Callable[[EventRecord], None]
     ) -> None:
         """`run` and `happened` as for EngineServer."""
-        self._factory = factory
-        self._run = run
-        self._happened = happened
+        self._factory, self._run, self._happened = factory, run, happened
         self._servers: dict[int, EngineServer] = {}
         self._publisher = rospy.Publisher(
             names.SIGNAL_TOPIC, DroneInfo, tcp_nodelay=True, queue_size=names.SIGNAL_QUEUE
         )
         # Added once the publisher exists; the report below reaches earlier subscribers.
-        implementation = self._publisher.impl
-        assert implementation is not None  # it is not closed yet
-        implementation.add_subscriber_listener(self)
+        assert self._publisher.impl is not None  # it is not closed yet
+        self._publisher.impl.add_subscriber_listener(self)
         self._report_all()
 
     def offer(self, drone: VirtualDrone) -> None:
@@ -172,10 +166,13 @@ class EngineServers(rospy.SubscribeListener):
             self._report(drone)
 
     def _report(self, drone: VirtualDrone) -> None:
-        """Publish its position; a drone with a flat battery has no power either."""
-        self._publisher.publish(engine_info(drone.node_id, drone.engine.state.position))
+        """Publish its position; a drone with a flat battery has no power either.
+
+        docs/ros.md, "Sources of DroneInfo": an engine never gives a topic.
+        """
+        self._publisher.publish(drone.node_id, drone.engine.state.position, "", True)
         if drone.engine.is_flat:
-            self._publisher.publish(power_off_info(drone.node_id))
+            self._publisher.publish(drone.node_id, NO_POSITION, "", False)
 
 
 class ExternalEngines:

@@ -14,12 +14,12 @@ from drone_mesh import srv
 from drone_mesh.drone.roles import Role
 from drone_mesh.errors import FleetRefused
 from drone_mesh.ros.graph import names
-from drone_mesh.ros.graph.master_watch import MasterWatch
-from drone_mesh.ros.graph.present_drones import PresentDrones
+from drone_mesh.ros.graph.master import MasterWatch
+from drone_mesh.ros.graph.simulation import PresentDrones
 from drone_mesh.ros.graph.waiting import comes_true
-from drone_mesh.ros.host.antenna_panel import node_runs
 from drone_mesh.ros.host.emulated_radios import EmulatedRadios
 from drone_mesh.ros.host.mesh_host import MeshHost
+from drone_mesh.ros.host.radios import node_runs
 from drone_mesh.ros.world.engine_server import EngineServers
 from drone_mesh.ros.world.mesh_state import MeshStatePublisher
 from drone_mesh.ros.world.world_runner import WorldRunner
@@ -55,14 +55,9 @@ class FleetChanges:
         `watch` restores the parameter after a restart of the master. `needed`: drones that cannot
         be removed, with the reason.
         """
-        self._factory = factory
-        self._runner = runner
-        self._state = state
-        self._engines = engines
-        self._host = host
-        self._radios = radios
-        self._watch = watch
-        self._needed = needed
+        self._factory, self._runner, self._state = factory, runner, state
+        self._engines, self._host, self._radios = engines, host, radios
+        self._watch, self._needed = watch, needed
         self._hosts: dict[int, str] = {}  # drone added here -> ROS node that runs its node
         self._worker = ThreadPoolExecutor(1, "fleet changes")
         self._publish()

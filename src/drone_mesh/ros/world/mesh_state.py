@@ -1,23 +1,34 @@
-"""MeshStatePublisher: merges the state of the whole mesh in the world's process."""
+"""MeshStatePublisher: merges the state of the whole mesh in the world's process.
+
+The diagnostics: one summary, and one status per node with a problem.
+"""
 
 from __future__ import annotations
 
+import math
 import time
 from collections import deque
 from dataclasses import replace
-from typing import Callable, Sequence, Tuple
+from typing import Callable, Iterable, Mapping, Sequence, Tuple
 
 import rospy
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from drone_mesh.msg import GroundedDrones, HostReport, LayoutProgress, MeshEvent, MeshState
 from drone_mesh.ros.graph import names
-from drone_mesh.ros.graph.conversions import event_msg, state_msg
-from drone_mesh.ros.graph.periodic import Periodic
-from drone_mesh.ros.graph.run import Run, is_left_behind, run_headers
-from drone_mesh.ros.world.diagnostics import diagnostics_msg
-from drone_mesh.state.model import EventRecord, MeshStatus
-from drone_mesh.state.observation import DroneView, MeshRoster
+from drone_mesh.ros.graph.conversions import event_msg, ros_time, state_msg
+from drone_mesh.ros.graph.periodic import HARDWARE_ID, Periodic
+from drone_mesh.ros.graph.simulation import Run, is_left_behind, run_headers
+from drone_mesh.state.condition import find_trouble, summarise
+from drone_mesh.state.model import (
+    EventRecord,
+    MeshStatus,
+    NodeStatus,
+    channel_in_words,
+    data_in_words,
+)
+from drone_mesh.state.observation import DroneView, MeshRoster, describe_drone
+from drone_mesh.world.factory import VirtualDrone
 
 WATCHED_PERIOD_S = 0.2  # wall time between two states with a subscriber: flights look smooth
 UNWATCHED_PERIOD_S = 1.0  # and without one: the greatest age of the latched state
@@ -108,19 +119,19 @@ class MeshStatePublisher(Periodic):
                 self._events.publish(event)
         while self._forgotten:
             self._roster.forget(self._forgotten.popleft())
-        while self._progress:
-            self._note_progress(self._progress.popleft())
+        while self._progress:  # what is over stays until there is other news
+            progress = self._progress.popleft()
+            self._layouts = {n: other for n, other in self._layouts.items() if not other.over}
+            self._layouts[progress.id] = progress
         while self._happened:
             self._events.publish(event_msg(self._happened.popleft()))
 
-    def _note_progress(self, progress: LayoutProgress) -> None:
-        """Take the progress of layouts; what is over stays until there is other news."""
-        self._layouts = {n: other for n, other in self._layouts.items() if not other.over}
-        self._layouts[progress.id] = progress
-
     def _publish(self, now_s: float) -> None:
         world, drones = self._read_view()
-        self._publish_grounded(drones)
+        grounded = {drone.id: drone.why_not_fly for drone in drones if drone.why_not_fly}
+        if grounded != self._grounded_now:
+            self._grounded_now = grounded
+            self._grounded.publish(GroundedDrones(list(grounded), list(grounded.values())))
         self.latest = mesh = replace(
             world,
             nodes=self._roster.snapshot(drones, now_s),
@@ -132,14 +143,69 @@ class MeshStatePublisher(Periodic):
             self._diagnosed_s = now_s
             self._diagnostics.publish(diagnostics_msg(mesh))
 
-    def _publish_grounded(self, drones: Sequence[DroneView]) -> None:
-        grounded = {drone.id: drone.why_not_fly for drone in drones if drone.why_not_fly}
-        if grounded != self._grounded_now:
-            self._grounded_now = grounded
-            self._grounded.publish(GroundedDrones(list(grounded), list(grounded.values())))
-
     def _achieved(self, now_s: float, world: MeshStatus) -> float:
         before, self._last_state = self._last_state, (now_s, world.stamp_s)
         if before is None or world.paused:
             return 0.0
         return max(0.0, (world.stamp_s - before[1]) / (now_s - before[0]))
+
+
+def drone_views(drones: Iterable[VirtualDrone], now_s: float) -> list[DroneView]:
+    """The positions and flight paths of these drones. Any thread."""
+    return [_view(drone, now_s) for drone in drones]
+
+
+def _view(drone: VirtualDrone, now_s: float) -> DroneView:
+    engine = drone.engine
+    state, pilot, battery = engine.state, engine.pilot, engine.battery_percent()
+    return replace(
+        describe_drone(drone.node_id, drone.role, state.position, state.path, now_s),
+        heading=() if pilot is None or state.path else pilot.heading or (),
+        battery=math.nan if battery is None else battery,
+        crashed=engine.crashed,
+        why_not_fly=engine.why_not_fly(),
+    )
+
+
+def diagnostics_msg(mesh: MeshStatus) -> DiagnosticArray:
+    """One summary, and one entry for each node with a problem."""
+    troubles = find_trouble(mesh.nodes)
+    summary = summarise(mesh.nodes, troubles)
+    by_id = {node.id: node for node in mesh.nodes}
+    counts = {"nodes": len(mesh.nodes), "with trouble": len(troubles)}
+    array = DiagnosticArray()
+    array.header.stamp = ros_time(mesh.stamp_s)
+    array.status = [
+        _status(summary.severity, "mesh", summary.text, HARDWARE_ID, counts),
+        *(
+            _status(
+                trouble.severity,
+                f"node {trouble.node}",
+                trouble.text,
+                f"{HARDWARE_ID}_{trouble.node}",
+                _details(by_id[trouble.node]),
+            )
+            for trouble in troubles
+        ),
+    ]
+    return array
+
+
+def _status(
+    level: int, name: str, text: str, hardware: str, values: Mapping[str, object]
+) -> DiagnosticStatus:
+    pairs = [KeyValue(key, str(value)) for key, value in values.items()]
+    return DiagnosticStatus(level, f"drone_mesh: {name}", text, hardware, pairs)
+
+
+def _details(node: NodeStatus) -> dict[str, object]:
+    return {
+        "on": node.on,
+        "connected": node.connected,
+        "hops": node.hops,
+        "neighbours": " ".join(map(str, node.neighbours)),
+        "route": " ".join(map(str, node.route)),
+        "repair": node.repair,
+        "radio channel": channel_in_words(node),
+        "users' data": data_in_words(node),
+    }

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import logging
+import math
 import threading
 import time
 from collections import deque
 from concurrent.futures import Future, TimeoutError
-from typing import Any, Callable, TypeVar
+from typing import Any, Callable, NamedTuple, TypeVar
 
 import rospy
 from rosgraph_msgs.msg import Clock
@@ -15,15 +16,16 @@ from std_msgs.msg import Float32
 
 from drone_mesh.configuration import MAX_REAL_TIME_FACTOR, MIN_REAL_TIME_FACTOR
 from drone_mesh.errors import FleetRefused
+from drone_mesh.msg import HostProgress
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import ros_time
 from drone_mesh.ros.graph.direct_publisher import DirectPublisher
-from drone_mesh.ros.graph.run import Run, run_headers
+from drone_mesh.ros.graph.logs import ThrottledLog
+from drone_mesh.ros.graph.simulation import Run, is_left_behind, run_headers
 from drone_mesh.ros.host.mesh_host import MeshHost
-from drone_mesh.ros.world.paced_hosts import PacedHosts
 from drone_mesh.srv import SetSpeed, SetSpeedRequest, SetSpeedResponse
-from drone_mesh.world.interfaces import World
-from drone_mesh.world.pace import Pace
+from drone_mesh.world.pace import Pace, UnderWay
+from drone_mesh.world.worlds import World
 
 # Wall: the kernel buffers minutes of /clock for a subscriber before a send blocks.
 STUCK_SUBSCRIBER_S = 0.02
@@ -33,9 +35,107 @@ _NAP_S = 0.001  # wall; while the mesh processes what is due
 _TASK_POLL_S = 0.2  # wall; how soon a waiting caller notices the end of the simulation
 _LONGEST_NAP_S = 0.05  # wall; a new speed or Ctrl-C takes effect after this at the latest
 
+# Simulated: a timer is late by at most this plus one step of the world, and so is the last
+# consequence of an event. The mesh waits more than ten times as long for an answer.
+MAX_LAG_S = 0.03
+HOST_TIMEOUT_S = 2.0  # wall seconds; the world continues without a host that is silent for longer
+ASK_AGAIN_AFTER_S = 1.0  # wall seconds; between two checks whether a stranger is a host
+
 _log = logging.getLogger(__name__)
 
 Result = TypeVar("Result")
+
+
+class _Progress(NamedTuple):
+    """The latest report of a host."""
+
+    done_s: float  # simulated; all work up to then is done
+    under_way: int  # packets handed over minus packets processed
+    reported_s: float  # monotonic
+
+
+class PacedHosts:
+    """The nodes of this process, and hosts in other processes.
+
+    The mesh is quiet when all hosts have done what was due and no packet is under way, in a queue
+    or between processes. The world is never more than MAX_LAG_S ahead of the last quiet moment, so
+    all consequences of an event, over any number of hops, happen within that time, however slow the
+    machine is.
+
+    Subscribes: /mesh/progress (HostProgress), of processes that have declared themselves hosts
+
+    Threads of rospy fill `_progress` and `_strangers`; the world's thread owns everything else.
+    """
+
+    def __init__(self, run: Run, nodes: MeshHost | None) -> None:
+        """`run` is the world's. `nodes` are those of this process, or None."""
+        self._run = run
+        self._nodes = nodes
+        self._progress: dict[str, _Progress] = {}
+        self._under_way = UnderWay()
+        self._quiet_s = 0.0  # simulated
+        self._strangers: dict[str, float] = {}  # node -> monotonic seconds of the last check
+        self._throttled_log = ThrottledLog(_log)
+        self._seen = (0.0, 0)  # work done and packets under way at the last call
+        self._stuck_since_s = time.monotonic()  # time stands still, and no work is done
+        rospy.Subscriber(names.PROGRESS_TOPIC, HostProgress, self._reported, tcp_nodelay=True)
+
+    def are_behind(self, now_s: float) -> bool:
+        """Whether the last quiet moment is too long ago for another step of the world."""
+        wall_s = time.monotonic()
+        slowest, done_s, under_way, idle = "the nodes of this process", now_s, 0, True
+        if self._nodes is not None:
+            idle = self._nodes.idle
+            done_s, under_way = now_s - self._nodes.lag_s(now_s), self._nodes.under_way
+        for host, progress in list(self._progress.items()):
+            if wall_s - progress.reported_s > HOST_TIMEOUT_S:
+                _log.warning("host %s is silent; the world continues without it", host)
+                del self._progress[host]
+                continue
+            under_way += progress.under_way
+            if progress.done_s < done_s:
+                slowest, done_s = f"host {host}", progress.done_s
+        if self._under_way.is_none(under_way, idle, wall_s):
+            self._quiet_s = max(self._quiet_s, done_s)
+        elif done_s >= now_s:
+            slowest = f"{under_way} packets"
+        if now_s - self._quiet_s <= MAX_LAG_S:
+            self._stuck_since_s = wall_s
+            return False
+        if (done_s, under_way) != self._seen:
+            self._seen, self._stuck_since_s = (done_s, under_way), wall_s
+        if wall_s - self._stuck_since_s > HOST_TIMEOUT_S:
+            self._throttled_log.note(
+                "time stands still", f"waiting for {slowest}, {now_s - self._quiet_s:.2f} s behind"
+            )
+        return True
+
+    def others(self) -> list[str]:
+        """The hosts in other processes that send reports. Any thread."""
+        return list(self._progress)
+
+    def _reported(self, progress: HostProgress) -> None:
+        if is_left_behind(progress, self._run):  # a host that has not noticed this world yet
+            return
+        reporter = progress._connection_header["callerid"]
+        if reporter not in self._progress and not self._is_host(reporter):
+            self._throttled_log.note("progress ignored", f"{reporter} is not a host of nodes")
+            return
+        before = self._progress.get(reporter)
+        # Two threads of a host send reports, so a later report may show less progress.
+        done_s = max(0.0 if before is None else before.done_s, progress.done.to_sec())
+        self._progress[reporter] = _Progress(done_s, progress.under_way, time.monotonic())
+
+    def _is_host(self, reporter: str) -> bool:
+        """Whether it has declared itself a host; asks the master at most once a second."""
+        now_s = time.monotonic()
+        if now_s - self._strangers.get(reporter, -math.inf) < ASK_AGAIN_AFTER_S:
+            return False
+        if rospy.has_param(names.host_param(reporter)):
+            self._strangers.pop(reporter, None)
+            return True
+        self._strangers[reporter] = now_s
+        return False
 
 
 class WorldRunner:
@@ -52,7 +152,9 @@ class WorldRunner:
     def __init__(self, world: World, run: Run, factor: float, nodes: MeshHost | None) -> None:
         """`run` is the world's. `nodes` are those of this process, or None."""
         self._world = world
+        self._nodes = nodes
         self._hosts = PacedHosts(run, nodes)
+        self.hosts = self._hosts.others
         self.paused = False  # this and the next: read by any thread
         self.wanted_factor = factor  # simulated seconds per wall second; 0: as fast as possible
         self._tasks: deque[tuple[Callable[[], Any], Future[Any]]] = deque()
@@ -62,10 +164,6 @@ class WorldRunner:
         )
         self._factor = rospy.Publisher(names.FACTOR_TOPIC, Float32, latch=True, queue_size=1)
         rospy.Service(names.SPEED_SERVICE, SetSpeed, self._set_speed)
-
-    def hosts(self) -> list[str]:
-        """The ROS nodes that run nodes of the mesh outside this process. Any thread."""
-        return self._hosts.others()
 
     def between_steps(self, function: Callable[[], Result]) -> Result:
         """Call `function` in the thread of `run`; returns its result. Any other thread.
@@ -84,14 +182,16 @@ class WorldRunner:
     def run(self, is_over: Callable[[], bool]) -> None:
         """Step until `is_over` returns True."""
         pace = Pace(self.wanted_factor)
-        measured_s = self._world.now_s, time.monotonic()
+        begun = self._world.now_s, time.monotonic()
         try:
             while not is_over():
                 self._run_tasks()
                 self._step_when_due(pace)
-                if time.monotonic() - measured_s[1] >= _MEASURE_PERIOD_S:
-                    measured_s = self._measure(measured_s)
-                    self._log_factor(pace, *measured_s)
+                now = self._world.now_s, time.monotonic()
+                if now[1] - begun[1] >= _MEASURE_PERIOD_S:
+                    self._factor.publish((now[0] - begun[0]) / (now[1] - begun[1]))
+                    self._log_factor(pace, *now)
+                    begun = now
         finally:
             self._over.set()
 
@@ -120,13 +220,8 @@ class WorldRunner:
             if wait_s > 0.0:
                 time.sleep(wait_s)
             self._clock.publish(Clock(ros_time(self._world.step())))
-            self._hosts.time_advanced()
-
-    def _measure(self, before_s: tuple[float, float]) -> tuple[float, float]:
-        """Publish the factor since `before_s` (simulated, wall); returns the current times."""
-        now_s = self._world.now_s, time.monotonic()
-        self._factor.publish((now_s[0] - before_s[0]) / (now_s[1] - before_s[1]))
-        return now_s
+            if self._nodes is not None:
+                self._nodes.executor.time_advanced()
 
     def _log_factor(self, pace: Pace, simulated_s: float, wall_s: float) -> None:
         achieved = pace.achieved(simulated_s, wall_s)

@@ -1,8 +1,10 @@
-"""MasterWatch: registers a node again after the master was restarted."""
+"""The ROS master: calls that end even if it hangs, and what a node does after its restart."""
 
 from __future__ import annotations
 
+import http.client
 import logging
+import xmlrpc.client
 from typing import Any
 
 import rosgraph
@@ -14,12 +16,56 @@ from rospy.impl.registration import (
     get_topic_manager,
 )
 
-from drone_mesh.ros.graph.bounded_master import NO_ANSWER
+from drone_mesh.errors import MeshError
 from drone_mesh.ros.graph.periodic import Periodic
 
-PERIOD_S = 2.0  # wall
+ANSWER_TIMEOUT_S = 5.0  # wall; what is silent for longer is dead
+POLL_PERIOD_S = 2.0  # wall
+NO_ANSWER = (OSError, http.client.HTTPException, xmlrpc.client.Error, rospy.ROSException)
 
 _log = logging.getLogger(__name__)
+
+
+class _BoundedTransport(xmlrpc.client.Transport):
+    def __init__(self, timeout_s: float) -> None:
+        super().__init__()
+        self._timeout_s = timeout_s
+
+    def make_connection(self, host: Any) -> http.client.HTTPConnection:
+        connection = super().make_connection(host)
+        connection.timeout = self._timeout_s
+        return connection
+
+
+def bounded_proxy(uri: str, timeout_s: float) -> xmlrpc.client.ServerProxy:
+    """Calls raise OSError after this wall time without an answer."""
+    return xmlrpc.client.ServerProxy(uri, transport=_BoundedTransport(timeout_s))
+
+
+def bounded_master(caller: str, timeout_s: float) -> rosgraph.Master:
+    """Like rosgraph.Master. Calls raise OSError after this wall time without an answer.
+
+    Raises MeshError if ROS_MASTER_URI is no address.
+    """
+    try:
+        master = rosgraph.Master(caller)
+    except (ValueError, OSError) as error:
+        uri = rosgraph.get_master_uri()
+        raise MeshError(
+            f"ROS_MASTER_URI={uri} is no address of a master: it must look like "
+            "http://localhost:11311"
+        ) from error
+    master.handle = bounded_proxy(master.master_uri, timeout_s)
+    return master
+
+
+def master_answers() -> bool:
+    """Whether there is a master, and it does not hang. Raises MeshError as `bounded_master`."""
+    try:
+        bounded_master("drone_mesh", ANSWER_TIMEOUT_S).getPid()
+    except (rosgraph.MasterException, *NO_ANSWER):
+        return False
+    return True
 
 
 class MasterWatch(Periodic):
@@ -32,7 +78,7 @@ class MasterWatch(Periodic):
 
     def __init__(self, *parameters: str) -> None:
         """`parameters`: names of public parameters to restore, if they exist when it starts."""
-        super().__init__("master watch", PERIOD_S)
+        super().__init__("master watch", POLL_PERIOD_S)
         self._master = rosgraph.Master(rospy.get_name())
         self._names = [rospy.resolve_name(name) for name in (rospy.get_name(), *parameters)]
         self._values: dict[str, Any] = {}  # replaced as a whole

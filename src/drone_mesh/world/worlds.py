@@ -1,8 +1,9 @@
-"""World and PhysicalWorld: the interfaces of a world, and of what moves in it."""
+"""World: time, and bodies without physics; and what a world with physics has besides."""
 
 from __future__ import annotations
 
 import abc
+import itertools
 from collections import deque
 from typing import Protocol, TypeVar
 
@@ -21,8 +22,10 @@ class Mover(Protocol):
         """Move on to `now_s`, in the world's thread; returns whether to call it again."""
 
 
-class World(abc.ABC):
+class World:
     """Bodies and simulated time, which advances by one fixed tick per `step()`.
+
+    Here a body is only its centre, which suffices for drones that follow their paths.
 
     Everything belongs to the thread that calls `step()`, except `wake()` and `now_s`, which any
     thread may use. Only movers that were woken cost time in a step. A world is a context manager
@@ -32,6 +35,8 @@ class World(abc.ABC):
     tick_s = 1.0 / TICKS_PER_S
 
     def __init__(self) -> None:
+        self.centres: dict[int, Vector] = {}  # by handle
+        self._handles = itertools.count()
         self._ticks = 0
         self._woken: deque[Mover] = deque()  # filled by any thread, emptied by the world's
         self._moving: dict[Mover, None] = {}  # an ordered set, so that runs are repeatable
@@ -47,39 +52,33 @@ class World(abc.ABC):
         now_s = self.now_s
         while self._woken:
             self._moving[self._woken.popleft()] = None
-        resting = [mover for mover in self._moving if not mover.step(now_s)]
-        for mover in resting:
+        for mover in [mover for mover in self._moving if not mover.step(now_s)]:
             del self._moving[mover]
-        self._advance()
         return now_s
 
     def wake(self, mover: Mover) -> None:
         """Call `mover` in each step from the next one on, until it returns False."""
         self._woken.append(mover)
 
-    @abc.abstractmethod
-    def add_box(self, size: Vector, centre: Vector) -> int:
+    def add_box(self, _size: Vector, centre: Vector) -> int:
         """Add a box (full edge lengths, metres) that only `move_box` moves; returns its handle."""
+        handle = next(self._handles)
+        self.centres[handle] = centre
+        return handle
 
-    @abc.abstractmethod
     def add_obstacle(self, box: Box) -> None:
         """Add a fixed box that bodies collide with, turned about its vertical axis."""
 
-    @abc.abstractmethod
     def move_box(self, box: int, centre: Vector) -> None:
         """Move a box's centre to this position; it stays upright."""
+        self.centres[box] = centre
 
-    @abc.abstractmethod
     def remove_box(self, box: int) -> None:
         """Remove a body. Its handle may be reused for a later body, so do not use it again."""
+        del self.centres[box]
 
-    @abc.abstractmethod
     def close(self) -> None:
         """Release the world's resources; a second call changes nothing. No steps after this."""
-
-    @abc.abstractmethod
-    def _advance(self) -> None:
-        """One tick of physics, after the movers have moved."""
 
     def __enter__(self: _AnyWorld) -> _AnyWorld:
         return self
@@ -88,7 +87,7 @@ class World(abc.ABC):
         self.close()
 
 
-class PhysicalWorld(World):
+class PhysicalWorld(World, abc.ABC):
     """A world with bodies that physics moves."""
 
     @abc.abstractmethod
