@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import unittest
 from pathlib import Path
 from typing import Callable, Iterable
 from xmlrpc.client import ServerProxy
@@ -31,6 +32,11 @@ NODES = Path(rospkg.RosPack().get_path("drone_mesh")) / "nodes"
 FORKS = multiprocessing.get_context("forkserver")
 PRELOADED = ["__main__", "drone_mesh.ros.views.report", "matplotlib.pyplot"]
 FORKS.set_forkserver_preload(PRELOADED)
+
+
+def in_order(*cases: type[unittest.TestCase]) -> unittest.TestSuite:
+    """The tests of classes that share a launch, one class after the other."""
+    return unittest.TestSuite(map(unittest.TestLoader().loadTestsFromTestCase, cases))
 
 
 def wait_for(what: str, within_s: float, condition: Callable[[], object]) -> None:

@@ -13,12 +13,26 @@ import rospy
 import rostest
 from rostest_support import Stranger, call, wait_for
 
+from drone_mesh import msg, srv
 from drone_mesh.msg import NodeDebugInfo
 from drone_mesh.srv import Casus, PowerSwitch, RequestDroneFlight, RequestGPS
 
 WITHIN_S = 90  # wall
 REQUESTLOCATION, LOCATION = 2, 1
 STRANGER = 200
+MD5_SUMS = {  # of 2019: programs built against those definitions still work
+    msg.DroneInfo: "99e674e5b5a4182824586263d617f84a",
+    msg.Location: "531a36c12f67bc070739cea93f21680c",
+    msg.NRF24: "a180fb3b6d78327c70980534ae536e9c",
+    msg.NodeDebugInfo: "b141338f1e7694ff1b6289d9fdd9b17d",
+    msg.RequestGatewayDroneFlight: "cae8e186407a89969bcd102090752de9",
+    srv.AreaScan: "ebc855433e55277d7ff08f155e929271",
+    srv.Casus: "793016ca784a646cc1bb4549c63c4736",
+    srv.PowerSwitch: "d1b2ea3f5a3f173007e2e47568b40871",
+    srv.RequestDroneFlight: "51562573c0dba53c9030c27c5521346f",
+    srv.RequestGPS: "531a36c12f67bc070739cea93f21680c",
+    srv.WirelessMessage: "7675f18cd7ea62a81bf259a443d1ffd3",
+}
 
 
 class DocumentTest(unittest.TestCase):
@@ -50,6 +64,9 @@ class DocumentTest(unittest.TestCase):
             return abs(x - longitude) + abs(y - latitude) < 0.1
 
         wait_for(f"drone {drone} at x {longitude}, y {latitude}", WITHIN_S, is_there)
+
+    def test_0_the_definitions_are_those_of_2019(self) -> None:
+        self.assertEqual({kind: kind._md5sum for kind in MD5_SUMS}, MD5_SUMS)
 
     def test_1_the_mesh_connects_and_a_layout_is_flown(self) -> None:
         self.wait_for_hops(0, 1, 1, 2)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The DroneFactory: time, speed, and the ROS side of the engines."""
+"""The DroneFactory: time, speed, the ROS side of the engines, and an antenna's power switch."""
 
 from __future__ import annotations
 
@@ -20,7 +20,6 @@ from drone_mesh.srv import SetSpeed
 class FactoryTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls) -> None:
-        rospy.init_node("test_factory")
         cls.log = LogWatch()
         cls.mesh = MeshWatch(3)
         cls.mesh.wait("the first debug messages", 30, lambda: len(cls.mesh.hops()) == 3)
@@ -111,4 +110,5 @@ class FactoryTest(unittest.TestCase):
 
 
 if __name__ == "__main__":
+    rospy.init_node("test_factory")
     rostest.rosrun("drone_mesh", "factory", FactoryTest)

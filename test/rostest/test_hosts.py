@@ -1,26 +1,138 @@
 #!/usr/bin/env python3
-"""The nodes are spread over three processes; one of them is killed and comes back."""
+"""The nodes are spread over three processes, which stay in step; one is killed and comes back."""
 
 from __future__ import annotations
 
+import collections
 import os
 import signal
 import subprocess
+import time
 import unittest
 
 import rospy
 import rostest
-from rostest_support import WALL_LIMIT_S, LogWatch, MeshWatch, call, pid_of, program, wait_for
+from rosgraph_msgs.msg import Clock
+from rostest_support import (
+    WALL_LIMIT_S,
+    LogWatch,
+    MeshWatch,
+    call,
+    in_order,
+    pid_of,
+    program,
+    wait_for,
+)
 
-from drone_mesh.srv import AddDrone, RemoveDrone
+from drone_mesh.msg import HostProgress
+from drone_mesh.srv import AddDrone, RemoveDrone, SetSpeed
+
+NOTHING_DONE = rospy.Time()
+REPEAT_S = 0.2  # wall
+STANDS_FOR_S = 3.0  # wall; longer than the world waits for a host that is silent
+
+
+class ProgressTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls) -> None:
+        cls.mesh = MeshWatch(4)
+        cls.now_s = 0.0
+        cls.said: collections.Counter[str] = collections.Counter()
+        rospy.Subscriber("/clock", Clock, cls._tick)
+        rospy.Subscriber(
+            "/mesh/progress", HostProgress, lambda heard: cls.said.update([heard.host])
+        )
+        cls.log = LogWatch()
+        cls.mesh.wait("all connected", 60, cls.mesh.connected)
+
+    @classmethod
+    def _tick(cls, clock: Clock) -> None:
+        cls.now_s = clock.clock.to_sec()
+
+    def test_each_host_goes_on_telling_while_time_stands_still(self) -> None:
+        self.addCleanup(self._go_on)
+        self.assertTrue(call("/DroneFactory/setSpeed", SetSpeed, True, 0.0).success)
+        self._wait_until_time_stands()
+        before = self.said.copy()
+        hosts = ("/mesh_host_1", "/mesh_host_2")
+        wait_for(
+            "two reports of progress from each host",
+            WALL_LIMIT_S,
+            lambda: all(self.said[host] - before[host] >= 2 for host in hosts),
+        )
+        self._go_on()
+        self.mesh.pass_time(1.0)
+
+    def test_a_node_that_is_not_a_host_cannot_stop_time(self) -> None:
+        stranger = rospy.Publisher("/mesh/progress", HostProgress, queue_size=10)
+        wait_for("the world listens", WALL_LIMIT_S, lambda: stranger.get_num_connections() >= 2)
+        begun_s, until_s = self.now_s, time.monotonic() + STANDS_FOR_S
+        while time.monotonic() < until_s or not self.log.lines("progress ignored"):
+            stranger.publish(HostProgress("/mesh_host_1", NOTHING_DONE, 0))
+            time.sleep(REPEAT_S)
+            self.assertLess(time.monotonic(), until_s + WALL_LIMIT_S, "nothing was logged")
+        self.assertIn(rospy.get_name(), self.log.lines("progress ignored")[0])
+        wait_for("time to go on", WALL_LIMIT_S, lambda: self.now_s > begun_s + 1.0)
+
+    def declare_as_host(self) -> None:
+        name = f"/drone_mesh/hosts{rospy.get_name()}"
+        rospy.set_param(name, [200, 201])
+        self.addCleanup(rospy.delete_param, name)
+
+    def test_the_world_waits_for_a_host_that_is_behind_but_not_for_a_silent_one(self) -> None:
+        self.declare_as_host()
+        slow = rospy.Publisher("/mesh/progress", HostProgress, queue_size=10)
+        wait_for("the world listens", WALL_LIMIT_S, lambda: slow.get_num_connections() >= 2)
+        late = HostProgress("/slow_host", NOTHING_DONE, 0)
+        self._wait_until_time_stands(lambda: slow.publish(late))
+        stands_at_s, until_s = self.now_s, time.monotonic() + STANDS_FOR_S
+        while time.monotonic() < until_s:
+            slow.publish(late)
+            time.sleep(REPEAT_S)
+            self.assertEqual(self.now_s, stands_at_s)
+        wait_for("a line", WALL_LIMIT_S, lambda: self.log.lines("time stands still"))
+        self.assertIn(
+            f"waiting for host {rospy.get_name()}", self.log.lines("time stands still")[0]
+        )
+        wait_for("time goes on", WALL_LIMIT_S, lambda: self.now_s > stands_at_s + 1.0)
+
+    def test_what_a_host_said_too_late_takes_nothing_back(self) -> None:
+        self.declare_as_host()
+        host = rospy.Publisher("/mesh/progress", HostProgress, queue_size=10)
+        wait_for("the world listens", WALL_LIMIT_S, lambda: host.get_num_connections() >= 2)
+        begun_s = self.now_s
+        ahead = rospy.Time.from_sec(begun_s + 1000.0)
+        host.publish(HostProgress("/hasty_host", ahead, 0))
+
+        def time_went_on() -> bool:
+            host.publish(HostProgress("/hasty_host", NOTHING_DONE, 0))
+            time.sleep(REPEAT_S)
+            return self.now_s > begun_s + 2.0
+
+        wait_for("time goes on all the same", WALL_LIMIT_S, time_went_on)
+
+    def _go_on(self) -> None:
+        self.assertTrue(call("/DroneFactory/setSpeed", SetSpeed, False, 0.0).success)
+
+    def _wait_until_time_stands(self, meanwhile=lambda: None) -> None:
+        seen_s, looks = -1.0, 0
+
+        def stands() -> bool:
+            nonlocal seen_s, looks
+            meanwhile()
+            before_s, seen_s = seen_s, self.now_s
+            time.sleep(REPEAT_S)
+            looks = looks + 1 if before_s == seen_s == self.now_s else 0
+            return looks >= 5  # a busy machine makes ticks late
+
+        wait_for("time stands still", WALL_LIMIT_S, stands)
 
 
 class HostsTest(unittest.TestCase):
     def test_only_the_drones_of_a_killed_host_are_lost_and_they_rejoin(self) -> None:
-        rospy.init_node("test_hosts")
         log = LogWatch()
-        mesh = MeshWatch(18)  # ids 0..4, 5..9 and 10..14 in one host each; the others are added
-        mesh.wait("all connected", 60, lambda: mesh.connected(range(15)))
+        mesh = MeshWatch(12)  # ids 0..2, 3..5 and 6..8 in one host each; the others are added
+        mesh.wait("all connected", 60, lambda: mesh.connected(range(9)))
         for host, latitude in ((1, 0.0), (2, 6.0), (3, 12.0)):
             added = call("/DroneFactory/addDrone", AddDrone, 255, False, latitude, 24.0)
             self.assertIn(f"/mesh_host_{host} runs its node", added.message)
@@ -38,22 +150,27 @@ class HostsTest(unittest.TestCase):
         self.assertNotIn("Traceback", refused.stderr)
 
         # A restarted node counts from 0: it must have sent enough to be recognised.
-        mesh.wait("14 has sent 40 messages", 90, lambda: mesh.info(14).totalMessages >= 40)
+        mesh.wait("8 has sent 40 messages", 90, lambda: mesh.info(8).totalMessages >= 40)
         old_pid = pid_of("/mesh_host_3")
-        sent = mesh.info(14).totalMessages
+        sent = mesh.info(8).totalMessages
         os.kill(old_pid, signal.SIGKILL)
-        mesh.wait("the others stay connected", 1, lambda: mesh.connected(range(10)))
+        mesh.wait("the others stay connected", 1, lambda: mesh.connected(range(6)))
         wait_for("respawn", WALL_LIMIT_S, lambda: pid_of("/mesh_host_3") not in (None, old_pid))
-        mesh.forget(10, 11, 12, 13, 14, 17)  # what they reported before their death
-        mesh.wait("14 restarted", 60, lambda: 14 in mesh.hops())
-        self.assertLess(mesh.info(14).totalMessages, sent, "it still counts as before")
-        mesh.wait("the nodes of host 3 connected again", 60, mesh.connected)
-        removed = call("/DroneFactory/removeDrone", RemoveDrone, 17)  # in the restarted host
+        mesh.forget(6, 7, 8, 11)  # what they reported before their death
+        mesh.wait("8 restarted", 240, lambda: 8 in mesh.hops())
+        self.assertLess(mesh.info(8).totalMessages, sent, "it still counts as before")
+        mesh.wait("the nodes of host 3 connected again", 240, mesh.connected)
+        removed = call("/DroneFactory/removeDrone", RemoveDrone, 11)  # in the restarted host
         self.assertTrue(removed.success, removed.message)
         with self.assertRaises(rospy.ROSException):
-            rospy.wait_for_service("/Nodes/17/powerSwitch", timeout=0.1)
+            rospy.wait_for_service("/Nodes/11/powerSwitch", timeout=0.1)
         self.assertEqual(log.failures(), [])
 
 
+def suite() -> unittest.TestSuite:
+    return in_order(HostsTest, ProgressTest)
+
+
 if __name__ == "__main__":
-    rostest.rosrun("drone_mesh", "hosts", HostsTest)
+    rospy.init_node("test_hosts")
+    rostest.rosrun("drone_mesh", "hosts", "__main__.suite")

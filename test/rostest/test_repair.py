@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Layout 201, a line of three: the middle one falls silent, the last one flies beside it."""
+"""Drones that are cut off: one of a line flies after the one that died, jammed ones stay."""
 
 from __future__ import annotations
 
@@ -8,7 +8,36 @@ import unittest
 
 import rospy
 import rostest
-from rostest_support import LogWatch, MeshWatch
+from rostest_support import LogWatch, MeshWatch, in_order
+from std_msgs.msg import Bool
+
+from drone_mesh.msg import MeshState
+
+
+class JammerTest(unittest.TestCase):
+    def test_jammed_drones_stay_say_so_and_connect_again(self) -> None:
+        log = LogWatch()
+        mesh = MeshWatch(4)
+        states: list[MeshState] = []
+        rospy.Subscriber("/mesh/state", MeshState, states.append, queue_size=1)
+        jammer = rospy.Publisher("/jammer", Bool, latch=True, queue_size=1)
+        mesh.wait("all connected at the start", 30, mesh.connected)
+        before = [mesh.place(node) for node in (1, 2, 3)]
+        jammer.publish(True)
+        mesh.wait("all routers are cut off", 60, lambda: mesh.lost(1, 2, 3))
+
+        def all_say_so() -> bool:
+            routers = [node for node in states[-1].nodes if node.id != 0] if states else []
+            return len(routers) == 3 and all("is jammed" in node.repair for node in routers)
+
+        mesh.wait("all say that their channel is jammed", 90, all_say_so)
+        self.assertTrue(all(node.jammed for node in states[-1].nodes if node.id != 0))
+        mesh.pass_time(60.0)
+        jammer.publish(False)
+        mesh.wait("all connected again", 30, mesh.connected)
+        self.assertEqual([mesh.place(node) for node in (1, 2, 3)], before)
+        self.assertEqual(log.failures(), [])
+
 
 FLIGHT_S = 6.0 / 2.0  # from (-1, 16) to (-1, 10) at 2 m/s
 
@@ -25,7 +54,6 @@ def stands_beside(place: tuple[float, float, int], other: tuple[float, float]) -
 
 class RepairTest(unittest.TestCase):
     def test_the_last_of_a_line_flies_beside_the_place_of_the_one_that_died(self) -> None:
-        rospy.init_node("test_repair")
         log = LogWatch()
         mesh = MeshWatch(4)
         mesh.wait("all connected at the start", 30, mesh.connected)
@@ -48,5 +76,10 @@ class RepairTest(unittest.TestCase):
         self.assertEqual(log.failures(), [])
 
 
+def suite() -> unittest.TestSuite:
+    return in_order(JammerTest, RepairTest)
+
+
 if __name__ == "__main__":
-    rostest.rosrun("drone_mesh", "repair", RepairTest)
+    rospy.init_node("test_repair")
+    rostest.rosrun("drone_mesh", "repair", "__main__.suite")

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A layout is a standing order: kept until each drone is at its place, replaced, or withdrawn."""
+"""Layouts are standing orders: kept until each drone is at its place, replaced, or withdrawn."""
 
 from __future__ import annotations
 
@@ -17,13 +17,28 @@ import actionlib
 import rospy
 import rostest
 from actionlib_msgs.msg import GoalStatus
-from rostest_support import LogWatch, MeshWatch, call, pid_of, program, run_program, wait_for
+from rostest_support import (
+    LogWatch,
+    MeshWatch,
+    call,
+    pid_of,
+    program,
+    run_program,
+    wait_for,
+)
 
 from drone_mesh.formations.layouts import Layouts
-from drone_mesh.msg import LayoutAction, LayoutFeedback, LayoutGoal, LayoutProgress, MeshState
-from drone_mesh.srv import OrderLayout, WithdrawLayout
+from drone_mesh.msg import (
+    LayoutAction,
+    LayoutFeedback,
+    LayoutGoal,
+    LayoutProgress,
+    Location,
+    MeshState,
+)
+from drone_mesh.srv import OrderFormation, OrderLayout, WithdrawLayout
 
-PLACES = (
+DRAWN = (
     ("drone 1", [5.1213562, 52.0907270]),  # x -3, y 3
     ("the old oak", [5.1213708, 52.0907270]),  # x -2, y 3
 )
@@ -37,7 +52,6 @@ def waits_for_17(progress: LayoutProgress) -> bool:
 class StandingLayoutsTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls) -> None:
-        rospy.init_node("test_standing_layouts")
         cls.log = LogWatch()
         cls.mesh = MeshWatch(18)
         cls.progress: dict[int, LayoutProgress] = {}
@@ -78,6 +92,20 @@ class StandingLayoutsTest(unittest.TestCase):
         self.assertEqual(client.get_state(), GoalStatus.SUCCEEDED, client.get_goal_status_text())
         self.assertEqual(client.get_result().message, "17 of 17 at their places")
         self.assertTrue(any(feedback.flying for feedback in heard))
+
+    def test_3_a_subscriber_that_comes_late_still_gets_the_goal(self) -> None:
+        """The engine's connection may take a second more than the order."""
+        goal = rospy.wait_for_message("/Drones/13/goal", Location, FLIGHTS_S)
+        self.assertEqual((goal.longitude, goal.latitude, goal.height), (9.0, 7.0, 0))
+        self.mesh.wait_at(13, 9.0, 7.0, within_s=5.0)
+
+    def test_3_a_drone_is_not_replaced_by_its_own_order_whatever_its_decimals(self) -> None:
+        """Whose third decimal is 5: as float32, in an order, it rounds to other hundredths."""
+        places = [Location(23.515, -12.535, 0), Location(26.015, 8.025, 0)]
+        formation = ("a", [1, 17], places, False, [])
+        number = call("/DroneManager/orderFormation", OrderFormation, *formation).id
+        done = self.wait_until_over(number)
+        self.assertEqual(bytes(done.arrived), bytes([1, 17]), done.message)
 
     def test_3_an_unknown_layout_is_refused_with_a_list_of_those_that_exist(self) -> None:
         client = actionlib.SimpleActionClient("/DroneManager/layout", LayoutAction)
@@ -134,8 +162,8 @@ class StandingLayoutsTest(unittest.TestCase):
 
     def missions_and_gateways_stay(self) -> None:
         """Points "0 " and "1 " of a ground station's mission are no drones, and move nobody."""
-        line = {"type": "LineString", "coordinates": [at for _name, at in PLACES]}
-        mission = self.drawing([("0 ", PLACES[0][1]), ("1 ", PLACES[1][1])], line)
+        line = {"type": "LineString", "coordinates": [at for _name, at in DRAWN]}
+        mission = self.drawing([("0 ", DRAWN[0][1]), ("1 ", DRAWN[1][1])], line)
         refused = run_program("layout", "--file", mission)
         self.assertEqual(refused.returncode, 2, refused.stdout)
         self.assertIn("a mission of one drone, as a line goes through its 2", refused.stderr)
@@ -147,7 +175,7 @@ class StandingLayoutsTest(unittest.TestCase):
         self.assertIn("drone 0 to x -3", moved.stdout, moved.stderr)
         self.assertNotEqual(moved.returncode, 2)
 
-    def drawing(self, points: Sequence[tuple[str, object]] = PLACES, *geometries: object) -> str:
+    def drawing(self, points: Sequence[tuple[str, object]] = DRAWN, *geometries: object) -> str:
         """A file of another program: a place for drone 1, and one for the nearest, which is 9."""
         drawn = [(name, {"type": "Point", "coordinates": place}) for name, place in points]
         features = [
@@ -170,4 +198,5 @@ class StandingLayoutsTest(unittest.TestCase):
 
 
 if __name__ == "__main__":
+    rospy.init_node("test_standing_layouts")
     rostest.rosrun("drone_mesh", "standing_layouts", StandingLayoutsTest)

@@ -94,8 +94,8 @@ def test_on_a_shared_channel_within_five_seconds(key, technique):
 )
 def test_also_between_more_nodes(nodes, radio, technique):
     network = scenarios.fleet(nodes - 1, math.isqrt(nodes), 2, radio=radio, routing=technique)
-    network.run_for(120.0)
-    assert_all_arrive(network, 1.0 if radio == "disc" else 5.0, count=300, every_s=0.5)
+    network.run_for(60.0)
+    assert_all_arrive(network, 1.0 if radio == "disc" else 5.0, count=100, every_s=0.5)
 
 
 @pytest.mark.slow
@@ -103,9 +103,9 @@ def test_between_a_hundred_nodes_with_beacons_on_a_shared_channel_one_in_a_hundr
     """Who changes its parent is not known far away until the beacons of all between have told."""
     network = scenarios.fleet(99, 10, 2, radio="shared", routing="beacon")
     network.run_for(120.0)
-    pairs = random.Random(3).sample(list(itertools.permutations(sorted(network.nodes), 2)), 300)
+    pairs = random.Random(3).sample(list(itertools.permutations(sorted(network.nodes), 2)), 100)
     delays = send_each(network, pairs, every_s=0.5)
-    assert sum(delays.get(pair, math.inf) <= 5.0 for pair in pairs) >= 297
+    assert sum(delays.get(pair, math.inf) <= 5.0 for pair in pairs) >= 99
 
 
 @pytest.mark.parametrize("technique", ROUTING_TECHNIQUES)

@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""Foreign DroneInfo, and subscribers that never read, neither cut off a node nor slow the world."""
+"""Killed parts, foreign DroneInfo, subscribers that never read, and far too many orders."""
 
 from __future__ import annotations
 
 import socket
 import struct
 import subprocess
+import time
 import unittest
 from xmlrpc.client import ServerProxy
 
@@ -14,12 +15,77 @@ import rosgraph
 import rospy
 import rostest
 from rosgraph_msgs.msg import Clock
-from rostest_support import WALL_LIMIT_S, LogWatch, MeshWatch, pid_of, wait_for
+from rostest_support import (
+    WALL_LIMIT_S,
+    LogWatch,
+    MeshWatch,
+    call,
+    in_order,
+    kill_and_wait_for_respawn,
+    pid_of,
+    wait_for,
+)
 from std_msgs.msg import String
 
-from drone_mesh.msg import DroneInfo
+from drone_mesh.msg import DroneInfo, RequestGatewayDroneFlight
 from drone_mesh.ros.graph.direct_publisher import DirectPublisher
 from drone_mesh.ros.world.world_runner import STUCK_SUBSCRIBER_S
+from drone_mesh.srv import AreaScan, RequestDroneFlight
+
+
+def near(node_id: int) -> list[int]:
+    """The nodes that this one could send to."""
+    return list(call("/SignalSimulator/othersinRange", AreaScan, node_id).near)
+
+
+class RestartsTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls) -> None:
+        cls.log = LogWatch()
+        cls.mesh = MeshWatch(10)
+
+    def test_the_mesh_is_connected_again_and_a_node_that_was_off_stays_off(self) -> None:
+        log, mesh = self.log, self.mesh
+        others = [node_id for node_id in range(10) if node_id != 9]
+        mesh.wait("all connected", 30, mesh.connected)
+        mesh.switch(9, False)
+        mesh.wait("9 off in the simulator", 12, lambda: 9 not in near(5))
+        near_before = near(5)
+        kill_and_wait_for_respawn("/WirelessSignalSimulator")
+        # Read only now, when the reports include all packets that the killed one carried.
+        sent_before = {node_id: mesh.info(node_id).totalMessages for node_id in others}
+
+        def all_sent() -> bool:
+            return all(mesh.info(n).totalMessages > sent_before[n] for n in others)
+
+        mesh.wait(
+            "all but 9 connected, with packets that the new simulator carried",
+            60,
+            lambda: mesh.connected(others) and all_sent(),
+        )
+        self.assertEqual(near(5), near_before)
+        self.assertNotIn(9, near(6))
+        self.assertLessEqual(len(log.lines("lost the simulator")), 1)
+        self.assertEqual(log.failures(), [])
+
+    def test_an_order_to_the_manager_that_came_back_moves_a_drone(self) -> None:
+        self.mesh.wait("all but 9 connected", 60, lambda: self.mesh.connected(range(9)))
+        kill_and_wait_for_respawn("/DroneManager")
+
+        def ordered() -> bool:
+            try:
+                answer = call(
+                    "/DroneManager/requestDroneMovement", RequestDroneFlight, 2, 4.0, 3.0, 0
+                )
+            except rospy.ServiceException:
+                return False  # the master may know the address of the dead one for a moment
+            return bool(answer.status == 1)
+
+        self.mesh.wait("the manager did not find the gateway", 120, ordered)
+        self.mesh.wait_at(2, 3.0, 4.0, within_s=60)
+        self.mesh.wait("0 and 1 connected", 8, lambda: self.mesh.connected([0, 1]))
+        self.assertEqual(self.log.failures(), [])
+
 
 STUCK = 30
 LARGE_BYTES = 100_000
@@ -51,9 +117,8 @@ def published_topics() -> set[str]:
 class StrayMessagesTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls) -> None:
-        rospy.init_node("test_stray_messages")
         cls.log = LogWatch()
-        cls.mesh = MeshWatch(3)
+        cls.mesh = MeshWatch(10)
         cls.mesh.wait("all connected", 30, cls.mesh.connected)
 
     def test_a_node_whose_packets_were_redirected_recovers_by_itself(self) -> None:
@@ -122,5 +187,36 @@ class StrayMessagesTest(unittest.TestCase):
         self.assertEqual(len(publisher.connections()), 1, "the stuck subscriber was not dropped")
 
 
+ORDERS = 4000
+PER_S = 1000
+LONGEST_PAUSE_S = 4.0  # wall; it was 9 s when each order was carried out and logged
+
+
+class OrderFloodTest(unittest.TestCase):
+    def test_the_world_goes_on_and_the_log_stays_readable(self) -> None:
+        log = LogWatch()
+        seen_s = [time.monotonic()]
+        rospy.Subscriber("/clock", Clock, lambda _clock: seen_s.append(time.monotonic()))
+        gateway = rospy.Publisher("/gateway", RequestGatewayDroneFlight, queue_size=ORDERS)
+        wait_for("the gateway subscribes", 10, gateway.get_num_connections)
+        begun_s = time.monotonic()
+        for number in range(ORDERS):
+            gateway.publish(RequestGatewayDroneFlight(ID=1 + number % 8, latitude=5.0))
+            time.sleep(max(0.0, begun_s + number / PER_S - time.monotonic()))
+        refused = "order refused: for drone"
+        wait_for("a line says that orders were refused", 20, lambda: log.lines(refused))
+        so_far = len(seen_s)
+        wait_for("the clock goes on", 20, lambda: len(seen_s) > so_far + 100)
+        pauses = [later - earlier for earlier, later in zip(seen_s, seen_s[1:])]
+        self.assertLess(max(pauses), LONGEST_PAUSE_S)
+        self.assertLess(len(log.lines("order")), 50)
+        self.assertEqual(log.failures(), [])
+
+
+def suite() -> unittest.TestSuite:
+    return in_order(StrayMessagesTest, RestartsTest, OrderFloodTest)
+
+
 if __name__ == "__main__":
-    rostest.rosrun("drone_mesh", "stray_messages", StrayMessagesTest)
+    rospy.init_node("test_disturbances")
+    rostest.rosrun("drone_mesh", "disturbances", "__main__.suite")

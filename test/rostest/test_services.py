@@ -1,9 +1,13 @@
 #!/usr/bin/env python3
-"""The DroneManager alone, with a gateway that only listens, or none."""
+"""DroneManager and WirelessSignalSimulator without a mesh: topics, services and honest answers."""
 
 from __future__ import annotations
 
 import math
+import os
+import signal
+import subprocess
+import sys
 import time
 import unittest
 from types import MappingProxyType
@@ -11,10 +15,155 @@ from typing import Container, Mapping
 
 import rospy
 import rostest
-from rostest_support import LogWatch, call, wait_for
+from diagnostic_msgs.msg import DiagnosticArray
+from rostest_support import WALL_LIMIT_S, LogWatch, Stranger, call, in_order, wait_for
 
-from drone_mesh.msg import FlightOrderAnswer, Location, RequestGatewayDroneFlight
-from drone_mesh.srv import Casus, OrderFlight, OrderFormation, OrderLayout, RequestDroneFlight
+from drone_mesh.msg import NRF24, DroneInfo, FlightOrderAnswer, Location, RequestGatewayDroneFlight
+from drone_mesh.srv import (
+    AreaScan,
+    Broadcast,
+    Casus,
+    OrderFlight,
+    OrderFormation,
+    OrderLayout,
+    RequestDroneFlight,
+    WirelessMessages,
+)
+
+# A receiver in a process of its own, to be killed.
+RECEIVER = """
+import rospy, sys
+from drone_mesh.msg import NRF24
+rospy.init_node("receiver", anonymous=True)
+rospy.Subscriber("/victim", NRF24, lambda packet: None)
+rospy.spin()
+"""
+
+
+def packet(from_: int, to: int) -> bytes:
+    return bytes((from_, from_, 200, to, to))
+
+
+class SimulatorTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls) -> None:
+        cls.log = LogWatch()
+        cls.a = Stranger(1, "/stranger_a", (1.0, 0.0, 0.1))
+        cls.b = Stranger(2, "/stranger_b", (5.0, 0.0, 0.1))
+        cls.far = Stranger(3, "/stranger_far", (10.5, 0.0, 0.1))
+        for stranger in (cls.a, cls.b, cls.far):
+            stranger.register()
+
+    def setUp(self) -> None:
+        for stranger in (self.a, self.b, self.far):
+            stranger.heard.clear()
+
+    def in_range(self, node_id: int) -> list[int]:
+        return list(call("/SignalSimulator/othersinRange", AreaScan, node_id).near)
+
+    def knows(self, node_id: int) -> bool:
+        try:
+            self.in_range(node_id)
+        except rospy.ServiceException:
+            return False
+        return True
+
+    def figure(self, name: str) -> float:
+        """The figures that the simulator publishes after this call."""
+        heard: list[float] = []
+        for _message in range(2):  # the first may have been sent before the call
+            array = rospy.wait_for_message("/diagnostics", DiagnosticArray, WALL_LIMIT_S)
+            heard += [float(v.value) for s in array.status for v in s.values if v.key == name]
+        return heard[-1]
+
+    def test_a_node_out_of_range_or_unknown_is_not_reached(self) -> None:
+        self.assertFalse(self.a.send(packet(1, 3)))
+        self.assertFalse(self.a.send(packet(1, 77)))
+        self.assertFalse(self.a.send(packet(77, 1)))
+
+    def test_an_unknown_asker_gets_a_service_error_that_says_so(self) -> None:
+        with self.assertRaisesRegex(rospy.ServiceException, "node 77 is not registered"):
+            self.in_range(77)
+
+    def test_a_broadcast_reaches_all_in_range_each_with_its_own_id(self) -> None:
+        message = NRF24(bytes((2, 2, 200, 254, 254)).ljust(32, b"\x07"))
+        reached = call("/SignalSimulator/broadcast", Broadcast, 2, message).reached
+        self.assertEqual(list(reached), [1, 3])
+        for stranger in (self.a, self.far):
+            got = stranger.wait_for_packet(b"\x02\x02\xc8", "the broadcast did not arrive")
+            self.assertEqual(got, bytes((2, 2, 200, stranger.node_id, 254)).ljust(32, b"\x07"))
+        self.assertEqual(self.b.heard, [])
+
+    def test_packets_handed_over_together_each_go_to_their_receiver(self) -> None:
+        near, unknown, far = packet(1, 2), packet(1, 77), packet(1, 3)
+        joined = b"".join(part.ljust(32, b"\x05") for part in (near, unknown, far, near))
+        taken = call("/SignalSimulator/messages", WirelessMessages, 1, joined).succes
+        self.assertEqual(list(taken), [True, False, False, True])
+        got = self.b.wait_for_packet(near, "the packet for 2 did not arrive")
+        self.assertEqual(got, near.ljust(32, b"\x05"))
+        self.assertEqual(self.far.heard, [])
+        with self.assertRaisesRegex(rospy.ServiceException, "33 bytes: expected 32 per packet"):
+            call("/SignalSimulator/messages", WirelessMessages, 1, bytes(33))
+
+    def test_a_node_that_is_off_neither_sends_nor_receives(self) -> None:
+        self.b.announce((0.0, 0.0, 0.0), "/stranger_b", on=False)
+        wait_for("2 was not switched off", 5, lambda: self.in_range(1) == [])
+        self.assertFalse(self.a.send(packet(1, 2)))
+        self.assertFalse(self.b.send(packet(2, 1)))
+        self.b.announce((0.0, 0.0, 0.0), "/stranger_b", on=True)
+        wait_for("2 was not switched on", 5, lambda: self.in_range(1) == [2])
+
+    def test_an_engine_moves_its_node(self) -> None:
+        self.far.announce((9.0, 0.0, 0.1))
+        wait_for("3 did not move", 5, lambda: self.in_range(1) == [2, 3])
+        self.far.announce((10.5, 0.0, 0.1))
+        wait_for("3 did not move back", 5, lambda: self.in_range(1) == [2])
+
+    def test_a_killed_receiver_does_not_count_as_reached(self) -> None:
+        receiver = subprocess.Popen([sys.executable, "-c", RECEIVER])
+        try:
+            self.a._publisher.publish(DroneInfo(9, (1.5, 0.0, 0.1), "/victim", True))
+            wait_for("9 could not be sent to", 10, lambda: self.a.send(packet(1, 9)))
+            os.kill(receiver.pid, signal.SIGKILL)
+            receiver.wait()
+            self.assertFalse(self.a.send(packet(1, 9)), "the first packet after its death")
+            self.assertNotIn(9, self.in_range(1))
+        finally:
+            receiver.kill()
+            receiver.wait()
+
+    def test_only_a_node_that_has_listened_before_can_lose_a_packet(self) -> None:
+        late = Stranger(8, "/stranger_late", (1.0, 1.0, 0.1))
+        late.subscriber.unregister()
+        late.announce((1.0, 1.0, 0.1), "/stranger_late")
+        wait_for("8 is known", WALL_LIMIT_S, lambda: self.knows(8))
+        lost = self.figure("lost in range")
+        self.assertFalse(self.a.send(packet(1, 8)))
+        self.assertEqual(self.figure("lost in range"), lost)
+
+        subscriber = rospy.Subscriber("/stranger_late", NRF24, lambda _packet: None)
+        wait_for("8 listens", WALL_LIMIT_S, lambda: self.a.send(packet(1, 8)))
+        subscriber.unregister()
+        wait_for("8 no longer listens", WALL_LIMIT_S, lambda: not self.a.send(packet(1, 8)))
+        self.assertGreater(self.figure("lost in range"), lost)
+        late.announce((0.0, 0.0, 0.0), "/stranger_late", on=False)
+
+    def test_bad_information_changes_nothing_and_does_not_flood_the_log(self) -> None:
+        nan = float("nan")
+        for _ in range(50):
+            self.a._publisher.publish(DroneInfo(1, (nan, 0.0, 0.0), "", True))
+            self.a._publisher.publish(DroneInfo(254, (1.0, 0.0, 0.0), "/Node/254", True))
+            self.a._publisher.publish(DroneInfo(255, (1.0, 0.0, 0.0), "", True))
+            self.a._publisher.publish(DroneInfo(1, (1.0, 0.0, 0.0), "no topic", True))
+            self.a._publisher.publish(DroneInfo(1, (1.0, 0.0, 0.0), "/rosout", True))
+        self.far.announce((9.0, 0.0, 0.1))  # comes after them on the same connection
+        wait_for("3 did not move", WALL_LIMIT_S, lambda: self.in_range(1) == [2, 3])
+        self.far.announce((10.5, 0.0, 0.1))
+        wait_for("3 did not move back", WALL_LIMIT_S, lambda: self.in_range(1) == [2])
+        wait_for("no line about it", 10, lambda: self.log.lines("DroneInfo dropped"))
+        self.assertTrue(self.b.send(packet(2, 1)))
+        self.assertLessEqual(len(self.log.lines("DroneInfo dropped")), 2)
+        self.assertEqual(self.log.failures(), [])
 
 
 def request(node_id: int, latitude: float, longitude: float, height: int) -> int:
@@ -25,7 +174,6 @@ def request(node_id: int, latitude: float, longitude: float, height: int) -> int
 class ManagerTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls) -> None:
-        rospy.init_node("test_manager")
         cls.log = LogWatch()
 
     def setUp(self) -> None:
@@ -63,14 +211,6 @@ class ManagerTest(unittest.TestCase):
             self.addCleanup(gateway.unregister)
             wait_for("the manager to connect", 10, lambda at=gateway: at.get_num_connections() > 0)
         wait_for("no order arrived", 10, lambda: request(250, 1, 1, 1) == 1 and trials)
-
-    def test_an_order_reaches_the_gateway_as_it_was_given(self) -> None:
-        self.listen()
-        self.assertEqual(request(3, 4.5, -2.25, 7), 1)
-        wait_for("the order did not arrive", 5, lambda: self.orders)
-        order = self.orders[0]
-        self.assertEqual((order.ID, order.latitude, order.longitude), (3, 4.5, -2.25))
-        self.assertEqual(order.height, 7)
 
     def test_an_order_that_no_gateway_has_a_route_for_has_status_2(self) -> None:
         self.listen(no_route=[3])
@@ -122,34 +262,12 @@ class ManagerTest(unittest.TestCase):
         wait_for("one line", 5, lambda: self.log.lines(line))
         self.assertEqual([order.ID for order in self.orders], [4, 3, 2, 1])
 
-    def test_the_short_names_do_the_same(self) -> None:
-        self.listen()
-        self.assertEqual(call("/requestDroneMovement", RequestDroneFlight, 3, 1, 1, 0).status, 1)
-        call("/SetToCasus", Casus, 1)
-        wait_for("both orders", 5, lambda: [order.ID for order in self.orders] == [3, 1])
-
     def test_without_a_gateway_the_status_is_0_after_3_seconds(self) -> None:
         begun_s = time.monotonic()
         self.assertEqual(request(3, 1, 1, 0), 0)
         self.assertTrue(2.5 < time.monotonic() - begun_s < 5.0)
         with self.assertRaisesRegex(rospy.ServiceException, "no gateway"):
             call("/DroneManager/SetToCasus", Casus, 101)
-
-    def test_a_layout_is_ordered_from_the_highest_id_down(self) -> None:
-        self.listen()
-        call("/DroneManager/SetToCasus", Casus, 101)
-        wait_for("six orders did not arrive", 5, lambda: len(self.orders) == 6)
-        self.assertEqual(
-            [(order.ID, order.longitude, order.latitude, order.height) for order in self.orders],
-            [
-                (6, 3, 16, 0),
-                (5, -3, 16, 0),
-                (4, 3, 10, 0),
-                (3, -3, 10, 0),
-                (2, 3, 4, 0),
-                (1, -3, 4, 0),
-            ],
-        )
 
     def test_a_formation_is_ordered_as_a_layout_is(self) -> None:
         self.listen(no_route=[4])
@@ -170,18 +288,6 @@ class ManagerTest(unittest.TestCase):
         ):
             with self.assertRaisesRegex(rospy.ServiceException, why):
                 call("/DroneManager/orderFormation", OrderFormation, name, drones, places, True, [])
-
-    def test_places_of_a_layout_that_are_too_near_to_each_other_are_refused(self) -> None:
-        self.listen()
-        name = "/DroneManager/orderFormation"
-        for away_m, at_once in ((0.0, True), (0.01, True), (0.9, False)):
-            places = [Location(5.0, 5.0, 0), Location(5.0, 5.0 + away_m, 0)]
-            why = f"drones 3 and 4 would stand {away_m:.2f} m apart: the clearance is 1 m"
-            with self.assertRaisesRegex(rospy.ServiceException, why):
-                call(name, OrderFormation, "near", [3, 4], places, at_once, [])
-        places = [Location(5.0, 5.0, 0), Location(5.0, 6.0, 0)]
-        self.assertTrue(call(name, OrderFormation, "apart", [3, 4], places, True, []).sent)
-        self.assertEqual([order.ID for order in self.orders], [4, 3])
 
     def test_what_is_no_order_is_refused_with_a_reason(self) -> None:
         self.listen()
@@ -206,5 +312,10 @@ class ManagerTest(unittest.TestCase):
         self.assertEqual(self.log.failures(), [])
 
 
+def suite() -> unittest.TestSuite:
+    return in_order(SimulatorTest, ManagerTest)
+
+
 if __name__ == "__main__":
-    rostest.rosrun("drone_mesh", "manager", ManagerTest)
+    rospy.init_node("test_services")
+    rostest.rosrun("drone_mesh", "services", "__main__.suite")

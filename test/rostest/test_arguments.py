@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What roslaunch makes of the arguments of the launch files; nothing is started.
+"""What roslaunch makes of arguments; an invalid one ends the launch with one line that says why.
 
 The effect of a parameter is tested where it is read.
 """
@@ -8,6 +8,9 @@ from __future__ import annotations
 
 import contextlib
 import io
+import os
+import socket
+import subprocess
 import sys
 import unittest
 import xml.etree.ElementTree as ET
@@ -18,10 +21,13 @@ from unittest import mock
 import roslaunch
 import rostest
 import yaml
+from rostest_support import WALL_LIMIT_S, free_port, in_order, program
 
 from drone_mesh.configuration import FactoryConfiguration
 
 LAUNCH = Path(__file__).resolve().parents[2] / "launch"
+OUR_LAUNCH = ("python3", "-m", "drone_mesh.ros.graph.launching")  # roslaunch exits with 0
+WITH_CONSOLE = ("console:=true", "simulator:=false", "manager:=false")
 
 
 def printed(option: str, file: str, *arguments: str) -> str:
@@ -129,5 +135,95 @@ class LaunchArgumentsTest(unittest.TestCase):
         self.assertEqual(hidden, ["/mesh_markers"])
 
 
+def ended(*command: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    """What a command said, and its exit code, once it has ended by itself."""
+    return subprocess.run(
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        env={**os.environ, **environment},
+        timeout=WALL_LIMIT_S,
+        check=False,
+        text=True,
+    )
+
+
+def launched(*arguments: str, by: tuple[str, ...] = OUR_LAUNCH) -> subprocess.CompletedProcess[str]:
+    port = free_port()
+    words = (*by, "-p", str(port), "drone_mesh", "factory.launch", *arguments)
+    return ended(*words, ROS_MASTER_URI=f"http://127.0.0.1:{port}")
+
+
+class BadArgumentsTest(unittest.TestCase):
+    def test_a_node_that_refuses_its_arguments_ends_the_whole_launch(self) -> None:
+        for argument, line in (
+            ("max_distance:=-1", "argument: invalid max_distance '-1': expected metres"),
+            ("casus:=/no/such.yaml", "casus:=/no/such.yaml: No such file or directory"),
+        ):
+            launch = launched(argument)
+            self.assertIn(f"/DroneFactory: {line}", launch.stdout)
+            self.assertIn("exit code 1", launch.stdout)
+            self.assertEqual(launch.returncode, 1)
+            # A node that is stopped while Python itself is starting prints a traceback.
+            until_failure, shutdown, _ = launch.stdout.partition("Initiating shutdown!")
+            self.assertTrue(shutdown, launch.stdout)
+            self.assertNotIn("Traceback", until_failure)
+
+    def test_the_factory_names_what_it_refuses_in_one_line(self) -> None:
+        # Each with a name of its own: what was given remains on the master, as a parameter.
+        for name, argument, line in (
+            ("a", "hosts:=many", "argument: invalid hosts 'many': expected a whole number"),
+            ("b", "obstacles:=/no/such.yaml", "obstacles: /no/such.yaml: No such"),
+            ("c", "config:=/tmp", "config:=/tmp: Is a directory"),
+            ("d", "config:=mine.yaml", "config:=mine.yaml: no such file in "),
+            ("e", "key:=/no/such", "key: /no/such: No such file or directory"),
+        ):
+            factory = ended(*program("drone_factory", f"__name:={name}", f"_{argument}"))
+            self.assertIn(line, factory.stdout)
+            self.assertNotIn("Traceback", factory.stdout)
+            self.assertEqual(factory.returncode, 1, factory.stdout)
+
+    def test_before_anything_starts_a_bad_namespace_and_a_bad_address_are_refused(self) -> None:
+        name = "must be letters, digits and _, and begin with a letter"
+        address = "is no address of a master: it must look like http://localhost:11311"
+        for argument, uri, line in (
+            ("namespace:=site-a", "", f"invalid namespace 'site-a': {name}"),
+            ("namespace:=01", "", f"invalid namespace '01': {name}"),
+            ("namespace:=site a", "", f"invalid namespace 'site a': {name}"),
+            ("routers:=2", "localhost:11311", f"ROS_MASTER_URI=localhost:11311 {address}"),
+        ):
+            environment = {"ROS_MASTER_URI": uri} if uri else {}
+            launch = ended(*OUR_LAUNCH, "drone_mesh", "factory.launch", argument, **environment)
+            self.assertEqual((launch.stdout, launch.returncode), (f"roslaunch: {line}\n", 1))
+
+    def test_the_nodes_themselves_refuse_such_a_namespace(self) -> None:
+        launch = launched("namespace:=site-a", by=("roslaunch",))
+        said = [line for line in launch.stdout.splitlines() if "invalid namespace" in line]
+        self.assertEqual(len(said), 1, said)
+        self.assertIn("drone_factory: invalid namespace '/site-a/'", said[0])
+
+    def test_what_the_console_cannot_use_is_said_before_anything_starts(self) -> None:
+        port = "invalid port 99999: must be a whole number 0..65535"
+        with socket.create_server(("127.0.0.1", 0)) as other:
+            used = str(other.getsockname()[1])
+            for argument, line in (
+                ("console_port:=99999", port),
+                (f"console_port:={used}", used),
+                ("origin:=abc", "invalid origin 'abc'"),
+            ):
+                launch = launched(*WITH_CONSOLE, argument)
+                (said,) = launch.stdout.splitlines()
+                self.assertIn(line, said)
+                self.assertEqual(launch.returncode, 1)
+        launch = launched(*WITH_CONSOLE, "console_port:=99999", by=("roslaunch",))
+        (said,) = [line for line in launch.stdout.splitlines() if line.startswith("console: ")]
+        self.assertIn(port, said)
+        self.assertNotIn("espawning", launch.stdout)
+
+
+def suite() -> unittest.TestSuite:
+    return in_order(LaunchArgumentsTest, BadArgumentsTest)
+
+
 if __name__ == "__main__":
-    rostest.rosrun("drone_mesh", "launch_arguments", LaunchArgumentsTest)
+    rostest.rosrun("drone_mesh", "arguments", "__main__.suite")

@@ -1,0 +1,92 @@
+#!/usr/bin/env python3
+"""A checkout in a path with a space is built and runs, and so does the installed package."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import tempfile
+import unittest
+from pathlib import Path
+
+import rostest
+from rostest_support import WALL_LIMIT_S, free_port, wait_for
+
+CHECKOUT = Path(__file__).resolve().parents[2]
+LEFT_OUT = (".*", "build", "logs", "__pycache__")
+CONNECTED = "2 of 2 routers connected"
+
+
+class InstallationsTest(unittest.TestCase):
+    def setUp(self) -> None:
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = Path(folder.name)
+        self.environment = {
+            "HOME": os.environ["HOME"],
+            "PATH": "/usr/bin:/bin",
+            "ROS_HOSTNAME": "localhost",
+            "ROS_MASTER_URI": f"http://localhost:{free_port()}",
+        }
+
+    def start(self, command: str, cwd: Path, stdout: int | None = None) -> subprocess.Popen[str]:
+        return subprocess.Popen(
+            ["bash", "-c", command],
+            cwd=cwd,
+            env=self.environment,
+            stdout=stdout,
+            start_new_session=True,
+            text=True,
+        )
+
+    def output(self, command: str, cwd: Path) -> str:
+        return self.start(command, cwd, subprocess.PIPE).communicate(timeout=WALL_LIMIT_S)[0]
+
+    def run_until_connected(self, simulation: str, setup: str, cwd: Path) -> None:
+        """Start a simulation, and look at it in another terminal."""
+        run = self.start(f"{simulation} routers:=2 spacing:=6", cwd)
+        status = f"{setup} && rosrun drone_mesh status"
+        try:
+            wait_for(
+                CONNECTED,
+                4 * WALL_LIMIT_S,
+                lambda: CONNECTED in self.output(status, cwd) or run.poll() is not None,
+            )
+            self.assertIsNone(run.poll(), "it ended")
+        finally:
+            if run.poll() is None:
+                os.killpg(run.pid, signal.SIGINT)
+            run.wait(WALL_LIMIT_S)
+
+    def test_run_builds_and_starts_a_simulation_in_a_path_with_a_space(self) -> None:
+        root = self.folder / "with space" / "drone mesh"
+        shutil.copytree(CHECKOUT, root, ignore=shutil.ignore_patterns(*LEFT_OUT))
+        (root / ".venv").symlink_to((CHECKOUT / ".venv").resolve())
+        self.run_until_connected("exec scripts/run", ". scripts/env.bash", root)
+
+    def test_the_installed_package_needs_its_setup_and_nothing_else(self) -> None:
+        # Not into the checkout: rospack would find the package twice.
+        subprocess.run(
+            ["cmake", "--build", str(CHECKOUT / "build"), "--target", "install"],
+            env={**os.environ, "DESTDIR": str(self.folder)},
+            stdout=subprocess.DEVNULL,
+            timeout=4 * WALL_LIMIT_S,
+            check=True,
+        )
+        (setup,) = self.folder.rglob("setup.bash")
+        sourced = f". {setup}"
+        shown = self.output(
+            f"{sourced} && rospack find drone_mesh && rosrun drone_mesh lab --help",
+            self.folder,
+        )
+        self.assertIn(str(setup.parent / "share" / "drone_mesh"), shown)
+        self.assertIn("usage: rosrun drone_mesh lab", shown)
+        self.run_until_connected(
+            f"{sourced} && exec roslaunch drone_mesh factory.launch", sourced, self.folder
+        )
+
+
+if __name__ == "__main__":
+    rostest.rosrun("drone_mesh", "installations", InstallationsTest)
