@@ -143,16 +143,12 @@ def test_a_list_that_names_an_id_that_no_node_has_is_damaged(below):
     assert Beacon.from_body((head + ids).ljust(27, b"\xff"), HERE) is None
 
 
-def test_a_beacon_that_names_the_broadcast_address_as_gateway_is_damaged():
-    assert (
-        Beacon.from_body(bytes.fromhex("00 14 fe 07 02 04 09 00 ff").ljust(27, b"\xff"), HERE)
-        is None
-    )
-
-
-def test_a_new_node_below_with_an_id_that_no_node_has_is_damage():
-    body = bytes.fromhex(FULL).replace(b"\x0c\xff", b"\xfe\xff")
-    assert Beacon.from_body(body, HERE) is None
+def test_the_broadcast_address_as_gateway_or_as_new_node_is_damage():
+    for body in (
+        bytes.fromhex("00 14 fe 07 02 04 09 00 ff").ljust(27, b"\xff"),
+        bytes.fromhex(FULL).replace(b"\x0c\xff", b"\xfe\xff"),
+    ):
+        assert Beacon.from_body(body, HERE) is None
 
 
 def test_a_search_and_its_answer_have_these_bytes():

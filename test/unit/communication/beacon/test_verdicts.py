@@ -1,4 +1,4 @@
-"""Verdicts: node 9 gives a packet to a neighbour, keeps it, returns it or drops it."""
+"""Node 9 gives a packet to a neighbour, keeps it, returns it or drops it, and searches."""
 
 from __future__ import annotations
 
@@ -8,8 +8,11 @@ from rig import packet
 from drone_mesh.communication.beacon.courier import DROP, HOLD, Transit
 from drone_mesh.communication.beacon.packets import NO_ANCESTORS, Beacon, Below
 from drone_mesh.communication.beacon.routes import BeaconRoutes
-from drone_mesh.communication.beacon.verdicts import Searches, Verdicts
+from drone_mesh.communication.beacon.verdicts import SUSPECTED_S, Searches, Verdicts
+from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.timing import Deadlines, Due
+from drone_mesh.communication.wire import messages
+from drone_mesh.communication.wire.packet_types import MessageType
 
 OWN, FROM_5_THROUGH_1 = "09 09 00 00 32", "05 01 00 09 32"  # for node 50
 UP = "05 01 00 09 00"
@@ -108,3 +111,182 @@ def test_three_neighbours_get_a_packet_down_and_any_number_one_up(node, text, se
     sent = transit(text)
     sent.sent_s = dict.fromkeys(sent_to, 0.5)
     assert node.verdict(sent, 0.5) == to
+
+
+GATEWAY, LIAR, RELAY, DRONE = 0, 1, 2, 9
+DRONES = (DRONE, 10, 11, 12)
+POLL, LAST_OF_TRAIN = b"\1\0\5\0\0\0", b"\1\0\0\0\0\0"  # session, nonce, message, checksum
+
+
+class Sender:
+    """A gateway with two neighbours that say to hear the drone; the liar said it last."""
+
+    def __init__(self):
+        self.deadlines = Deadlines()
+        self.routes = BeaconRoutes(
+            GATEWAY, True, 10.0, lambda _node: None, shared=False, clock=self.deadlines
+        )
+        searches = Searches(GATEWAY, self.routes, lambda *_packet: None, 0.002)
+        self.verdicts = Verdicts(self.routes, searches, self.deadlines)
+        self.claim()
+
+    def claim(self):
+        for node, ago_s in ((RELAY, 0.1), (LIAR, 0.0)):
+            self.routes.clock.now_s = self.deadlines.now_s - ago_s
+            near = Beacon(GATEWAY, 1, 1, GATEWAY, NO_ANCESTORS, 2.0, near=DRONES)
+            self.routes.heard(node, near)
+
+    def next_hop(
+        self, after_s=0.0, kind=MessageType.MOVE_TO_LOCATION, came_from=NO_ROUTE, to=DRONE, body=b""
+    ):
+        self.deadlines.now_s += after_s
+        self.claim()
+        packet = messages.packet(kind, GATEWAY, GATEWAY, NO_ROUTE, to, body)
+        return self.verdicts.verdict_on(Transit(packet, came_from, self.deadlines.now_s))
+
+
+@pytest.mark.parametrize("came_from", [NO_ROUTE, 7], ids=["made here", "of another node"])
+def test_an_order_without_an_answer_goes_another_way_the_next_time(came_from):
+    sender = Sender()
+    tries = [sender.next_hop(after_s=2.0, came_from=came_from) for _ in range(4)]
+    assert tries == [LIAR, RELAY, LIAR, RELAY]
+
+
+def test_a_drone_that_was_heard_since_its_last_order_is_ordered_the_same_way():
+    sender = Sender()
+    assert sender.next_hop() == LIAR
+    sender.routes.clock.now_s += 1.0
+    sender.routes.led_to(DRONE, RELAY)
+    assert sender.next_hop(after_s=5.0) == LIAR
+
+
+def test_nobody_is_suspected_for_longer_than_the_order_is_repeated():
+    sender = Sender()
+    assert sender.next_hop() == LIAR
+    assert sender.next_hop(after_s=SUSPECTED_S + 1.0) == LIAR
+
+
+def test_packets_that_are_no_orders_go_the_best_way():
+    sender = Sender()
+    assert [sender.next_hop(2.0, MessageType.REQUESTLOCATION) for _ in range(2)] == [LIAR, LIAR]
+
+
+def test_a_poll_without_an_answer_goes_another_way_too_but_not_one_that_wants_none():
+    sender = Sender()
+    assert [sender.next_hop(2.0, 193, body=POLL) for _ in range(2)] == [LIAR, RELAY]
+    sender = Sender()
+    assert [sender.next_hop(2.0, 193, body=LAST_OF_TRAIN) for _ in range(2)] == [LIAR, LIAR]
+
+
+def unanswered(sender, drones):
+    for drone in drones:
+        assert sender.next_hop(to=drone) == LIAR
+        assert sender.next_hop(after_s=2.0, to=drone) == RELAY
+
+
+def test_a_neighbour_through_which_three_nodes_gave_no_answer_takes_no_packet_of_any_kind():
+    sender = Sender()
+    unanswered(sender, DRONES[:2])
+    assert sender.next_hop(kind=MessageType.REQUESTLOCATION, to=12) == LIAR
+    unanswered(sender, DRONES[2:3])
+    assert sender.next_hop(kind=MessageType.REQUESTLOCATION, to=12) == RELAY
+    assert sender.next_hop(kind=MessageType.REQUESTLOCATION, to=LIAR) == LIAR
+
+
+def test_until_a_packet_of_another_node_comes_through_it():
+    sender = Sender()
+    unanswered(sender, DRONES[:3])
+    sender.routes.led_to(12, LIAR)
+    sender.deadlines.now_s += 5.0  # that it came from there is no hint any more
+    assert sender.next_hop(kind=MessageType.REQUESTLOCATION, to=12) == LIAR
+
+
+def test_it_is_used_where_there_is_no_other_way():
+    sender = Sender()
+    unanswered(sender, DRONES[:3])
+    del sender.routes.neighbours[RELAY]
+    ways = list(sender.routes.next_hops(12, NO_ROUTE))
+    assert [way.neighbour for way in ways] == [LIAR]
+
+
+HOP_S = 0.0025
+FOR_21 = b"\x15\x07\x00\x02"  # node 21, number 7, two hops left
+
+
+@pytest.fixture
+def routes():
+    return BeaconRoutes(1, False, 9.0, lambda node: None, shared=True, clock=Deadlines())
+
+
+@pytest.fixture
+def sent():
+    return []
+
+
+@pytest.fixture
+def searches(routes, sent):
+    return Searches(1, routes, lambda kind, creator, body: sent.append((creator, body)), HOP_S)
+
+
+def test_a_node_searches_for_one_after_the_other(routes, searches, sent):
+    searches.search(21, 2)
+    searches.search(22, 2)
+    assert sent == [(1, b"\x15\x01\x00\x02")]
+
+    routes.clock.now_s = 400 * HOP_S
+    searches.search(22, 2)
+    assert sent[1:] == [(1, b"\x16\x02\x00\x02")]
+
+
+def test_a_node_repeats_the_search_of_another_and_waits_before_its_own(routes, searches, sent):
+    assert not searches.heard(3, 3, FOR_21)
+    searches.search(22, 2)
+    assert sent == [(3, b"\x15\x07\x00\x01")]
+
+    routes.clock.now_s = 400 * HOP_S
+    searches.search(22, 2)
+    assert sent[1:] == [(1, b"\x16\x01\x00\x02")]
+
+
+def test_on_a_fast_medium_the_same_node_is_searched_again_after_six_tenths_of_a_second(
+    routes, sent
+):
+    searches = Searches(1, routes, lambda *_: sent.append(routes.now_s), 1e-5)
+    for step in range(14):
+        routes.clock.now_s = step / 8
+        searches.search(21, 2)
+    assert sent == [0.0, 0.625, 1.25]
+
+
+def test_after_five_searches_in_vain_it_pauses_for_ten_seconds(routes, searches, sent):
+    searched_s = []
+    for second in range(40):
+        routes.clock.now_s = 2.0 * second
+        searches.search(21, 2)
+        if len(sent) > len(searched_s):
+            searched_s.append(routes.now_s)
+    assert searched_s[:7] == [0.0, 2.0, 4.0, 6.0, 8.0, 18.0, 20.0]
+
+
+@pytest.mark.parametrize(("after_s", "repeated"), [(4.0, 1), (6.0, 2)])
+def test_a_search_that_comes_again_is_repeated_once_within_five_seconds(
+    routes, searches, sent, after_s, repeated
+):
+    searches.heard(3, 3, FOR_21)
+    routes.clock.now_s = after_s
+    searches.heard(3, 4, FOR_21)
+    assert len(sent) == repeated
+
+
+def test_searches_that_found_the_node_do_not_count(routes, searches, sent):
+    for second in range(0, 30, 3):
+        routes.clock.now_s = float(second)
+        searches.search(21, 2)
+        searches.found(21)
+    assert len(sent) == 10
+
+
+@pytest.mark.parametrize(("hops_left", "repeated"), [(255, 11), (12, 11), (1, 0)])
+def test_a_search_is_repeated_at_most_eleven_times_more(searches, sent, hops_left, repeated):
+    searches.heard(3, 3, bytes((21, 7, 0, hops_left)))
+    assert sent == [(3, bytes((21, 7, 0, repeated)))]

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import pytest
+from data_rig import ROOM, outbox_to_0, submit
 
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.inbox import Inbox
-from drone_mesh.communication.data.outbox import Outbox
-from drone_mesh.communication.data.outgoing import LIFETIME_S, OutgoingMessage, Ticket
+from drone_mesh.communication.data.outgoing import LIFETIME_S
 from drone_mesh.communication.timing import UNDISTURBED
-
-ROOM = 27
 
 
 class Link:
@@ -18,22 +16,14 @@ class Link:
 
     def __init__(self, reliable):
         self.reliable, self.count = reliable, 0
-        self.outbox = Outbox(
-            to=0,
-            session=0xFFFF,
-            room=ROOM,
-            ended=lambda _state: None,
-            seal=lambda _place, payload: payload,
-            hint=str,
-        )
+        self.outbox = outbox_to_0(session=0xFFFF)
         self.inbox = Inbox(ROOM, lambda ack: None, lambda _place, sealed: sealed, UNDISTURBED)
 
     def send(self, heard=True):
         """Send a message with its number; the sender gives it up. Returns what is delivered."""
         payload = self.count.to_bytes(4, "big")
-        ticket = Ticket(self.count, 0, 5, 4, self.reliable)
+        submit(self.outbox, self.count, payload, self.reliable)
         self.count += 1
-        self.outbox.waiting.append(OutgoingMessage(ticket, payload, LIFETIME_S))
         packet = self.outbox.next_packet(0.0)
         self.outbox.on_sent(packet, 0.0)
         if self.reliable:
@@ -65,8 +55,7 @@ def test_a_new_session_waits_for_the_acknowledgements_of_the_last():
     for _ in range(32_767):
         link.send(heard=False)
     for number in range(2):
-        ticket = Ticket(link.count + number, 0, 5, 4, True)
-        link.outbox.waiting.append(OutgoingMessage(ticket, bytes(4), LIFETIME_S))
+        submit(link.outbox, link.count + number, bytes(4))
     last = link.outbox.next_packet(0.0)
     link.outbox.on_sent(last, 0.0)
     assert link.outbox.next_packet(0.0) is None

@@ -3,27 +3,16 @@
 from __future__ import annotations
 
 import pytest
+from data_rig import outbox_to_0, submit
 
 from drone_mesh.communication.data import packets
-from drone_mesh.communication.data.outbox import Outbox
-from drone_mesh.communication.data.outgoing import LIFETIME_S, OutgoingMessage, Ticket, TicketState
+from drone_mesh.communication.data.outgoing import TicketState
 from drone_mesh.communication.data.pacing import FIRST_TIMEOUT_S, MOST_TIMEOUT_S, RoundTrip
 
 
 def outbox_with(count, relayed):
-    outbox = Outbox(
-        to=0,
-        session=7,
-        room=27,
-        ended=lambda _state: None,
-        seal=lambda _place, payload: payload,
-        hint=str,
-    )
-    outbox.set_relayed(relayed)
-    tickets = [Ticket(number, to=0, port=5, size=16, reliable=True) for number in range(count)]
-    for ticket in tickets:
-        outbox.waiting.append(OutgoingMessage(ticket, bytes(16), LIFETIME_S))
-    return outbox, tickets
+    outbox = outbox_to_0(relayed=relayed)
+    return outbox, [submit(outbox, number) for number in range(count)]
 
 
 def send_all(outbox, now_s):
@@ -45,8 +34,7 @@ def test_behind_relays_few_messages_leave_at_once_while_answers_are_late(relayed
     (first,) = send_all(outbox, 0.0)
     outbox.answered(ack_of(first, nonce=0), answered_s)
     for number in range(1, 31):
-        ticket = Ticket(number, to=0, port=5, size=16, reliable=True)
-        outbox.waiting.append(OutgoingMessage(ticket, bytes(16), answered_s + LIFETIME_S))
+        submit(outbox, number, now_s=answered_s)
     sent = send_all(outbox, answered_s)
     assert [packet.kind for packet in sent] == [packets.FRAGMENTS.start] * most
 
@@ -61,8 +49,7 @@ def test_while_a_poll_has_no_answer_nothing_else_is_sent(relayed):
     outbox, _ = outbox_with(3, relayed)
     assert len(send_all(outbox, 0.0)) >= 3
     for number in range(20):
-        ticket = Ticket(10 + number, to=0, port=5, size=16, reliable=True)
-        outbox.waiting.append(OutgoingMessage(ticket, bytes(16), LIFETIME_S))
+        submit(outbox, 10 + number)
     polled_s = []
     for tenth in range(11, 1000):
         for packet in send_all(outbox, tenth / 10) if tenth > 11 else send_polls(outbox):

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections import Counter
 
 import pytest
+from data_rig import outbox_to_0, submit
 
 from drone_mesh.communication.data import packets
-from drone_mesh.communication.data.outbox import Outbox
-from drone_mesh.communication.data.outgoing import LIFETIME_S, OutgoingMessage, Ticket
 from drone_mesh.communication.data.pacing import (
     FIRST_LENGTH,
     LEAST_LENGTH,
@@ -98,18 +97,9 @@ def test_a_silent_receiver_does_not_stop_best_effort(chain):
 
 
 def test_a_loss_of_best_effort_shortens_the_next_train_and_not_those_after_it():
-    outbox = Outbox(
-        to=0,
-        session=7,
-        room=27,
-        ended=lambda _state: None,
-        seal=lambda _place, payload: payload,
-        hint=str,
-    )
-    outbox.set_relayed(True)
+    outbox = outbox_to_0(relayed=True)
     for number in (1, 2, 3):
-        ticket = Ticket(number, to=0, port=5, size=1024, reliable=False)
-        outbox.waiting.append(OutgoingMessage(ticket, bytes(1024), LIFETIME_S))
+        submit(outbox, number, bytes(1024), reliable=False)
     arrived = Counter()  # by message, as bits
 
     def length_of_train(lost):

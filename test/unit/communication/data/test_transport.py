@@ -238,15 +238,6 @@ def test_a_neighbour_counts_as_lost_only_after_nine_lost_packets_of_a_user(netwo
     assert len([payload for payload in tried if is_data(payload) and payload[3] == 0]) == 9
 
 
-def test_packets_of_the_mesh_are_sent_before_those_of_users():
-    access = MediumAccess(AccessRules.for_cycle(0.002), rng=None)
-    for name in (b"d1", b"d2"):
-        access.offer(5, name, 0.0, Priority.DATA)
-    access.offer(5, b"c1", 0.0)
-    access.offer(5, b"c2", 0.0)
-    assert access.due(1.0).payload == b"c1"
-
-
 def test_users_packets_leave_room_in_the_queue():
     rules = AccessRules.for_cycle(0.002)
     access = MediumAccess(rules, rng=None)

@@ -51,6 +51,7 @@ def own_bid(to: int, score: float) -> bytes:
     return (bytes((1, 1, BID, to, to)) + struct.pack("<f", score)).ljust(32, b"\0")
 
 
+TWO_AT_8 = "02 02 01 01 01 00 00 00 41 00 00 00 00"  # node 2: latitude 8; a height follows
 UNDERGROUND = "02 02 01 01 01 00 00 00 41 00 00 00 00 f5 ff"  # node 2: height -11 m
 
 
@@ -108,10 +109,13 @@ def fly(rig, place):
 # The place to step back to -------------------------------------------------------------------
 
 
-def test_the_place_of_the_next_hop_is_the_one_to_step_back_to():
+@pytest.mark.parametrize(
+    ("heard", "node"), [([NEIGHBOUR_2_AT_0_8, "00 02 01 01 01 00 00 80 40"], 2), ([], 255)]
+)
+def test_the_place_of_the_next_hop_is_the_one_to_step_back_to(heard, node):
     rig = connected_rig()
-    rig.hear(NEIGHBOUR_2_AT_0_8, "00 02 01 01 01 00 00 80 40")
-    assert rig.mesh.get_last_good_known_location_id() == 2
+    rig.hear(*heard)
+    assert rig.mesh.get_last_good_known_location_id() == node
 
 
 def test_where_the_next_hop_flies_to_is_no_place_to_step_back_to_and_kept_clear_of():
@@ -128,10 +132,12 @@ def test_a_goal_farther_away_than_the_next_hop_can_stand_is_no_wrong_place():
     assert not rig.mesh.complaints.counts
 
 
-def test_a_gateway_is_followed_to_where_it_flies():
+def test_a_gateway_that_is_the_next_hop_is_followed_to_where_it_flies():
     rig = Rig()
     rig.connect_to_gateway()
-    rig.hear(GATEWAY_AT_0_4, "00 00 01 01 01 00 00 c0 40 00 00 00 00 00 00 00 00 00 80")
+    rig.hear(GATEWAY_AT_0_4)
+    assert rig.mesh.get_last_good_known_location_id() == 0
+    rig.hear("00 00 01 01 01 00 00 c0 40 00 00 00 00 00 00 00 00 00 80")
     assert rig.mesh.places.gateway == rig.mesh.places.good == Location(6.0, 0.0, 0.0)
 
 
@@ -156,18 +162,6 @@ def test_where_others_saw_a_drone_in_flight_does_not_replace_the_goal_that_it_to
     rig.hear("06 06 02 01 fe 00 00 00 41 00 00 00 00 01 80")  # flies to latitude 8
     rig.hear("05 05 45 01 01 00 00 06 00 00 80 40 00 00 00 00 04 00")  # was at latitude 4, 4 m up
     assert rig.mesh._neighbours.place_of(6).place == Location(8.0, 0.0, 0.0)
-
-
-def test_it_is_the_gateways_when_that_is_the_next_hop():
-    rig = Rig()
-    rig.connect_to_gateway()
-    rig.hear(GATEWAY_AT_0_4)
-    assert rig.mesh.get_last_good_known_location_id() == 0
-
-
-def test_it_is_unknown_until_a_location_arrives():
-    rig = connected_rig()
-    assert rig.mesh.get_last_good_known_location_id() == 255
 
 
 # Flight --------------------------------------------------------------------------------------
@@ -242,37 +236,20 @@ def test_a_router_without_a_gateway_forgets_its_routes_after_a_short_flight_too(
     assert rig.routing.empty()
 
 
-def test_it_has_landed_within_a_tenth_of_a_metre_of_the_goal_and_then_introduces_itself():
+@pytest.mark.parametrize(
+    "latitudes",
+    [[2.0, 10.0, 19.89, 19.91], [7.0, 7.5, 7.5], [0.0] * 9 + [2.0, 20.0]],
+    ids=["within a tenth of a metre of the goal", "it no longer moves", "once it had begun"],
+)
+def test_a_drone_introduces_itself_as_soon_as_it_has_landed(latitudes):
     rig = connected_rig()
     rig.hear("00 02 06 01 01 00 00 a0 41")
-    rig.forget()
-    for latitude in (2.0, 10.0, 19.89):
-        fly(rig, Location(latitude, 0.0, 0.0))
+    for latitude in latitudes:
         assert "LANDED" not in rig.kinds()
-    fly(rig, Location(19.91, 0.0, 0.0))
+        rig.forget()
+        fly(rig, Location(latitude, 0.0, 0.0))
     assert "LANDED" in rig.kinds()
     assert rig.broadcasts() == [packet("01 01 03 fe fe ff 00")]
-
-
-def test_it_has_landed_when_it_no_longer_moves():
-    rig = Rig()
-    rig.hear("02 02 06 01 01 00 00 a0 41")
-    fly(rig, Location(7.0, 0.0, 0.0))
-    fly(rig, Location(7.5, 0.0, 0.0))
-    assert "LANDED" not in rig.kinds()
-    fly(rig, Location(7.5, 0.0, 0.0))
-    assert "LANDED" in rig.kinds()
-
-
-def test_a_flight_that_has_not_begun_is_not_over():
-    rig = Rig()
-    rig.hear("02 02 06 01 01 00 00 a0 41")
-    for _ in range(9):
-        fly(rig, Location(0.0, 0.0, 0.0))
-    fly(rig, Location(2.0, 0.0, 0.0))
-    assert "LANDED" not in rig.kinds()
-    fly(rig, Location(20.0, 0.0, 0.0))
-    assert "LANDED" in rig.kinds()
 
 
 def test_a_flight_that_goes_on_to_another_goal_is_not_over_at_the_first_one():
@@ -302,11 +279,14 @@ def test_a_drone_that_does_not_set_out_in_a_time_that_fits_the_distance_has_land
     assert "LANDED" in rig.kinds()
 
 
-def test_a_drone_that_can_no_longer_fly_does_not_set_out():
+@pytest.mark.parametrize(
+    ("trouble", "within_s"), [({"grounded": "battery empty"}, 2.0), ({"place": None}, 30.0)]
+)
+def test_a_drone_that_cannot_fly_or_say_where_it_is_does_not_fly_for_ever(trouble, within_s):
     rig = Rig()
     rig.hear("02 02 06 01 01 00 00 a0 41")
-    rig.engine.grounded = "battery empty"
-    rig.wait(2.0)
+    vars(rig.engine).update(trouble)
+    rig.wait(within_s)
     assert "LANDED" in rig.kinds()
 
 
@@ -369,39 +349,19 @@ def test_an_order_ends_the_time_without_a_gateway():
     assert len(rig.engine.goals) == 2
 
 
-def test_the_same_order_during_the_flight_is_no_new_flight():
-    rig = Rig()
-    rig.hear("00 02 06 01 01 00 00 a0 41", "09 03 06 01 01 00 00 a0 41")
-    assert rig.engine.goals == [Location(20.0, 0.0, 0)]
-
-
-def test_the_same_order_of_a_second_gateway_is_reported_once():
-    rig = Rig()
-    rig.hear("00 02 06 01 01 00 00 a0 41", "07 02 06 01 01 00 00 a0 41")
-    assert rig.kinds().count("FLIGHT_ORDERED") == 1
-
-
-def test_another_order_during_the_flight_replaces_the_first():
-    rig = Rig()
-    rig.hear("00 02 06 01 01 00 00 a0 41", "00 02 06 01 01 00 00 80 3f")
-    assert rig.engine.goals == [Location(20.0, 0.0, 0), Location(1.0, 0.0, 0)]
-
-
 @pytest.mark.parametrize(
-    "place",
+    ("other", "goals"),
     [
-        "00 60 9c 45",  # latitude 5004
-        "00 00 00 00 00 60 9c c5",  # longitude -5004
-        "00 00 00 00 00 00 00 00 f5 01",  # height 501
-        "00 00 00 00 00 00 00 00 ff ff",  # height -1
+        ("09 03 06 01 01 00 00 a0 41", [Location(20.0, 0.0, 0)]),
+        ("07 02 06 01 01 00 00 a0 41", [Location(20.0, 0.0, 0)]),
+        ("00 02 06 01 01 00 00 80 3f", [Location(20.0, 0.0, 0), Location(1.0, 0.0, 0)]),
     ],
 )
-def test_an_order_out_of_bounds_is_refused_and_counted(place):
-    rig = connected_rig()
-    rig.hear(f"00 02 06 01 01 {place}")
-    assert rig.engine.goals == []
-    assert rig.mesh.get_connected_to_gateway()
-    assert rig.mesh.complaints.counts["order refused"] == 1
+def test_the_same_order_in_flight_is_no_new_one_and_another_replaces_the_first(other, goals):
+    rig = Rig()
+    rig.hear("00 02 06 01 01 00 00 a0 41", other)
+    assert rig.engine.goals == goals
+    assert rig.kinds().count("FLIGHT_ORDERED") == len(goals)
 
 
 def test_a_drone_that_cannot_say_where_it_is_now_and_then_flies_on():
@@ -410,14 +370,6 @@ def test_a_drone_that_cannot_say_where_it_is_now_and_then_flies_on():
     for second in range(30):
         fly(rig, Location(2.0 * second, 0.0, 0.0) if second % 3 == 0 else None)
     assert "LANDED" not in rig.kinds()
-
-
-def test_a_drone_that_cannot_say_where_it_is_does_not_fly_for_ever():
-    rig = Rig()
-    rig.hear("02 02 06 01 01 00 00 a0 41")
-    rig.engine.place = None
-    rig.wait(30.0)
-    assert "LANDED" in rig.kinds()
 
 
 def test_a_heartbeat_answered_in_flight_no_longer_counts_after_the_landing():
@@ -508,10 +460,11 @@ def test_a_router_whose_neighbour_was_seen_to_move_waits_three_times_as_long():
     assert len(rig.engine.goals) == 1
 
 
-def test_a_router_that_knows_no_other_place_flies_to_the_gateway():
+@pytest.mark.parametrize("of_the_next_hop", [[], [NEIGHBOUR_2_AT_0_8, UNDERGROUND]])
+def test_a_router_that_knows_no_other_place_to_fly_to_flies_to_the_gateway(of_the_next_hop):
     rig = connected_rig(12.0)
-    rig.hear("00 02 01 01 01 00 00 80 40")
-    assert rig.mesh.get_last_good_known_location_id() == 255
+    rig.hear("00 02 01 01 01 00 00 80 40", *of_the_next_hop)
+    assert rig.mesh.get_last_good_known_location_id() == (2 if of_the_next_hop else 255)
     rig.antenna.dead = {2}
     rig.wait_until(60.0)
     assert rig.engine.goals[:1] == [A_LEG_FROM_12]
@@ -534,12 +487,17 @@ def test_after_one_step_back_the_next_one_is_to_the_gateway():
     assert home == A_LEG_FROM_12
 
 
-def test_a_drone_that_its_pilot_keeps_from_repairs_stays_and_says_why():
+@pytest.mark.parametrize(
+    ("hindrance", "why"),
+    [("kept_by_pilot", "in LOITER, flown by its pilot"), ("grounded", "the battery is empty")],
+)
+def test_a_drone_that_cannot_fly_for_a_repair_stays_and_says_why(hindrance, why):
     rig = lone_rig()
-    rig.engine.kept_by_pilot = "in LOITER, flown by its pilot"
+    setattr(rig.engine, hindrance, why)
     rig.wait_until(200.0)
+    assert "FLIGHT_DECIDED" not in rig.kinds()
     assert rig.engine.goals == []
-    assert rig.mesh.get_repair_status().reason == "cannot fly: in LOITER, flown by its pilot"
+    assert rig.mesh.get_repair_status().reason == f"cannot fly: {why}"
 
 
 def test_a_router_that_knows_no_place_at_all_stays():
@@ -675,9 +633,6 @@ def test_a_drone_that_knows_no_place_and_is_where_it_was_connected_last_stays_an
     assert "is where it was connected last, and knows no other place" in rig.repair_in_words()
 
 
-TWO_AT_8 = "02 02 01 01 01 00 00 00 41 00 00 00 00"  # node 2: latitude 8; a height follows
-
-
 @pytest.mark.parametrize("height", ["fd ff", "ff ff", "00 00"])  # -3, -1 and 0 m
 def test_the_place_of_a_next_hop_a_few_metres_below_the_origin_is_flown_to_and_not_below_it(height):
     """A field slopes, and altitudes err by metres."""
@@ -699,12 +654,6 @@ def test_two_silent_drones_on_a_slope_both_keep_their_places(height, other):
     assert goal.distance_m(NEIGHBOUR_PLACE) >= 1.0
 
 
-def test_above_a_silent_drone_below_the_origin_is_a_metre_above_the_origin():
-    rig = lone_rig(RepairOptions(lost_place=LostPlace.ABOVE), heard=[f"{TWO_AT_8} fd ff"])
-    rig.wait_until(46.0)
-    assert rig.engine.goals == [NEIGHBOUR_PLACE._replace(height=1)]
-
-
 @pytest.mark.parametrize("height", [-0.3, -4.0])
 def test_a_drone_that_sees_itself_below_the_ground_flies_to_goals_on_it_and_back(height):
     rig = lone_rig()
@@ -713,14 +662,6 @@ def test_a_drone_that_sees_itself_below_the_ground_flies_to_goals_on_it_and_back
     assert step_back == BESIDE_NEIGHBOUR
     assert start == Location(12.0, 0.0, 0.0)
     assert home.height == 0.0
-
-
-def test_a_next_hop_with_an_impossible_place_does_not_hide_that_of_the_gateway():
-    rig = lone_rig()
-    rig.hear(UNDERGROUND)
-    rig.antenna.dead = {2}
-    rig.wait_until(60.0)
-    assert rig.engine.goals[:1] == [A_LEG_FROM_12]
 
 
 # Negotiation ---------------------------------------------------------------------------------
@@ -781,10 +722,45 @@ def test_no_router_flies_without_a_bid():
     rig = Rig()
     rig.know_neighbour(3)
     rig.wait_until(36.1)
-    assert rig.sent(BID) == [own_bid(3, -1.0)]
     decide(rig, bid(3, -1.0))
     assert rig.engine.goals == []
     assert rig.events[-1].peer == NO_ROUTE
+
+
+def without_gateway():
+    """It knows no other place than that of the neighbour that died."""
+    rig = Rig()
+    rig.hear(NEIGHBOUR_2_AT_0_8)
+    rig.antenna.dead = {2}
+    rig.know_neighbour(3)
+    return rig
+
+
+def without_place():
+    rig = group_rig(3)
+    rig.engine.place = None
+    return rig
+
+
+def grounded():
+    rig = group_rig(3)
+    rig.engine.grounded = "the battery is empty"
+    return rig
+
+
+@pytest.mark.parametrize(
+    ("make_rig", "at_s", "why"),
+    [
+        (without_gateway, 36.1, "knows no place to fly to"),
+        (without_place, BIDS_S, "does not know where it is"),
+        (grounded, BIDS_S, "cannot fly: the battery is empty"),
+    ],
+)
+def test_a_router_that_knows_no_way_or_cannot_fly_does_not_bid_and_says_why(make_rig, at_s, why):
+    rig = make_rig()
+    rig.wait_until(at_s)
+    assert rig.sent(BID) == [own_bid(3, -1.0)]
+    assert why in rig.repair_in_words()
 
 
 def test_a_router_that_would_take_the_place_of_a_neighbour_does_not_bid():
@@ -792,15 +768,6 @@ def test_a_router_that_would_take_the_place_of_a_neighbour_does_not_bid():
     rig.antenna.dead = set()  # it takes the heartbeats for the gateway, and no answer comes
     rig.wait_until(BIDS_S)
     assert own_bid(3, -1.0) in rig.sent(BID)
-
-
-def test_a_router_that_knows_no_gateway_location_does_not_bid():
-    rig = Rig()
-    rig.hear(NEIGHBOUR_2_AT_0_8)
-    rig.antenna.dead = {2}
-    rig.know_neighbour(3)
-    rig.wait_until(36.1)
-    assert rig.sent(BID) == [own_bid(3, -1.0)]
 
 
 def test_a_router_that_knows_where_its_relay_stood_and_not_where_the_gateway_is_bids_its_way():
@@ -826,13 +793,6 @@ def test_a_router_that_knows_only_the_place_of_the_gateway_bids_for_flying_there
     assert rig.sent(BID) == [own_bid(3, 8.0)]
     decide(rig, bid(3, 1.0))
     assert rig.engine.goals == [A_LEG_FROM_12]
-
-
-def test_a_router_that_does_not_know_its_location_does_not_bid():
-    rig = group_rig(3)
-    rig.engine.place = None
-    rig.wait_until(BIDS_S)
-    assert rig.sent(BID) == [own_bid(3, -1.0)]
 
 
 def test_a_gateway_with_an_impossible_place_does_not_break_the_bids():
@@ -908,18 +868,19 @@ def test_a_connected_node_does_not_negotiate():
     assert "NEGOTIATION_STARTED" not in rig.kinds()
 
 
-def test_switching_the_antenna_off_ends_a_negotiation():
-    rig = bidding_rig(3, 4)
+def switch_off(rig):
     rig.antenna.powered = False
     rig.mesh.on_antenna_power(False, rig.now_s)
-    rig.wait(12.0)
-    assert rig.engine.goals == []
-    assert "NEGOTIATION_ENDED" not in rig.kinds()
 
 
-def test_becoming_connected_ends_a_negotiation():
-    rig = bidding_rig(3, 4)
+def connect(rig):
     rig.hear("00 03 04 01 01 01 00 03", bid(3, 1.0), bid(4, 1.0))
+
+
+@pytest.mark.parametrize("ends", [switch_off, connect])
+def test_a_connection_or_an_antenna_that_is_off_ends_a_negotiation(ends):
+    rig = bidding_rig(3, 4)
+    ends(rig)
     rig.wait(12.0)
     assert rig.engine.goals == []
     assert "NEGOTIATION_ENDED" not in rig.kinds()
@@ -1013,12 +974,14 @@ def test_a_node_in_flight_does_not_negotiate():
 # Occupied places -----------------------------------------------------------------------------
 
 
-def test_a_place_on_which_a_neighbour_stands_is_occupied():
+@pytest.mark.parametrize(("latitude", "score"), [(8.3, -1.0), (9.6, 8.0)])  # 2's place is at 8
+def test_a_place_on_which_a_neighbour_stands_is_occupied(latitude, score):
     rig = group_rig(3, 4)
     rig.wait_until(EMERGENCY_S)
-    rig.hear(place(3, 8.3), place(4, 30.0))  # 2's place is at 8
-    assert rig.sent(BID) == [own_bid(3, -1.0), own_bid(4, -1.0)]
-    assert rig.repair_in_words() == "negotiating, does not bid: the place of 2 is occupied by 3"
+    rig.hear(place(3, latitude), place(4, 30.0))
+    assert rig.sent(BID) == [own_bid(3, score), own_bid(4, score)]
+    words = "does not bid: the place of 2 is occupied by 3"
+    assert (rig.repair_in_words() == f"negotiating, {words}") is (score < 0)
 
 
 @pytest.mark.parametrize(("age", "score"), [("22 01", -1.0), ("36 01", 8.0)])  # 290 s, 310 s
@@ -1050,13 +1013,6 @@ def test_each_step_of_an_election_is_described():
     assert rig.repair_in_words() == ""
 
 
-def test_a_place_from_which_all_neighbours_keep_clear_is_free():
-    rig = group_rig(3, 4)
-    rig.wait_until(EMERGENCY_S)
-    rig.hear(place(3, 9.6), place(4, 30.0))
-    assert rig.sent(BID) == [own_bid(3, 8.0), own_bid(4, 8.0)]
-
-
 def test_a_place_is_occupied_while_its_owner_answers_over_whatever_route():
     rig = group_rig(3)
     rig.wait_until(EMERGENCY_S - 1.0)
@@ -1085,26 +1041,20 @@ def test_after_two_rounds_without_a_flier_the_place_of_the_gateway_counts():
 # Which drone flies ---------------------------------------------------------------------------
 
 
-def test_a_drone_that_cannot_fly_does_not_bid_and_says_why():
-    rig = group_rig(3)
-    rig.engine.grounded = "the battery is empty"
-    rig.wait_until(BIDS_S)
-    assert rig.sent(BID) == [own_bid(3, -1.0)]
-    assert "cannot fly: the battery is empty" in rig.repair_in_words()
-
-
-def test_a_lone_drone_that_cannot_fly_stays():
-    rig = lone_rig()
-    rig.engine.grounded = "the battery is empty"
-    rig.wait_until(200.0)
-    assert rig.engine.goals == []
-    assert "FLIGHT_DECIDED" not in rig.kinds()
-
-
-def test_an_order_to_a_drone_that_cannot_fly_is_refused_and_counted():
+@pytest.mark.parametrize(
+    ("place", "grounded"),
+    [
+        ("00 60 9c 45", ""),  # latitude 5004
+        ("00 00 00 00 00 60 9c c5", ""),  # longitude -5004
+        ("00 00 00 00 00 00 00 00 f5 01", ""),  # height 501
+        ("00 00 00 00 00 00 00 00 ff ff", ""),  # height -1
+        ("00 00 80 3f", "the battery is empty"),
+    ],
+)
+def test_an_order_that_the_drone_cannot_follow_is_refused_and_counted(place, grounded):
     rig = connected_rig()
-    rig.engine.grounded = "the battery is empty"
-    rig.hear("00 02 06 01 01 00 00 80 3f")
+    rig.engine.grounded = grounded
+    rig.hear(f"00 02 06 01 01 {place}")
     assert rig.engine.goals == []
     assert rig.mesh.get_connected_to_gateway()
     assert rig.mesh.complaints.counts["order refused"] == 1
@@ -1164,15 +1114,22 @@ def test_a_winner_that_does_not_take_off_within_5_s_is_passed_over():
     assert rig.engine.goals == [BESIDE_NEIGHBOUR]
 
 
-def test_what_another_drone_found_in_vain_is_no_second_choice():
+@pytest.mark.parametrize(
+    ("about", "goals", "why"),
+    [
+        ("", [], "another drone flew to the gateway without success"),
+        ("01 00 00 00 00 20 42 00 00 00 00 00 00", [A_LEG_FROM_12], ""),  # to (0, 40), not (0, 4)
+    ],
+)
+def test_where_another_drone_found_no_gateway_is_no_second_choice(about, goals, why):
     rig = group_rig(2, 3)
     rig.antenna.dead = set()
     for round_s in (0.0, 40.0, 80.0):
         rig.wait_until(BIDS_S + round_s)
-        rig.hear(bid(3, HOME_FAILED), bid(2, -1.0))
+        rig.hear(bid(3, HOME_FAILED) + about, bid(2, -1.0))
         rig.wait(TO_DECISION_S)
-    assert rig.engine.goals == []
-    assert "another drone flew to the gateway without success" in rig.repair_in_words()
+    assert rig.engine.goals == goals
+    assert why in rig.repair_in_words()
 
 
 def test_twenty_rounds_after_another_drone_was_at_the_gateway_in_vain_it_tries_itself():
@@ -1186,18 +1143,6 @@ def test_twenty_rounds_after_another_drone_was_at_the_gateway_in_vain_it_tries_i
     while not rig.engine.goals and rig.now_s < 900.0:
         rig.wait(5.0)
         rig.hear(bid(3, HOME_FAILED), bid(2, -1.0))
-    assert rig.engine.goals == [A_LEG_FROM_12]
-
-
-def test_what_another_drone_found_in_vain_elsewhere_does_not_keep_this_one_from_the_gateway():
-    """The other one believed the gateway at (0, 40); this one knows that it is at (0, 4)."""
-    rig = group_rig(2, 3)
-    rig.antenna.dead = set()
-    in_vain_at_0_40 = bid(3, HOME_FAILED) + "01 00 00 00 00 20 42 00 00 00 00 00 00"
-    for round_s in (0.0, 40.0, 80.0):
-        rig.wait_until(BIDS_S + round_s)
-        rig.hear(in_vain_at_0_40, bid(2, -1.0))
-        rig.wait(TO_DECISION_S)
     assert rig.engine.goals == [A_LEG_FROM_12]
 
 
@@ -1453,27 +1398,24 @@ def test_neighbours_that_it_flew_away_from_are_not_silent():
 
 
 @pytest.mark.parametrize(
-    ("option", "goal"),
+    ("option", "height", "goal"),
     [
-        (LostPlace.BESIDE, BESIDE_NEIGHBOUR),
-        (LostPlace.ABOVE, NEIGHBOUR_PLACE._replace(height=1.0)),
-        (LostPlace.BELOW, NEIGHBOUR_PLACE._replace(height=1.0)),  # the ground is in the way
-        (LostPlace.EXACT, NEIGHBOUR_PLACE),
+        (LostPlace.BESIDE, "00 00", BESIDE_NEIGHBOUR),
+        (LostPlace.ABOVE, "00 00", NEIGHBOUR_PLACE._replace(height=1.0)),
+        (LostPlace.ABOVE, "fd ff", NEIGHBOUR_PLACE._replace(height=1.0)),  # 3 m below the origin
+        (
+            LostPlace.BELOW,
+            "00 00",
+            NEIGHBOUR_PLACE._replace(height=1.0),
+        ),  # the ground is in the way
+        (LostPlace.BELOW, "04 00", NEIGHBOUR_PLACE._replace(height=3.0)),
+        (LostPlace.EXACT, "00 00", NEIGHBOUR_PLACE),
     ],
 )
-def test_the_goal_keeps_clear_of_the_silent_drone_as_the_option_says(option, goal):
-    rig = lone_rig(RepairOptions(lost_place=option))
+def test_the_goal_keeps_clear_of_the_silent_drone_as_the_option_says(option, height, goal):
+    rig = lone_rig(RepairOptions(lost_place=option), heard=[f"{TWO_AT_8} {height}"])
     rig.wait_until(46.0)
     assert rig.engine.goals == [goal]
-
-
-def test_below_a_silent_drone_that_hovers_high_enough_there_is_room():
-    rig = lone_rig(
-        RepairOptions(lost_place=LostPlace.BELOW),
-        heard=["02 02 01 01 01 00 00 00 41 00 00 00 00 04 00"],
-    )
-    rig.wait_until(46.0)
-    assert rig.engine.goals == [NEIGHBOUR_PLACE._replace(height=3)]
 
 
 def test_the_side_is_the_one_that_keeps_the_links_of_the_lost_node():
@@ -1498,44 +1440,32 @@ def test_a_drone_that_was_silent_since_keeps_its_place_and_one_that_moved_does_n
     assert goal == Location(pytest.approx(8.0), pytest.approx(1.1), 0)
 
 
-def test_in_flight_it_goes_aside_for_a_silent_drone_of_which_another_node_tells():
+@pytest.mark.parametrize(
+    "heard",
+    [
+        ("07 07 01 01 01 00 00 c8 42", "09 09 45 01 01 3c 00 07 00 00 00 41 00 00 c0 bf"),
+        ("09 09 45 01 01 3c 00 07 00 00 c0 7f", "08 08 02 01 01 00 00 c0 7f 00 00 00 00 01 80"),
+    ],
+    ids=["7 was seen at latitude 100 since", "no numbers"],
+)
+def test_old_news_and_places_that_are_no_numbers_change_nothing(heard):
     rig = flying_rig()
-    fly(rig, Location(10.0, 0.0, 2.0))
-    rig.hear("09 09 45 01 01 3c 00 07 00 00 00 41 00 00 c0 bf")  # 7 was there a minute ago
-    assert len(rig.engine.goals) == 2
-    assert rig.engine.goals[-1].distance_m(Location(8.0, -1.5, 0.0)) >= 1.0
-
-
-def test_old_news_of_a_drone_that_was_seen_elsewhere_since_changes_nothing():
-    rig = flying_rig()
-    rig.hear("07 07 01 01 01 00 00 c8 42")  # 7 is at latitude 100
-    rig.hear("09 09 45 01 01 3c 00 07 00 00 00 41 00 00 c0 bf")
+    rig.hear(*heard)
     assert rig.engine.goals == [BESIDE_NEIGHBOUR]
 
 
-def test_a_place_that_is_no_number_is_ignored():
-    rig = flying_rig()
-    rig.hear("09 09 45 01 01 3c 00 07 00 00 c0 7f", "08 08 02 01 01 00 00 c0 7f 00 00 00 00 01 80")
-    assert rig.engine.goals == [BESIDE_NEIGHBOUR]
-
-
-def test_a_drone_in_flight_hears_who_was_last_heard_near_its_goal():
+@pytest.mark.parametrize(
+    ("flies", "told"), [("80", [packet("01 01 45 03 03 3c 00 05 00 00 00 41")]), ("00", [])]
+)
+def test_only_a_drone_in_flight_hears_who_was_last_heard_near_its_goal(flies, told):
     rig = Rig()
     rig.know_neighbour(3)
     rig.hear("05 03 02 01 01 00 00 00 41 00 00 00 00 01 00")  # 5 asks, from latitude 8
     rig.hear("06 03 02 01 01 00 00 48 42 00 00 00 00 01 00")  # 6 asks, from latitude 50
     rig.wait(60.0)
     rig.forget()
-    rig.hear("03 03 02 01 fe 00 00 e0 40 00 00 00 00 01 80")  # 3 flies to latitude 7
-    assert rig.sent(LAST_PLACE) == [packet("01 01 45 03 03 3c 00 05 00 00 00 41")]
-
-
-def test_a_drone_that_does_not_fly_is_told_no_places_of_others():
-    rig = Rig()
-    rig.know_neighbour(3)
-    rig.hear("05 03 02 01 01 00 00 00 41 00 00 00 00 01 00")
-    rig.hear("03 03 02 01 fe 00 00 e0 40 00 00 00 00 01 00")
-    assert rig.sent(LAST_PLACE) == []
+    rig.hear(f"03 03 02 01 fe 00 00 e0 40 00 00 00 00 01 {flies}")  # 3 is at, or flies to, 7
+    assert rig.sent(LAST_PLACE) == told
 
 
 class Impatient(Thesis):
@@ -1654,10 +1584,15 @@ def test_in_flight_it_accepts_no_connection():
     assert not rig.mesh.get_connected_to_gateway()
 
 
-def test_it_lands_beside_a_drone_that_stands_on_its_goal():
+@pytest.mark.parametrize(
+    "heard",
+    [place(9, 8.0, -1.5), "09 09 45 01 01 3c 00 07 00 00 00 41 00 00 c0 bf"],
+    ids=["itself", "from another node, a minute later"],
+)
+def test_it_lands_beside_a_drone_of_which_it_hears_that_it_is_at_its_goal(heard):
     rig = flying_rig()
     fly(rig, Location(10.0, 0.0, 2.0))
-    rig.hear(place(9, 8.0, -1.5))
+    rig.hear(heard)
     assert len(rig.engine.goals) == 2
     assert rig.engine.goals[-1].distance_m(Location(8.0, -1.5, 0.0)) >= 1.0
     assert 1.0 <= rig.engine.goals[-1].distance_m(NEIGHBOUR_PLACE) < 1.2
@@ -1756,8 +1691,7 @@ def test_the_flight_ends_although_the_antenna_goes_off_on_the_ground(after_s):
     fly(rig, rig.engine.goals[-1])
     rig.wait(after_s)
     assert "LANDED" not in rig.kinds()
-    rig.antenna.powered = False
-    rig.mesh.on_antenna_power(False, rig.now_s)
+    switch_off(rig)
     rig.wait(1.0)
     assert "LANDED" in rig.kinds()
     rig.antenna.powered = True
