@@ -57,7 +57,11 @@ class Connection:
             self.show()
         if not self._states.connected and now_s >= self._check_s:
             self._check_s = now_s + CHECK_S
-            if self._may_repair():
+            # Not in flight, whoever flies the drone. If its gateway has no internet and is in
+            # reach, a flight repairs nothing.
+            flies = self._states.repair is RepairState.FLYING or not self._motion.stands(now_s)
+            may_repair = not flies and not self._routes.offline and self._antenna.on()
+            if may_repair and self._host.may_connect(NO_ROUTE, False):
                 self._host.on_unconnected_check(now_s)
 
     def has_new_parent(self) -> None:
@@ -112,16 +116,6 @@ class Connection:
         """Whether packets pass in both directions, to a gateway with internet."""
         routes = self._routes
         return routes.parent != NO_ROUTE and not routes.offline and routes.is_proved
-
-    def _may_repair(self) -> bool:
-        """Whether a lost connection counts: not in flight, whoever flies the drone."""
-        if self._states.repair is RepairState.FLYING:
-            return False
-        if not self._motion.stands(self._routes.now_s):
-            return False
-        if self._routes.offline:
-            return False  # its gateway is in reach and has no internet: a flight repairs nothing
-        return self._antenna.on() and self._host.may_connect(NO_ROUTE, False)
 
 
 @dataclass(eq=False)

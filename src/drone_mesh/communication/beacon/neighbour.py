@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from drone_mesh.communication.beacon.packets import Beacon, Motion
@@ -52,7 +53,10 @@ class Losses:
         if due > FORGOTTEN:
             before = None
         is_far = WRONG < own.distance_m(place) / self._range_m <= LUCKY
-        if before is not None and self._stood(before, own, place):
+        moved_m = 0.0
+        if before is not None:
+            moved_m = own.distance_m(before.own) + place.distance_m(before.place)
+        if before is not None and moved_m <= STOOD * self._range_m:
             kept = self._kept[node] * (1.0 - WEIGHT) ** due + WEIGHT
         elif not is_far:
             kept = 1.0
@@ -62,10 +66,6 @@ class Losses:
         again = 1.0 / kept - 1.0  # further frames, as expected: De Couto et al. 2003
         return min(MOST, again // STEP * STEP)
 
-    def _stood(self, before: _Heard, own: Location, place: Location) -> bool:
-        moved_m = own.distance_m(before.own) + place.distance_m(before.place)
-        return moved_m <= STOOD * self._range_m
-
 
 FRESH = 2.5  # intervals: a neighbour that was silent for longer is none
 MOST_VAIN = 3  # nodes with which it brought no contact, before it counts as one that swallows
@@ -73,28 +73,27 @@ MOST_REFUSED = 3  # packets that it did not take, since it last proved that it h
 REFUSED_S = 3.0  # within which; a burst of losses is shorter
 
 
+@dataclass(eq=False)
 class Neighbour:
     """What is known of one neighbour."""
 
-    __slots__ = (
-        "alive_s", "announced_s", "apart_m", "beacon", "deaf", "doubted_s", "failed_s", "heard_s",
-        "listed_s", "loss", "motion", "near_s", "node", "proved_s", "refused", "refuses_s",
-        "reported_s", "until_s", "vain",
-    )  # fmt: skip
+    node: int
+    beacon: Beacon
+    heard_s: float = -math.inf
+    alive_s: float = -math.inf
+    failed_s: float = -math.inf
+    doubted_s: float = -math.inf  # when it did not take a packet
+    proved_s: float = -math.inf  # when it showed that it hears this node
+    refused: int = 0  # packets that it did not take since
+    refuses_s: float = math.inf  # the first of them
+    deaf: bool = False  # to this node: the link works one way only
+    until_s: float = -math.inf  # it counts as a neighbour without a further sign of life
+    motion: Motion | None = None  # the last one that it reported
+    reported_s: float = -math.inf
+    apart_m: float = 0.0  # then
+    loss: float = 0.0  # of its link, in hops
 
-    def __init__(self, node: int, beacon: Beacon) -> None:
-        self.node = node
-        self.beacon = beacon
-        self.heard_s = self.alive_s = self.failed_s = -math.inf
-        self.doubted_s = -math.inf  # when it did not take a packet
-        self.proved_s = -math.inf  # when it showed that it hears this node
-        self.refused, self.refuses_s = 0, math.inf  # packets that it did not take since; the first
-        self.deaf = False  # to this node: the link works one way only
-        self.until_s = -math.inf  # it counts as a neighbour without a further sign of life
-        self.motion: Motion | None = None  # the last one that it reported
-        self.reported_s = -math.inf
-        self.apart_m = 0.0  # then
-        self.loss = 0.0  # of its link, in hops
+    def __post_init__(self) -> None:
         self.announced_s: dict[int, float] = {}  # the nodes below it, and since when
         self.listed_s: dict[int, float] = {}  # and when it listed them last
         # Nodes that did not answer what this one took for them, since a packet of another came here

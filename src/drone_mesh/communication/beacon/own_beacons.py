@@ -195,6 +195,8 @@ class OwnBeacons:
         if routes.is_root:
             routes.next_number()
         gateway, hops, offline = routes.shown
+        is_sealed = self.room <= SEALED_ROOM  # a seal leaves room for less: some parts take turns
+        has_digest = self.asks or self._sent % DIGEST_EVERY == (0 if is_sealed else 1)
         beacon = Beacon(
             gateway,
             routes.number,
@@ -204,12 +206,12 @@ class OwnBeacons:
             interval_s,
             routes.motion,
             self._next_gateway_place(),
-            self._frame.digest if self.asks or self._is_digests_turn() else 0,
+            self._frame.digest if has_digest else 0,
             self.asks or hops == NO_ROUTE,
             offline=offline,
         )
         self.asks = False
-        below, is_sealed = self._below, self.room <= SEALED_ROOM  # a seal leaves room for less
+        below = self._below
         room, turn = beacon.room_below(self.room), self._sent % 2 == 0
         if room < 0 or (is_sealed and turn and room < len(below.ids())):
             beacon = beacon._replace(motion=None)
@@ -228,11 +230,6 @@ class OwnBeacons:
             return False
         self._shown = None
         return True
-
-    def _is_digests_turn(self) -> bool:
-        """With a seal, a beacon has room for it and the gateway's place, or for its own place."""
-        turn = 0 if self.room <= SEALED_ROOM else 1
-        return self._sent % DIGEST_EVERY == turn
 
     def _next_gateway_place(self) -> Location | None:
         """The gateway's place, if it is this beacon's turn to spread it."""

@@ -42,19 +42,9 @@ class Motion(NamedTuple):
     place: Location
     velocity: Velocity
 
-    def after(self, seconds: float) -> Location:
-        """Where it will be."""
-        north, east, up = self.velocity
-        place = self.place
-        return Location(
-            place.latitude + north * seconds,
-            place.longitude + east * seconds,
-            place.height + up * seconds,
-        )
-
     def apart_m(self, seconds: float, other: Motion, others_s: float) -> float:
         """From where it will be to where the other one will be, each in its own time."""
-        # Without the objects of `after`: this is the most frequent question of all.
+        # Without objects for places: this is the most frequent question of all.
         (a, b, c), (u, v, w) = self
         (d, e, f), (x, y, z) = other
         north = a + u * seconds - (d + x * others_s)

@@ -25,7 +25,6 @@ from drone_mesh.communication.interfaces import BROADCAST, MAX_NODE_ID, NO_ROUTE
 from drone_mesh.communication.timing import Due
 from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.packet_types import MessageType
-from drone_mesh.drone.location import Location
 
 LOOK_S = 0.2  # links change that slowly
 BIDS_WITHIN_S = 3.0  # routers that lose one parent notice it within two intervals
@@ -91,14 +90,9 @@ class BeaconPlane(IControlPlane):
         self._states = states
         self._connection = None
         if states is not None:
+            report, places, antenna = node.report, node.places, node.antenna
             self._connection = Connection(
-                node.host,
-                states,
-                self._routes,
-                self._motion,
-                node.places,
-                node.antenna,
-                node.report,
+                node.host, states, self._routes, self._motion, places, antenna, report
             )
         self._look_s = -math.inf  # when it looks at everything anew, whatever a beacon says
         self.learn = self._learn
@@ -161,11 +155,10 @@ class BeaconPlane(IControlPlane):
 
     def _look_round(self) -> None:
         """Forget who is silent, choose the parent, tell the node what has changed."""
-        routes, now_s = self._routes, self._routes.now_s
+        routes, heard, now_s = self._routes, self._neighbours, self._routes.now_s
         for node in routes.expired():
             self._trickle.reset(now_s)
-            self._lost(node)
-        heard = self._neighbours
+            self._gone(node, heard.lost(node, now_s))
         for node in heard.deaf() & routes.neighbours.keys():
             neighbour = routes.neighbours[node]
             if now_s - neighbour.doubted_s >= DEAF_AGAIN_S:
@@ -228,18 +221,16 @@ class BeaconPlane(IControlPlane):
 
     def _plan(self) -> None:
         """Schedule the next call of `on_due`."""
-        due_s = self._trickle.due_s
         routes = self._routes
-        due_s = min(due_s, routes.first_end_s() + 1e-3)
+        due_s = [self._trickle.due_s, routes.first_end_s() + 1e-3, self._proofs.next_s]
         parent = routes.neighbours.get(routes.parent)
         if parent is not None:
-            due_s = min(due_s, self._watch.due_s(parent))
+            due_s.append(self._watch.due_s(parent))
         if self._courier.holds:
-            due_s = min(due_s, self._verdicts.retry_s)
+            due_s.append(self._verdicts.retry_s)
         if self._connection is not None:
-            due_s = min(due_s, self._connection.due_s)
-        due_s = min(due_s, self._proofs.next_s)
-        self._deadlines.set(Due.ROUTING, max(due_s, routes.now_s))
+            due_s.append(self._connection.due_s)
+        self._deadlines.set(Due.ROUTING, max(min(due_s), routes.now_s))
 
     # Beacons ---------------------------------------------------------------------------------
 
@@ -270,11 +261,12 @@ class BeaconPlane(IControlPlane):
             return
         if beacon.digest:
             self._claims.heard_origin(creator, beacon.digest)
+        own, told = routes.motion, beacon.motion
         if self._frame.refuses(creator):
             beacon = beacon._replace(motion=None, gateway_place=None)
-        elif beacon.motion is not None and not self._is_in_reach(beacon.motion.place):
+        elif own and told and own.place.distance_m(told.place) > LUCKY * self._range_m:
             reason = "a neighbour's place that is out of reach"
-            self._complaints.add(reason, beacon.motion.place.in_words(), now_s)
+            self._complaints.add(reason, told.place.in_words(), now_s)
             beacon = beacon._replace(motion=None)
         longest_s = self._trickle.longest_s
         if beacon.interval_s > longest_s:  # who promises it could fall silent and stay the way
@@ -288,10 +280,6 @@ class BeaconPlane(IControlPlane):
         if self._courier.holds or not is_quiet:  # few beacons
             self._consider(creator, beacon, is_new)
         self._take_gateway_place(creator, beacon)
-
-    def _is_in_reach(self, place: Location) -> bool:
-        own = self._routes.motion
-        return own is None or own.place.distance_m(place) <= LUCKY * self._range_m
 
     def _consider(self, creator: int, beacon: Beacon, is_new: bool) -> None:
         """Update what depends on a neighbour's new beacon."""
@@ -398,9 +386,6 @@ class BeaconPlane(IControlPlane):
             self._show()
             self._plan()
 
-    def _lost(self, node: int) -> None:
-        self._gone(node, self._neighbours.lost(node, self._routes.now_s))
-
     def _gone(self, node: int, was_neighbour: bool) -> None:
         if was_neighbour:
             self._report(MeshEventKind.NEIGHBOUR_LOST, node)
@@ -413,8 +398,7 @@ class BeaconPlane(IControlPlane):
         """Answer or repeat another node's search."""
         self._set_time()
         if self._searches.heard(creator, from_, messages.body(payload)):
-            me, found = self._me, Found(Search.from_body(messages.body(payload)).node)
-            body = found.to_body()
+            me, body = self._me, Found(Search.from_body(messages.body(payload)).node).to_body()
             self._courier.send_own(
                 messages.packet(MessageType.FOUND, me, me, creator, creator, body)
             )

@@ -126,8 +126,11 @@ class BeaconRoutes(IRoutes):
             )
         if beacon.gateway not in (NO_ROUTE, self._node_id):
             self._take_number(node, beacon)
-            if node == self.parent:
-                self._take_internet(beacon)
+            if node == self.parent:  # others speak for their own way
+                if beacon.offline:
+                    self._offline[beacon.gateway] = beacon.number, self.clock.now_s
+                elif not self._is_offline(beacon):
+                    self._offline.pop(beacon.gateway, None)
         return is_new
 
     def _take_number(self, node: int, beacon: Beacon) -> None:
@@ -147,13 +150,6 @@ class BeaconRoutes(IRoutes):
         is_old = age_s > STALE * beacon.interval_s and age_s > STALE * self._slowest_s()
         if ahead > 0 or is_old:
             self._newest[gateway] = number, now_s
-
-    def _take_internet(self, beacon: Beacon) -> None:
-        """Note what the parent says of a gateway's internet; others speak for their own way."""
-        if beacon.offline:
-            self._offline[beacon.gateway] = beacon.number, self.clock.now_s
-        elif not self._is_offline(beacon):
-            self._offline.pop(beacon.gateway, None)
 
     def _is_offline(self, beacon: Beacon) -> bool:
         """Whether the gateway had no internet, when it sent the number of this beacon or later."""
@@ -324,10 +320,6 @@ class BeaconRoutes(IRoutes):
         self.parent, self.ancestors = NO_ROUTE, NO_ANCESTORS
         self.number, self.offline = self._own_number, not self._has_internet
 
-    def _candidates(self) -> Iterator[Neighbour]:
-        """The neighbours that lead to a gateway without leading through this node."""
-        return filter(self._leads_up, self._all())
-
     def _leads_up(self, neighbour: Neighbour) -> bool:
         me, beacon = self._node_id, neighbour.beacon
         if beacon.gateway in (NO_ROUTE, me) or beacon.hops >= NO_ROUTE - 1:
@@ -392,7 +384,8 @@ class BeaconRoutes(IRoutes):
     def next_hops(self, node: int, came_from: int) -> Iterator[Way]:
         """The neighbours to try for a packet to `node`, the best first; mostly one is enough."""
         if node == self.gateway and not self.is_root:
-            for _cost, _other, heard, neighbour in sorted(map(self._rank, self._candidates())):
+            candidates = filter(self._leads_up, self._all())
+            for _cost, _other, heard, neighbour in sorted(map(self._rank, candidates)):
                 yield Way(neighbour, -heard)
             return
         seen: set[int] = set()
@@ -420,9 +413,10 @@ class BeaconRoutes(IRoutes):
             yield Way(hint, at_s)
         for _rank, way in sorted(self._announcements(node)):
             yield way
-        parent = self.neighbours.get(self.parent)
-        if parent is not None and self._comes_from_below(came_from):
-            yield Way(parent.node, parent.heard_s)
+        parent, before = self.neighbours.get(self.parent), self.neighbours.get(came_from)
+        comes_from_below = before is not None and before.beacon.parent == self._node_id
+        if parent is not None and (came_from == NO_ROUTE or comes_from_below):
+            yield Way(parent.node, parent.heard_s)  # up, to who knows more
         yield from self._nearer(node)
         if direct is not None and is_doubtful and not direct.deaf:
             yield Way(node, direct.alive_s)
@@ -448,13 +442,6 @@ class BeaconRoutes(IRoutes):
                 yield (not is_child, age_s), Way(neighbour.node, listed_s)
             elif node == neighbour.beacon.parent or node in neighbour.beacon.ancestors:
                 yield (True, math.inf), Way(neighbour.node, neighbour.heard_s)
-
-    def _comes_from_below(self, came_from: int) -> bool:
-        """Whether a packet for an unknown node goes up: from this node or one below it."""
-        if came_from == NO_ROUTE:
-            return True
-        neighbour = self.neighbours.get(came_from)
-        return neighbour is not None and neighbour.beacon.parent == self._node_id
 
     def _nearer(self, node: int) -> list[Way]:
         """The neighbours that are nearer to the last known place of `node`, the nearest first."""

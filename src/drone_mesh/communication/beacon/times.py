@@ -103,10 +103,8 @@ class ParentWatch:
         return max(self._wanted_s(parent), again_s)
 
     def _wanted_s(self, parent: Neighbour) -> float:
-        return min(self._late_s(parent), self._routes.proved_s + PROOF_S)
-
-    def _late_s(self, parent: Neighbour) -> float:
         interval_s = parent.beacon.interval_s
         silent_s = max(LATE * interval_s, min(2.0 * interval_s, LATE_S))
         turns_s = TURN_HOPS * self._hop_s * len(self._routes.neighbours)
-        return parent.alive_s + silent_s + self._turn * turns_s
+        late_s = parent.alive_s + silent_s + self._turn * turns_s
+        return min(late_s, self._routes.proved_s + PROOF_S)

@@ -115,9 +115,11 @@ class Verdicts:
         if now_s - transit.seen_s >= HELD_S or transit.kind in NOT_HELD:
             return DROP
         if not is_up:
-            is_own = transit.came_from == NO_ROUTE
-            if not is_own and now_s - transit.seen_s >= SEARCHES_S and self._may_return(transit):
-                return transit.came_from
+            back, is_own = transit.came_from, transit.came_from == NO_ROUTE
+            knows_back = back in routes.neighbours  # who may know another way
+            is_tried = back in transit.sent_s or back in transit.failed_s
+            if now_s - transit.seen_s >= SEARCHES_S and knows_back and not is_tried:
+                return back
             self._searches.search(transit.addressee, MOST_HOPS if is_own else HOPS_AROUND)
         if self.retry_s <= now_s:
             self.retries()
@@ -142,15 +144,6 @@ class Verdicts:
         for to in asked:
             routes.in_vain(node, to)
         return iter(sorted(ways, key=lambda way: asked.get(way.neighbour, -math.inf)))
-
-    def _may_return(self, transit: Transit) -> bool:
-        """Whether the sender of a packet, who may know another way, can get it back."""
-        to = transit.came_from
-        return (
-            to in self._routes.neighbours
-            and to not in transit.sent_s
-            and to not in transit.failed_s
-        )
 
 
 def _asks(transit: Transit) -> bool:

@@ -206,7 +206,9 @@ class Transport:
                 if not to_all or self._flood.repeat(payload):
                     self._inboxes.fragment(creator, to_all, kind - packets.FRAGMENTS.start, body)
             elif kind == packets.ACK:
-                if self._is_authentic(body, creator):
+                plain = packets.untagged(body)
+                tag = self._seals.acknowledgement_tag(creator, self._node_id, plain)
+                if hmac.compare_digest(tag, body[len(plain) :][: len(tag)]):  # a relay could forge
                     self._outboxes.answered(creator, packets.ack_of(body))
                 else:
                     self._complaints.dropped("an acknowledgement without proof", payload, now_s)
@@ -267,12 +269,6 @@ class Transport:
         queued = len(self._outboxes)
         if queued >= MOST_QUEUED:
             raise QueueFull(f"the queue is full: {queued} messages wait or are on their way")
-
-    def _is_authentic(self, ack: bytes, creator: int) -> bool:
-        """Whether an ACK comes from its creator: a relay could forge one."""
-        body = packets.untagged(ack)
-        tag = self._seals.acknowledgement_tag(creator, self._node_id, body)
-        return hmac.compare_digest(tag, ack[len(body) : len(body) + len(tag)])
 
     def _ended(self, state: TicketState) -> None:
         figures = self._figures

@@ -15,6 +15,7 @@ from drone_mesh.communication.repair.spots import (
     TakenPlaces,
     above_ground,
     at_whole_metres,
+    free_spot,
 )
 from drone_mesh.communication.timing import LANDED_WITHIN_M
 from drone_mesh.drone.location import Location
@@ -112,8 +113,9 @@ class RepairFlight:
 
     def arrived(self) -> bool:
         """Ask for the places of others after landing. Returns False if another leg follows."""
-        here = self._pilot.location()
-        if self._leg_is_short(here):
+        here, start = self._pilot.location(), self._leg_from
+        left = here and start and here.distance_m(start) >= LANDED_WITHIN_M
+        if here and left and here.distance_m(self.goal) > LANDED_WITHIN_M:  # not the last leg
             self.fly_on()
             return False
         self.ask_on_ground()
@@ -158,20 +160,10 @@ class RepairFlight:
         self._pilot.step_back_to(self._leg_end)
         self._requests.ask_all()
 
-    def _leg_is_short(self, here: Location | None) -> bool:
-        """Whether this was not the last leg, and the drone makes progress."""
-        if (
-            here is None
-            or self._leg_from is None
-            or here.distance_m(self._leg_from) < LANDED_WITHIN_M
-        ):
-            return False
-        return here.distance_m(self.goal) > LANDED_WITHIN_M
-
     def _spot(self) -> Location:
         return self._beside(self._wanted, self._landing)
 
     def _beside(self, place: Location, landing: Landing) -> Location:
         """A free spot; two drones that divert at the same time skip different numbers of spots."""
         skip = self._node_id % 5 if self._diversions > 1 else 0
-        return self._taken.beside(place, landing, skip)
+        return free_spot(place, landing, self._options, self._taken.all(), skip)

@@ -234,7 +234,3 @@ class TakenPlaces:
         if self.is_free(place, tried):
             return place
         return free_spot(place, landing, self._options, [*self.all(), *tried])
-
-    def beside(self, place: Location, landing: Landing, skip: int = 0) -> Location:
-        """The best free spot near `place`; `skip`: see free_spot."""
-        return free_spot(place, landing, self._options, self.all(), skip)

@@ -193,7 +193,9 @@ class EndToEnd:
         if last is not None and last.what == what and now_s - last.at_s <= SAME_PACKET_S:
             # another try, or a copy for another neighbour
             return form.with_proof(payload, last.tag, last.sequence)
-        sequence = self._next_sequence(forward)
+        if forward not in self._sequences:
+            self._sequences[forward] = self._rng.getrandbits(16)
+        sequence = self._sequences[forward] = (self._sequences[forward] + 1) % _SEQUENCES
         tag = _tag(state, self._nonce_for(kind, form, forward), sequence, what)
         self._last = _Sealed(what, tag, sequence, now_s)
         return form.with_proof(payload, tag, sequence)
@@ -235,13 +237,6 @@ class EndToEnd:
         if kind == _HEARTBEAT and payload[CREATOR_AT] != messages.preferred_gateway(payload):
             return _OF_ROUTER
         return _FORMS.get(kind)
-
-    def _next_sequence(self, forward: int) -> int:
-        before = self._sequences.get(forward)
-        if before is None:
-            before = self._rng.getrandbits(16)
-        self._sequences[forward] = sequence = (before + 1) % _SEQUENCES
-        return sequence
 
     def is_gateway(self, node: int) -> bool:
         """Whether this node has proved to be a gateway."""
