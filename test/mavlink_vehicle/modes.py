@@ -15,7 +15,6 @@ class Mode(enum.Enum):
     PILOT = "its pilot flies"
     HOLD = "holds its position"
     FOLLOW = "follows targets"  # GUIDED, OFFBOARD
-    TAKE_OFF = "takes off"  # PX4 only
     LAND = "lands"
     RETURN = "returns home and lands"
 
@@ -32,7 +31,6 @@ _NUMBERS = {
         Mode.PILOT: px4_mode(3),
         Mode.HOLD: px4_mode(4, 3),
         Mode.FOLLOW: px4_mode(6),
-        Mode.TAKE_OFF: px4_mode(4, 2),
         Mode.LAND: px4_mode(4, 6),
         Mode.RETURN: px4_mode(4, 5),
     },

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import struct
 from typing import Callable, Dict
 
@@ -27,10 +26,9 @@ _PX4 = {
     "GF_ACTION": 2.0,
     "GF_MAX_HOR_DIST": 1000.0,
     "GF_MAX_VER_DIST": 120.0,
-    "MIS_TAKEOFF_ALT": 2.5,
     "NAV_RCL_ACT": 2.0,
 }
-_REAL = ("COM_OF_LOSS_T", "GF_MAX_HOR_DIST", "GF_MAX_VER_DIST", "MIS_TAKEOFF_ALT")
+_REAL = ("COM_OF_LOSS_T", "GF_MAX_HOR_DIST", "GF_MAX_VER_DIST")
 
 
 class Parameters(Dict[str, float]):
@@ -52,18 +50,6 @@ class Parameters(Dict[str, float]):
             self._report(names[message.param_index])
         elif message.param_id in self:
             self._report(message.param_id)
-
-    def take_list_request(self, _message: Message) -> None:
-        """PARAM_REQUEST_LIST."""
-        for name in self.names():
-            self._report(name)
-
-    def take(self, message: Message) -> None:
-        """PARAM_SET."""
-        name, raw = message.param_id, message.param_value
-        if name in self and math.isfinite(raw):
-            self[name] = self._autopilot.parameter_value(raw, _kind(name))
-            self._report(name)
 
     def _report(self, name: str) -> None:
         kind, names = _kind(name), self.names()

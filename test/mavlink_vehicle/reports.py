@@ -1,4 +1,4 @@
-"""The messages of the simulated vehicle about itself: each at its own rate, or on request."""
+"""The messages of the simulated vehicle about itself, each at its own rate."""
 
 from __future__ import annotations
 
@@ -27,11 +27,6 @@ SENSORS = (
     | mavlink.MAV_SYS_STATUS_SENSOR_GPS
     | mavlink.MAV_SYS_STATUS_PREARM_CHECK
 )
-CAPABILITIES = (
-    mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
-    | mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
-    | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
-)
 FULL_CELL_MV, EMPTY_CELL_MV, CELLS = 4200, 3300, 4
 
 
@@ -48,12 +43,10 @@ class Reported(Protocol):
 
 
 class Reports:
-    """Schedules the messages, and sends others on request. An interval of 0 or less: not sent."""
+    """Schedules the messages. An interval of 0 or less: not sent."""
 
-    def __init__(self, vehicle: Reported, send: Callable[[Message], None]) -> None:
-        """`send`: what was requested."""
+    def __init__(self, vehicle: Reported) -> None:
         self._vehicle = vehicle
-        self._send = send
         is_px4 = vehicle.autopilot is PX4
         estimate = self._estimator if is_px4 else self._ekf
         self._makers: dict[int, Callable[[], Message]] = {
@@ -65,8 +58,6 @@ class Reports:
             mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: self._landed,
             mavlink.MAVLINK_MSG_ID_HOME_POSITION: self._home,
             mavlink.MAVLINK_MSG_ID_RC_CHANNELS: self._sticks,
-            mavlink.MAVLINK_MSG_ID_VFR_HUD: self._hud,
-            mavlink.MAVLINK_MSG_ID_ATTITUDE: self._attitude,
         }
         # Two messages want it, and while the drone stands or hovers it is the same.
         self._on_earth = functools.lru_cache(maxsize=1)(vehicle.home.to_earth)
@@ -85,27 +76,6 @@ class Reports:
         if message_id not in self._makers or not math.isfinite(interval_us):
             return int(mavlink.MAV_RESULT_UNSUPPORTED)
         self._interval_s[message_id] = 1.0 if interval_us == 0 else interval_us / 1e6
-        return int(mavlink.MAV_RESULT_ACCEPTED)
-
-    def request_message(self, message: Message) -> int:
-        """MAV_CMD_REQUEST_MESSAGE."""
-        if not math.isfinite(message.param1):
-            return int(mavlink.MAV_RESULT_DENIED)
-        if message.param1 == mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION:
-            return self.request_capabilities(message)
-        maker = self._makers.get(int(message.param1))
-        if maker is None:
-            return int(mavlink.MAV_RESULT_UNSUPPORTED)
-        self._send(maker())
-        return int(mavlink.MAV_RESULT_ACCEPTED)
-
-    def request_capabilities(self, _message: Message) -> int:
-        """MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES."""
-        self._send(
-            mavlink.MAVLink_autopilot_version_message(
-                CAPABILITIES, 0x01000000, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, 0
-            )
-        )
         return int(mavlink.MAV_RESULT_ACCEPTED)
 
     def due(self, now_s: float) -> list[Message]:
@@ -233,13 +203,3 @@ class Reports:
     def _sticks(self) -> Message:
         channels = [self._vehicle.faults.stick_us, 1500, 1500, 1500] + [0] * 14
         return mavlink.MAVLink_rc_channels_message(self._ms(), 4, *channels, 200)
-
-    def _hud(self) -> Message:
-        vehicle = self._vehicle
-        north, east, up = vehicle.body.velocity
-        speed = math.hypot(north, east)
-        altitude_m = vehicle.home.altitude_m + vehicle.body.place.height
-        return mavlink.MAVLink_vfr_hud_message(speed, speed, 0, 50, altitude_m, up)
-
-    def _attitude(self) -> Message:
-        return mavlink.MAVLink_attitude_message(self._ms(), *(0.0,) * 6)

@@ -57,17 +57,12 @@ class MavlinkVehicle:
         self._stands_since_s = math.inf
         self._lifts_s = -math.inf  # when the motors have spooled up
         self._ground_station_s = math.nan  # when its heartbeat was heard; NaN: never
-        self._reports = Reports(self, self._send)
+        self._reports = Reports(self)
         self._takes: dict[str, Callable[[Message], None]] = {
             "HEARTBEAT": self._take_heartbeat,
             "COMMAND_LONG": self._take_command,
-            "COMMAND_INT": self._take_command,
-            "SET_MODE": self._take_set_mode,
             "SET_POSITION_TARGET_GLOBAL_INT": self._take_target,
             "PARAM_REQUEST_READ": parameters.take_read_request,
-            "PARAM_REQUEST_LIST": parameters.take_list_request,
-            "PARAM_SET": parameters.take,
-            "TIMESYNC": self._take_timesync,
         }
 
     # Actions of the human pilot --------------------------------------------------------------
@@ -121,9 +116,7 @@ class MavlinkVehicle:
             target = here
         if self.now_s < self._lifts_s:
             target = here
-        arrived = body.move(target, passed_s, speed_m_s)
-        if self.mode is Mode.TAKE_OFF and arrived:
-            self._enter(Mode.HOLD)
+        body.move(target, passed_s, speed_m_s)
         self._disarm_on_ground()
 
     def _way_home(self, here: Location) -> tuple[Location, float]:
@@ -188,20 +181,11 @@ class MavlinkVehicle:
         if message.get_srcSystem() == OUR_SYSTEM_ID:
             self._ground_station_s = self.now_s
 
-    def _take_set_mode(self, message: Message) -> None:
-        self._set_mode(mode_of(self.autopilot, message.custom_mode))
-
-    def _take_timesync(self, message: Message) -> None:
-        if message.tc1 == 0:
-            self._send(mavlink.MAVLink_timesync_message(int(self.now_s * 1e9), message.ts1))
-
     def _take_target(self, message: Message) -> None:
         ignored = mavlink.POSITION_TARGET_TYPEMASK_X_IGNORE
         if message.type_mask & ignored or not math.isfinite(message.alt):
             return
-        target = self._place(
-            message.lat_int, message.lon_int, message.alt, message.coordinate_frame
-        )
+        target = self._place(message.lat_int, message.lon_int, message.alt)
         if target is None:
             return
         self._target_s = self.now_s
@@ -211,19 +195,11 @@ class MavlinkVehicle:
             return  # ArduPilot requires a take-off first
         self._target = target
 
-    def _place(self, lat: int, lon: int, altitude_m: float, frame: int) -> Location | None:
+    def _place(self, lat: int, lon: int, altitude_m: float) -> Location | None:
         """Relative to home; None: not on the earth, or implausibly far away."""
         if abs(lat) > 90e7 or abs(lon) > 180e7:
             return None
-        relative = frame in (
-            mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT,
-            mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
-        )
-        place = self.home.to_frame(
-            EarthPlace(
-                lat / 1e7, lon / 1e7, altitude_m + (self.home.altitude_m if relative else 0.0)
-            )
-        )
+        place = self.home.to_frame(EarthPlace(lat / 1e7, lon / 1e7, altitude_m))
         if max(map(abs, place)) > MOST_DISTANCE_M:
             return None
         return place._replace(height=max(0.0, place.height))
@@ -239,12 +215,7 @@ class MavlinkVehicle:
             mavlink.MAV_CMD_DO_SET_MODE: self._obey_mode,
             mavlink.MAV_CMD_NAV_TAKEOFF: self._obey_take_off,
             mavlink.MAV_CMD_NAV_LAND: lambda _message: self._set_mode(Mode.LAND),
-            mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: lambda _message: self._set_mode(Mode.RETURN),
-            mavlink.MAV_CMD_DO_REPOSITION: self._obey_reposition,
-            mavlink.MAV_CMD_DO_CHANGE_SPEED: lambda _message: ACCEPTED,
             mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: reports.set_interval,
-            mavlink.MAV_CMD_REQUEST_MESSAGE: reports.request_message,
-            mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: reports.request_capabilities,
         }
         obey = orders.get(message.command)
         return obey(message) if obey is not None else UNSUPPORTED
@@ -278,28 +249,10 @@ class MavlinkVehicle:
         return int(ACCEPTED)
 
     def _obey_take_off(self, message: Message) -> int:
-        height_m = message.param7 if message.get_type() == "COMMAND_LONG" else message.z
-        if not self.body.armed:
-            return int(DENIED)
-        if self.autopilot is PX4:
-            self._enter(Mode.TAKE_OFF)
-            height_m -= self.home.altitude_m
-            if not math.isfinite(height_m):
-                height_m = self.parameters["MIS_TAKEOFF_ALT"]
-        elif self.mode is not Mode.FOLLOW or not self.body.on_ground:
-            return int(DENIED)
-        if not 0.0 < height_m < MOST_DISTANCE_M:
+        height_m = message.param7
+        is_ready = self.body.armed and self.mode is Mode.FOLLOW and self.body.on_ground
+        if self.autopilot is PX4 or not is_ready or not 0.0 < height_m < MOST_DISTANCE_M:
             return int(DENIED)
         self._target = self.body.place._replace(height=height_m)
         self._lifts_s = self.now_s + self.faults.spool_up_s
-        return int(ACCEPTED)
-
-    def _obey_reposition(self, message: Message) -> int:
-        if message.get_type() != "COMMAND_INT" or not math.isfinite(message.z):
-            return int(UNSUPPORTED)
-        target = self._place(message.x, message.y, message.z, message.frame)
-        if target is None or not self.body.armed or self.body.on_ground:
-            return int(DENIED)
-        self._enter(Mode.HOLD if self.autopilot is PX4 else Mode.FOLLOW)
-        self._target = target
         return int(ACCEPTED)

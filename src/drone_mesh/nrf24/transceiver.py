@@ -284,11 +284,15 @@ class Transceiver:
         deadline_s = self._runtime.now_s() + TIMEOUT_S
         self._runtime.sleep(expected_s)
         while True:
+            now_s = self._runtime.now_s()  # before the look: a busy machine may pause after it
             self._link.command(Command.NOP)
             flags = self._link.status & (TX_DS.mask | MAX_RT.mask)
             if flags:
                 return flags
-            if self._runtime.now_s() > deadline_s:
-                raise RadioError("the chip reported neither success nor failure within 95 ms")
+            if now_s > deadline_s:
+                raise RadioError(
+                    "the radio reported a packet neither sent nor failed: is CE wired, and --ce "
+                    "right?"
+                )
             # The chip's next attempt cannot end sooner.
             self._runtime.sleep(ard_s(self._retries[0]))

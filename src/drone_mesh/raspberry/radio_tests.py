@@ -65,9 +65,8 @@ def _holds(radio: FieldRadio, pattern: bytes) -> bool:
 def _check_irq(radio: FieldRadio, irq: IrqPin) -> str:
     if irq.wait_low(0.0):
         return "FAIL IRQ: low although no flag is set: check its wiring"
-    radio.broadcast(_probe(), keep_flags=True)
+    radio.raise_flag()
     fell = irq.wait_low(0.1)
-    radio.clear_flags()
     return (
         "ok   IRQ: falls after a packet was sent"
         if fell

@@ -94,7 +94,7 @@ def _measured(radio: FieldRadio, to: int, packets: int) -> str:
     payload = _payload(radio.node_id, to)
     sent = [radio.send(address, payload, RETRANSMITS) for _ in range(packets)]
     lost = sum(not one.acknowledged for one in sent)
-    again = sum(one.retransmits for one in sent)
+    again = sum(one.frames - 1 for one in sent)
     rate = settings.data_rate.value // 1000
     return f"{rate},{settings.power.value},{packets},{lost},{again},{lost / packets:.4f}"
 
