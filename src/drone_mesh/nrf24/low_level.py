@@ -7,7 +7,6 @@ import logging
 import random
 from typing import Callable, Iterator
 
-from drone_mesh.channel.access_rules import AccessRules
 from drone_mesh.channel.medium_access import Fate, MediumAccess
 from drone_mesh.channel.packet_queue import OutgoingPacket
 from drone_mesh.channel.radio import Try
@@ -81,15 +80,13 @@ class NRF24LowLevelInterface:
         settings: RadioSettings = RadioSettings(),  # noqa: B008 (frozen)
         runtime: Runtime | None = None,
         rng: random.Random | None = None,
-        rules: AccessRules | None = None,
     ) -> None:
-        """`rules`: of access to the channel; by default those of `settings.access_rules`."""
         self.node_id = node_id
         self.settings = settings
         self.medium = settings.medium
         self._spi, self._ce, self._irq = spi, ce, irq
         self._runtime = runtime or SystemRuntime()
-        self.access = MediumAccess(rules or settings.access_rules, rng or random.Random())
+        self.access = MediumAccess(settings.access_rules, rng or random.Random())
         self._lock = self._runtime.lock()  # guards the chip and all fields below
         self._chip = Transceiver(spi, ce, node_id, settings, self._runtime, self.access.counters)
         self._irq_watch = IrqWatch()

@@ -181,11 +181,3 @@ def frame_bits(address_bytes: int, payload_bytes: int, crc_bytes: int) -> int:
 def ard_s(delay: int) -> float:
     """ARD of SETUP_RETR in seconds: from the end of a frame until the chip starts the next one."""
     return (delay + 1) * ARD_STEP_NS / NS_PER_S
-
-
-def failed_cycle_ns(data_ns: int, ard_ns: int, retransmits: int) -> int:
-    """From the rise of CE to MAX_RT.
-
-    ARD starts at the end of a frame; the settling before the next frame is added [DS Fig. 17].
-    """
-    return SETTLING_NS + (retransmits + 1) * (data_ns + ard_ns) + retransmits * SETTLING_NS

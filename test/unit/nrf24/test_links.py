@@ -11,10 +11,8 @@ from drone_mesh.nrf24.emulator.links import (
     Hop,
     IdealDisc,
     LogDistance,
-    LossCurve,
     bit_error_rate,
     free_space_dbm,
-    measured_curve,
     measured_losses,
 )
 
@@ -79,71 +77,6 @@ def test_damaged_frames_are_thrown_away_by_the_receivers_crc():
 
 def test_the_measured_file_has_these_losses():
     assert {round(m): round(loss, 4) for m, loss in measured_losses()} == MEASURED
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("distance_m", sorted(MEASURED))
-def test_sends_fail_as_often_as_was_measured(distance_m):
-    """After the chip's 15 retransmissions, as in 2019, without another try; within 1 point."""
-    lab = Lab(measured_curve(random.Random(distance_m)))
-    sender, receiver = lab.driver(1), lab.driver(2, float(distance_m))
-    packets = 2000 if distance_m >= 500 else 1000  # the rarer the loss, the less it scatters
-    confirmed = 0
-    for number in range(packets):
-        payload = number.to_bytes(4, "little") + bytes(28)
-        confirmed += sender.try_once(2, payload, False, 15, 5).acknowledged
-        receiver.receive(0.0)
-    assert receiver.statistics().received == confirmed
-    assert 1 - confirmed / packets == pytest.approx(MEASURED[distance_m], abs=0.01)
-
-
-def packets_per_s(distance_m, packets=600):
-    lab = Lab(measured_curve(random.Random(distance_m)))
-    sender, receiver = lab.driver(1), lab.driver(2, float(distance_m))
-    begin_s = lab.clock.now_s()
-    for number in range(packets):
-        sender.try_once(2, number.to_bytes(4, "little") + bytes(28), False, 15, 5)
-        receiver.receive(0.0)
-    return packets / (lab.clock.now_s() - begin_s)
-
-
-@pytest.mark.slow
-def test_packets_take_longer_from_400_m_on_as_was_measured():
-    """The throughput of 2019 at 200, 450 and 600 m: 180, 103 and 70 kbit/s.
-
-    The driver's own work between two packets, which is the same everywhere, flattens it.
-    """
-    near, far, farthest = (packets_per_s(distance_m) for distance_m in (200, 450, 600))
-    assert far / near == pytest.approx(103.16 / 180.47, abs=0.15)
-    assert farthest / near == pytest.approx(70.27 / 180.47, abs=0.15)
-
-
-def test_another_try_after_a_pause_helps_against_a_burst():
-    lab = Lab(measured_curve(random.Random(5)))
-    sender, receiver = lab.driver(1), lab.driver(2, 600.0)
-    confirmed = 0
-    for number in range(300):
-        confirmed += sender.send(2, number.to_bytes(4, "little") + bytes(28))
-        receiver.receive(0.0)
-    assert confirmed >= 299  # 29 packets were lost in 2019, with one try
-
-
-def test_the_measured_range_can_be_shrunk():
-    curve = measured_curve(random.Random(1), range_m=9.0)
-    assert curve.loss(9.0) == pytest.approx(0.0959, abs=1e-4)
-    assert curve.loss(7.5) == pytest.approx(0.0286, abs=1e-4)
-    assert curve.loss(9.1) is None
-
-
-def test_a_curve_is_straight_between_its_points_and_flat_before_them():
-    curve = LossCurve(((10.0, 0.1), (20.0, 0.3)), random.Random(1))
-    assert [curve.loss(m) for m in (0.0, 10.0, 15.0, 20.0)] == pytest.approx([0.1, 0.1, 0.2, 0.3])
-
-
-@pytest.mark.parametrize("points", [(), ((2.0, 0.0), (1.0, 0.1))])
-def test_a_curve_without_rising_distances_is_refused(points):
-    with pytest.raises(ValueError, match="rising distance"):
-        LossCurve(points, random.Random(1))
 
 
 def test_the_disc_ends_at_its_range():
