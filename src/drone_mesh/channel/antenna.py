@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 from dataclasses import replace
-from typing import Mapping
+from typing import Callable, Mapping
 
 from drone_mesh.channel.packet_queue import ALL_NODES
 from drone_mesh.channel.radio import PacketRadio, Received
@@ -56,8 +56,10 @@ class PacketAntenna(IWirelessCommunication):
         submit: Submit,
         *,
         runtime: Runtime | None = None,
+        on_payload: Callable[[bytes], None] | None = None,
         debug_period_s: float = DEBUG_PERIOD_S,
     ) -> None:
+        """`on_payload` is called with each payload as the mesh gets it, in the receiving thread."""
         self._debug_period_s = debug_period_s
         self._radio = radio
         self._submit = submit
@@ -66,6 +68,7 @@ class PacketAntenna(IWirelessCommunication):
         self._sender = Sender(radio, self._runtime, self._delivered, self._given_up)
         self._meter = ChannelMeter(self._runtime.now_s())
         self._quality = LinkQuality()
+        self._on_payload = on_payload
         self._mesh: IMeshNetwork | None = None
         self._receiving: Task | None = None
         self._ending = False  # the receiving thread must end
@@ -238,6 +241,8 @@ class PacketAntenna(IWirelessCommunication):
         self._sender.heard(sender(payload), broadcast=answers, train=train)
         if received.to_all:
             payload = readdressed(payload, self._radio.node_id)
+        if self._on_payload is not None:
+            self._on_payload(payload)
         self._inbox.put(lambda now_s: mesh.on_msg(payload, now_s))
 
     def _note(self, payload: bytes) -> None:

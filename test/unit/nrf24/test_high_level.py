@@ -47,10 +47,12 @@ class Node:
     def __init__(self, lab, node_id, x_m):
         self.mesh = Mesh(node_id)
         self.driver = lab.driver(node_id, x_m, begin=False)
+        self.shown = []
         self.antenna = NRF24HighLevelInterface(
             self.driver,
             lambda work: work(lab.clock.now_s()),
             runtime=lab.clock,
+            on_payload=self.shown.append,
         )
 
 
@@ -72,6 +74,7 @@ def test_a_packet_reaches_the_node_in_byte_3_and_no_other(lab, nodes):
     assert nodes[0].antenna.send_message_to(packet(2))
     lab.clock.sleep(0.1)
     assert [node.mesh.heard for node in nodes] == [[], [], [packet(2)]]
+    assert nodes[2].shown == [packet(2)]
     assert nodes[0].mesh.delivered == [(2, 1)]
 
 
