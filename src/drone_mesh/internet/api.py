@@ -27,10 +27,17 @@ from drone_mesh.drone.goal import MAX_COORDINATE_M, MAX_HEIGHT_M
 from drone_mesh.drone.location import Location
 from drone_mesh.internet.asking import GatewayDesk
 from drone_mesh.internet.data import data_requests
-from drone_mesh.internet.guarded_app import UNDONE, Refusal, Responses, guarded_app
-from drone_mesh.internet.numbers import DecimalDigits, WholeDigits
+from drone_mesh.internet.guarded_app import (
+    UNDONE,
+    DecimalDigits,
+    ReadStatus,
+    Refusal,
+    Responses,
+    WholeDigits,
+    guarded_app,
+    status_request,
+)
 from drone_mesh.internet.orders import order_requests
-from drone_mesh.internet.status import ReadStatus, status_request
 from drone_mesh.users.desk import UsersDesk
 from drone_mesh.web.access import Access, Allowance
 

@@ -20,8 +20,7 @@ from drone_mesh.communication.data.outgoing import TO_ALL, TicketState
 from drone_mesh.communication.data.packets import MAX_DATA_PORT
 from drone_mesh.communication.data.transport import ReceivedMessage
 from drone_mesh.errors import MessageRefused, QueueFull
-from drone_mesh.internet.guarded_app import UNDONE, Refusal
-from drone_mesh.internet.numbers import DecimalDigits, WholeDigits
+from drone_mesh.internet.guarded_app import UNDONE, DecimalDigits, Refusal, WholeDigits
 from drone_mesh.users.desk import HANDOVER_S, Sending, UsersDesk, in_json
 
 LONGEST_WAIT_S = 60.0

@@ -1,4 +1,4 @@
-"""The common base of all nodes' HTTP servers: guard, token, and errors with a reason.
+"""The common base of all nodes' HTTP servers: guard, token, errors with a reason, and GET /status.
 
 No `from __future__ import annotations` here: FastAPI reads the annotations at run time, also on
 Python 3.8.
@@ -7,18 +7,19 @@ Python 3.8.
 import functools
 import logging
 import time
-from typing import Any, Dict, Optional, Union
+from typing import Any, Callable, Dict, Optional, Union
 
 from fastapi import APIRouter, Depends, FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
 from fastapi_offline import FastAPIOffline
-from pydantic import BaseModel
+from pydantic import BaseModel, BeforeValidator
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp
 from typing_extensions import Annotated
 
+from drone_mesh.arguments import is_decimal, is_whole
 from drone_mesh.communication.timing import Throttle
 from drone_mesh.errors import GoalRefused, PlaceTaken
 from drone_mesh.internet.asking import AnswerLate, NotCarriedOut
@@ -26,6 +27,20 @@ from drone_mesh.internet.http_settings import HttpSettings
 from drone_mesh.internet.request_guard import RequestGuard
 from drone_mesh.web.access import Access, TooManyGuesses
 from drone_mesh.web.server_thread import ServerThread
+
+
+def _digits(is_number: Callable[[str], bool], what: str) -> BeforeValidator:
+    def check(value: object) -> object:
+        if isinstance(value, str) and not is_number(value):
+            raise ValueError(f"must be {what} in decimal digits")
+        return value
+
+    return BeforeValidator(check)
+
+
+WholeDigits = _digits(is_whole, "a whole number")
+DecimalDigits = _digits(is_decimal, "a number")
+
 
 REFUSAL_LOG_PERIOD_S = 10.0
 MOST_CONNECTIONS = 64  # further ones get 503
@@ -129,3 +144,29 @@ def _answer_errors_with_a_reason(app: FastAPI) -> None:
     async def bad_request(_request: Request, error: RequestValidationError) -> JSONResponse:
         detail = "; ".join(f"{e['loc'][-1]}: {e['msg']}" for e in error.errors())
         return JSONResponse({"detail": detail}, 422)
+
+
+ReadStatus = Callable[[], Dict[str, Any]]
+"""Returns a node's status; any thread may call it."""
+
+
+def status_request(status: ReadStatus) -> APIRouter:
+    """`GET /status`."""
+    router = APIRouter()
+
+    @router.get("/status")
+    async def node_status() -> Dict[str, Any]:
+        """The status of this node: mesh, radio, flight, version."""
+        return status()
+
+    return router
+
+
+class StatusServer(HttpServer):
+    """The HTTP side of a router: `GET /status`."""
+
+    def __init__(self, status: ReadStatus, http: HttpSettings) -> None:
+        """Open the port. Raises ConfigurationError as HttpInternet does."""
+        about = "Reports the status of this node."
+        request = status_request(status)
+        super().__init__(guarded_app("drone_mesh router", about, http.access(), request), http)

@@ -13,9 +13,8 @@ from drone_mesh.drone.geodesy import Origin
 from drone_mesh.execution import Submit
 from drone_mesh.internet.api import make_api
 from drone_mesh.internet.asking import GatewayDesk
-from drone_mesh.internet.guarded_app import HttpServer
+from drone_mesh.internet.guarded_app import HttpServer, ReadStatus
 from drone_mesh.internet.http_settings import HttpSettings
-from drone_mesh.internet.status import ReadStatus
 from drone_mesh.users.desk import UsersDesk
 
 ANSWER_WITHIN_S = 2.0  # over ten times the duration of an order to a lost node

@@ -10,10 +10,10 @@ from drone_mesh.errors import ConfigurationError
 
 if TYPE_CHECKING:
     from drone_mesh.execution import Submit
+    from drone_mesh.internet.guarded_app import ReadStatus, StatusServer
     from drone_mesh.internet.http_settings import HttpSettings
     from drone_mesh.internet.mqtt_internet import MqttInternet
     from drone_mesh.internet.mqtt_topics import Broker
-    from drone_mesh.internet.status import ReadStatus, StatusServer
     from drone_mesh.users.desk import UsersDesk
 
 
@@ -46,7 +46,7 @@ def mqtt_internet(
 def status_server(status: ReadStatus, http: HttpSettings) -> StatusServer:
     """Create a StatusServer. Also raises ConfigurationError if its libraries are missing."""
     with _extra("http", "--http needs"):
-        from drone_mesh.internet.status import StatusServer
+        from drone_mesh.internet.guarded_app import StatusServer
     return StatusServer(status, http)
 
 

@@ -14,8 +14,7 @@ from typing_extensions import Annotated
 from drone_mesh.communication.interfaces import IGatewayCommands, OrderRecord, OrderState
 from drone_mesh.communication.orders.book import HIGHEST_NUMBER
 from drone_mesh.internet.asking import GatewayDesk
-from drone_mesh.internet.guarded_app import UNDONE, Refusal
-from drone_mesh.internet.numbers import WholeDigits
+from drone_mesh.internet.guarded_app import UNDONE, Refusal, WholeDigits
 
 OrderNumber = Annotated[
     int,

@@ -22,8 +22,8 @@ def check_drone(options: Options) -> int:
     """Print every parameter; the exit status is 0 if each is safe. Raises ConfigurationError."""
     if not options.flight.drone.startswith(MAVLINK):
         raise ConfigurationError("check-drone needs --drone mavlink:ADDRESS")
+    from drone_mesh.drone.mavlink.authority import FlightArea
     from drone_mesh.drone.mavlink.commander import Commander
-    from drone_mesh.drone.mavlink.flight_area import FlightArea
     from drone_mesh.drone.mavlink.link import MavlinkLink
     from drone_mesh.drone.mavlink.parameter_check import ParameterCheck
     from drone_mesh.drone.mavlink.telemetry import Telemetry

@@ -9,7 +9,7 @@ from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.limits import FlightLimits
-from drone_mesh.errors import ConfigurationError
+from drone_mesh.errors import ConfigurationError, GoalRefused, LocationUnknown
 
 HERE = Location(1.0, 2.0, 3.0)
 ORIGIN = Origin(52.0, 5.0, 0.0)
@@ -37,6 +37,20 @@ def test_without_an_option_the_node_stands_on_the_ground() -> None:
     engine = create_engine(4, HERE, FlightOptions())
     assert isinstance(engine, GroundEngine)
     assert engine.get_location() == HERE
+
+
+def test_a_node_on_the_ground_refuses_each_goal_and_stays_where_it_was_put():
+    engine = GroundEngine(7, HERE)
+    with pytest.raises(GoalRefused, match="drone 7 cannot fly: it stands on the ground"):
+        engine.set_goal(10.0, 20.0, 30)
+    assert engine.get_location() == HERE
+    assert not engine.can_fly()
+    assert engine.why_not_fly() == "it stands on the ground"
+
+
+def test_without_a_position_a_node_on_the_ground_invents_none():
+    with pytest.raises(LocationUnknown, match="use --latitude and --longitude"):
+        GroundEngine(7, None).get_location()
 
 
 def test_an_own_engine_is_made_with_the_id_of_the_node_and_can_fly() -> None:

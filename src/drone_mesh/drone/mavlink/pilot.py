@@ -14,9 +14,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.location import Location
-from drone_mesh.drone.mavlink.authority import Authority
+from drone_mesh.drone.mavlink.authority import Authority, FlightArea
 from drone_mesh.drone.mavlink.commander import CARRIED_OUT_WITHIN_S, Commander
-from drone_mesh.drone.mavlink.flight_area import FlightArea
 from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions
 from drone_mesh.drone.mavlink.parameter_check import ParameterCheck
 from drone_mesh.drone.mavlink.pilot_status import UNDER_WAY, Phase, PilotStatus
