@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from typing import Sequence
+
+from drone_mesh.drone.flight_path import Point
 from drone_mesh.drone.location import Location
 
 LEAD_S = 2.5  # the target ahead, in seconds of flight; with 1.5 ArduCopter is slow
@@ -23,11 +26,19 @@ class Route:
         cross_at_m: float,
         lands: bool,
         speed_m_s: float,
+        around: Sequence[Point] = (),
     ) -> None:
-        """`cross_at_m` is the height in between; `lands`: the autopilot does the final descent."""
+        """`cross_at_m` is the height in between; `around` are corners (x, y) in between.
+
+        `lands` leaves the final descent to the autopilot.
+        """
         height = max(cross_at_m, start.height, goal.height)
-        corners = [start, start._replace(height=height), goal._replace(height=height)]
-        self._corners = corners if lands else [*corners, goal]
+        between_ends = [Location.from_vector((x, y, height)) for x, y in around]
+        corners = [start, start._replace(height=height), *between_ends]
+        corners.append(goal._replace(height=height))
+        if not lands:
+            corners.append(goal)
+        self._corners = corners
         self._next = 1  # the corner that the target moves to
         self.target = start  # the position to fly to now
         self._speed_m_s = speed_m_s

@@ -34,12 +34,8 @@ class IrqWatch:
 
     def __init__(self) -> None:
         self.trusted = True
-        self._said: bool | None = None  # whether the pin was low; None: not read
+        self.said: bool | None = None  # whether the pin was low after the wait; None: not read
         self._contradictions = 0
-
-    def woken(self, low: bool) -> None:
-        """The wait for the pin is over."""
-        self._said = low
 
     def polled(self, found: bool, low_for_nothing: bool) -> bool:
         """The chip was read after the wait; returns whether the pin is now considered broken.
@@ -47,7 +43,7 @@ class IrqWatch:
         `found`: there were payloads, so the pin should have been low. `low_for_nothing`: all flags
         are clear, but the pin is low.
         """
-        said, self._said = self._said, None
+        said, self.said = self.said, None
         if low_for_nothing or (found and said is False):
             self._contradictions += 1
         elif found and said:
@@ -216,7 +212,7 @@ class NRF24LowLevelInterface:
             if self._irq is None or not self._irq_watch.trusted or not self.working:
                 self._runtime.sleep(min(left_s, POLL_S))
             else:
-                self._irq_watch.woken(self._irq.wait_low(left_s))
+                self._irq_watch.said = self._irq.wait_low(left_s)
 
     def hears_power(self) -> bool | None:
         """Whether more than -64 dBm were in the channel for 40 us (RPD); None: it fails now."""

@@ -101,20 +101,16 @@ def _report(radio: FieldRadio, irq: IrqPin | None, options: argparse.Namespace) 
     # Before the scan, which takes seconds; an earlier report stays until this one is complete.
     with _refusing(file):
         file.open("a", encoding="utf-8").close()
-    for part, made in (
-        ("check", radio_tests.check(radio, irq)),
-        ("scan", radio_tests.scan(radio, REPORT_ROUNDS, USUAL_NODES)),
-    ):
-        lines.append(f"== {part}")
-        try:
-            for line in made:
-                lines.append(line)
-                if part == "check":
-                    yield line
-        except MeshError as error:
-            lines.append(f"FAIL {error}")
-            yield lines[-1]
-            break
+    try:
+        lines.append("== check")
+        for line in radio_tests.check(radio, irq):
+            lines.append(line)
+            yield line
+        lines.append("== scan")
+        lines.extend(radio_tests.scan(radio, REPORT_ROUNDS, USUAL_NODES))
+    except MeshError as error:
+        lines.append(f"FAIL {error}")
+        yield lines[-1]
     with _refusing(file):
         file.write_text("\n".join(lines) + "\n", encoding="utf-8")
     yield f"report written to {file}"

@@ -23,25 +23,62 @@ def register_of(*places, max_distance_m=9.0):
     return table
 
 
-def test_a_stranger_is_registered_where_it_says_it_is():
+PLACE, ELSEWHERE = (1.0, 2.0, 0.05), (6.0, 7.0, 8.0)
+TOPIC = "/Node/7"
+KNOWN = [(PLACE, "", True), (NOWHERE, TOPIC, True)]
+OFF = (NOWHERE, "", False)
+
+
+@pytest.mark.parametrize(
+    ("infos", "node", "position"),
+    [
+        pytest.param([(PLACE, TOPIC, True)], (TOPIC, True), PLACE, id="a stranger is there"),
+        pytest.param([(PLACE, "", True)], None, PLACE, id="without sub only its place is kept"),
+        pytest.param(
+            [(PLACE, "", True), (ELSEWHERE, TOPIC, True)], (TOPIC, True), PLACE, id="then it counts"
+        ),
+        pytest.param([OFF], None, None, id="the power of an unknown node is no position"),
+        pytest.param(
+            [*KNOWN, (ELSEWHERE, TOPIC, True)], (TOPIC, True), PLACE, id="an antenna moves no node"
+        ),
+        pytest.param(
+            [*KNOWN, (NOWHERE, TOPIC, False), (ELSEWHERE, "", True)],
+            (TOPIC, False),
+            ELSEWHERE,
+            id="a flying drone does not switch its antenna back on",
+        ),
+        pytest.param([*KNOWN, OFF], (TOPIC, False), PLACE, id="the power alone moves nothing"),
+        pytest.param([*KNOWN, OFF, OFF], (TOPIC, False), PLACE, id="nor twice"),
+        # As in the original design; `on` is false then, because nobody has set it.
+        pytest.param(
+            [*KNOWN, (ELSEWHERE, "", False)],
+            (TOPIC, True),
+            ELSEWHERE,
+            id="an engine that fills only id and position leaves it on",
+        ),
+        pytest.param(
+            [*KNOWN, OFF, (NOWHERE, "", True)], (TOPIC, True), PLACE, id="the origin switches it on"
+        ),
+        pytest.param(
+            [*KNOWN, (NOWHERE, "", True)],
+            (TOPIC, True),
+            NOWHERE,
+            id="the origin is a position for a node that is on",
+        ),
+        pytest.param(
+            [*KNOWN, (NOWHERE, "/new", True)],
+            ("/new", True),
+            PLACE,
+            id="a new sub counts",
+        ),
+    ],
+)
+def test_what_a_drone_info_changes(infos, node, position):
     table = NodeTable()
-    table.drone_info(7, (1.0, 2.0, 3.0), "/stranger", True)
-    assert table.node(7) == Node(7, "/stranger", True)
-    assert table.position(7) == (1.0, 2.0, 3.0)
-
-
-def test_an_unknown_node_without_sub_is_not_registered_but_its_position_is_kept():
-    table = NodeTable()
-    table.drone_info(7, (1.0, 2.0, 3.0), "", True)
-    assert table.node(7) is None
-    table.drone_info(7, (50.0, 0.0, 0.0), "/Node/7", True)
-    assert table.position(7) == (1.0, 2.0, 3.0)
-
-
-def test_an_antenna_never_moves_a_known_node():
-    table = register_of((1.0, 2.0, 0.05))
-    table.drone_info(0, (8.0, 8.0, 8.0), "/Node/0", True)
-    assert table.position(0) == (1.0, 2.0, 0.05)
+    for place, sub, on in infos:
+        table.drone_info(7, place, sub, on)
+    assert table.node(7) == (node and Node(7, *node))
+    assert table.position(7) == position
 
 
 def test_an_engine_moves_its_node():
@@ -50,56 +87,6 @@ def test_an_engine_moves_its_node():
     table.drone_info(1, (20.0, 0.0, 0.05), "", True)
     assert table.in_range(0) == ()
     assert table.link(0, 1) is None
-
-
-def test_a_flying_drone_does_not_switch_its_antenna_back_on():
-    table = register_of((0.0, 0.0, 0.05), (5.0, 0.0, 0.05))
-    table.drone_info(1, NOWHERE, "/Node/1", False)
-    table.drone_info(1, (6.0, 0.0, 0.05), "", True)
-    assert table.node(1) == Node(1, "/Node/1", False)
-    assert table.position(1) == (6.0, 0.0, 0.05)
-
-
-def test_a_message_with_neither_sub_nor_position_switches_the_power_and_moves_nothing():
-    table = register_of((1.0, 2.0, 0.05))
-    table.drone_info(0, NOWHERE, "", False)
-    assert table.node(0) == Node(0, "/Node/0", False)
-    assert table.position(0) == (1.0, 2.0, 0.05)
-
-
-def test_an_engine_that_fills_only_id_and_position_moves_its_node_and_leaves_it_on():
-    """As in the original design; `on` is false then, because nobody has set it."""
-    table = register_of((1.0, 2.0, 0.05))
-    table.drone_info(0, (9.0, 9.0, 9.0), "", False)
-    assert table.node(0) == Node(0, "/Node/0", True)
-    assert table.position(0) == (9.0, 9.0, 9.0)
-
-
-def test_the_power_of_an_unknown_node_is_no_position_of_it():
-    table = NodeTable()
-    table.drone_info(7, NOWHERE, "", False)
-    table.drone_info(7, (5.0, 0.0, 0.05), "/Node/7", True)
-    assert table.position(7) == (5.0, 0.0, 0.05)
-
-
-def test_exactly_the_origin_without_sub_switches_on_a_node_that_is_off():
-    table = register_of((1.0, 2.0, 0.05))
-    table.drone_info(0, NOWHERE, "", False)
-    table.drone_info(0, NOWHERE, "", True)
-    assert table.node(0) == Node(0, "/Node/0", True)
-    assert table.position(0) == (1.0, 2.0, 0.05)
-
-
-def test_exactly_the_origin_is_a_position_for_a_node_that_is_on():
-    table = register_of((1.0, 2.0, 0.05))
-    table.drone_info(0, NOWHERE, "", True)
-    assert table.position(0) == NOWHERE
-
-
-def test_a_new_sub_replaces_the_topic():
-    table = register_of((0.0, 0.0, 0.05), (5.0, 0.0, 0.05))
-    table.drone_info(1, NOWHERE, "/elsewhere", True)
-    assert table.link(0, 1) == "/elsewhere"
 
 
 @pytest.mark.parametrize(
@@ -174,13 +161,6 @@ def test_both_queries_agree_however_nodes_are_moved_and_switched():
     links = {pair for pair in itertools.permutations(range(40), 2) if table.link(*pair)}
     assert links == {(a, b) for a in range(40) for b in table.in_range(a)}
     assert 100 < len(links) < 40 * 39
-
-
-def test_power_off_twice_moves_nothing():
-    table = register_of((1.0, 2.0, 0.05))
-    for _ in range(2):
-        table.drone_info(0, NOWHERE, "", False)
-    assert table.position(0) == (1.0, 2.0, 0.05)
 
 
 def test_a_wall_hides_nodes_from_each_other_until_one_flies_over_it():
