@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from drone_mesh.errors import ConfigurationError
-
 
 @dataclass(frozen=True)
 class AccessRules:
@@ -63,8 +61,3 @@ class AccessRules:
             most_patience=2.5,
             busy_at=0.3,
         )
-
-    def __post_init__(self) -> None:
-        for name in ("tries", "tries_when_silent", "queue_length", "data_queue_length"):
-            if getattr(self, name) < 1:
-                raise ConfigurationError(f"medium access: {name} must be at least 1")

@@ -14,7 +14,6 @@ from drone_mesh.channel.access_rules import AccessRules
 from drone_mesh.channel.medium_access import Fate, InTrain, MediumAccess
 from drone_mesh.channel.packet_queue import ALL_NODES
 from drone_mesh.communication.wire.packet_types import Priority
-from drone_mesh.errors import ConfigurationError
 
 CYCLE_S = 0.0026
 RULES = AccessRules.for_cycle(CYCLE_S)
@@ -266,11 +265,6 @@ def test_what_was_cleared_is_not_tried_again():
     assert access.tried(due, False, 0.1) in (Fate.WAITS, Fate.GIVEN_UP)
     assert len(access) == 0
     assert access.due(100.0) is None
-
-
-def test_rules_without_tries_are_refused():
-    with pytest.raises(ConfigurationError, match="tries must be at least 1"):
-        AccessRules(**{**RULES.__dict__, "tries": 0})
 
 
 def loaded(data, control=0):
