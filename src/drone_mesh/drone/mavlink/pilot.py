@@ -350,6 +350,8 @@ class MavlinkPilot:
             return
         autopilot = telemetry.autopilot
         if autopilot is not None and telemetry.mode != autopilot.land_mode:
+            if autopilot.wants_targets_beforehand and self._route is not None:
+                self._send_target(self._route.end, now_s)  # the order to land may get lost
             self._authority.choice.command(autopilot.land_mode)
             self._command(mavlink.MAV_CMD_NAV_LAND, (), now_s)
 
