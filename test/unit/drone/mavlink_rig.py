@@ -146,3 +146,20 @@ def is_inside(target: Location, limits: FlightLimits, home: Location) -> bool:
     return distance_m <= limits.max_distance_m + 0.1 and target.height <= (
         home.height + limits.max_height_m + 0.1
     )
+
+
+def in_the_air(autopilot: Autopilot, permissions: Permissions = ALL) -> Rig:
+    """Its pilot has taken it to 8 m."""
+    rig = Rig(autopilot, permissions)
+    lift(rig.vehicle, 8.0)
+    return rig.ready()
+
+
+def in_flight(autopilot: Autopilot, permissions: Permissions = ALL) -> Rig:
+    """The pilot gave it to the mesh in the air, and it flies as ordered."""
+    rig = in_the_air(autopilot, permissions)
+    rig.vehicle.choose_mode(Mode.FOLLOW)
+    rig.run_until("it can fly", lambda: not rig.status().why_not_fly, within_s=3.0)
+    rig.goal(100.0, 0.0, 8.0)
+    rig.run_until("it is on its way", lambda: rig.place.latitude > 10.0)
+    return rig

@@ -5,7 +5,15 @@ from __future__ import annotations
 import re
 
 import pytest
-from mavlink_rig import ALL, ARDUPILOT, NONE, TARGET, Rig, lift
+from mavlink_rig import (
+    ARDUPILOT,
+    NONE,
+    TARGET,
+    Rig,
+    in_flight,
+    in_the_air,
+    lift,
+)
 from mavlink_vehicle.modes import Mode
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -16,26 +24,6 @@ from drone_mesh.drone.mavlink.pilot_status import Phase
 from drone_mesh.errors import GoalRefused
 
 BOTH = pytest.mark.parametrize("autopilot", [ARDUPILOT, PX4], ids=lambda a: a.name)
-
-
-def _in_the_air(autopilot: Autopilot, permissions: Permissions = ALL) -> Rig:
-    rig = Rig(autopilot, permissions)
-    lift(rig.vehicle, 8.0)
-    return rig.ready()
-
-
-def _given_to_the_mesh(autopilot: Autopilot, permissions: Permissions = ALL) -> Rig:
-    rig = _in_the_air(autopilot, permissions)
-    rig.vehicle.choose_mode(Mode.FOLLOW)
-    rig.run_until("it can fly", lambda: not rig.status().why_not_fly, within_s=3.0)
-    return rig
-
-
-def _on_its_way(autopilot: Autopilot, permissions: Permissions = ALL) -> Rig:
-    rig = _given_to_the_mesh(autopilot, permissions)
-    rig.goal(100.0, 0.0, 8.0)
-    rig.run_until("it is on its way", lambda: rig.place.latitude > 20.0)
-    return rig
 
 
 # What it may not do --------------------------------------------------------------------------
@@ -82,7 +70,7 @@ def test_it_never_takes_control_from_a_pilot_who_flies_by_hand(autopilot: Autopi
 def test_without_permissions_it_flies_when_the_pilot_hands_it_a_hovering_drone(
     autopilot: Autopilot,
 ) -> None:
-    rig = _in_the_air(autopilot, NONE)
+    rig = in_the_air(autopilot, NONE)
     assert "flown by its pilot: this needs" in rig.status().why_not_fly
     rig.vehicle.choose_mode(Mode.FOLLOW)
     rig.run(3.0)
@@ -116,7 +104,7 @@ def test_without_permissions_it_flies_when_the_pilot_hands_it_a_hovering_drone(
 def test_a_flight_ends_at_once_and_its_reason_is_logged(
     autopilot: Autopilot, what: str, value: object, why: str, caplog: pytest.LogCaptureFixture
 ) -> None:
-    rig = _on_its_way(autopilot)
+    rig = in_flight(autopilot)
     vehicle, where_m = rig.vehicle, rig.place.latitude
     if isinstance(value, Mode):
         vehicle.choose_mode(value)
@@ -136,7 +124,7 @@ def test_a_flight_ends_at_once_and_its_reason_is_logged(
 
 @BOTH
 def test_after_a_pilot_took_over_not_one_target_is_sent(autopilot: Autopilot) -> None:
-    rig = _on_its_way(autopilot)
+    rig = in_flight(autopilot)
     rig.vehicle.choose_mode(Mode.PILOT)
     rig.run_until("it noticed", lambda: not rig.status().is_flying, within_s=2.0)
     rig.down.sent.clear()
@@ -150,7 +138,7 @@ def test_after_a_pilot_took_over_not_one_target_is_sent(autopilot: Autopilot) ->
 
 @BOTH
 def test_handing_the_drone_back_does_not_resume_the_flight(autopilot: Autopilot) -> None:
-    rig = _on_its_way(autopilot)
+    rig = in_flight(autopilot)
     rig.vehicle.choose_mode(Mode.HOLD)
     rig.run(3.0)
     place = rig.place
@@ -162,7 +150,7 @@ def test_handing_the_drone_back_does_not_resume_the_flight(autopilot: Autopilot)
 
 
 def test_the_target_of_a_ground_station_is_not_overruled_while_the_drone_holds() -> None:
-    rig = _on_its_way(ARDUPILOT)
+    rig = in_flight(ARDUPILOT)
     rig.reach(Phase.HOLDING)
     rig.run(5.0)
     rig.down.sent.clear()
@@ -176,7 +164,7 @@ def test_the_target_of_a_ground_station_is_not_overruled_while_the_drone_holds()
 def test_when_the_program_dies_in_flight_the_autopilot_lands_the_drone(
     autopilot: Autopilot,
 ) -> None:
-    rig = _on_its_way(autopilot)
+    rig = in_flight(autopilot)
     rig.down.broken = True
     rig.run(60.0)
     assert rig.vehicle.mode is Mode.LAND
@@ -218,7 +206,7 @@ def test_a_home_at_another_height_than_the_origin_is_doubted_once(
 
 
 def test_a_second_vehicle_on_the_line_is_ignored() -> None:
-    rig = _in_the_air(ARDUPILOT)
+    rig = in_the_air(ARDUPILOT)
     other = mavlink.MAVLink(None, 2, 1)
     codec = mavlink.MAVLink(None)
     stranger = mavlink.MAVLink_heartbeat_message(
@@ -269,6 +257,6 @@ def test_the_charge_may_be_unknown_when_no_least_charge_is_asked_for() -> None:
 
 
 def test_every_target_is_a_position_alone() -> None:
-    rig = _on_its_way(ARDUPILOT)
+    rig = in_flight(ARDUPILOT)
     masks = {m.type_mask for m in rig.down.sent if m.get_type() == TARGET}
     assert masks == {0b110111111000}

@@ -11,7 +11,7 @@ from dataclasses import replace
 from typing import Any, Callable
 
 import pytest
-from mavlink_rig import ALL, ARDUPILOT, STEP_S, Rig, lift
+from mavlink_rig import ALL, ARDUPILOT, STEP_S, Rig, in_flight, lift
 from mavlink_vehicle.modes import Mode, mode_number
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -44,18 +44,6 @@ EVERY_KIND_OF_MODE = pytest.mark.parametrize(
         pytest.param(PX4, px4_mode(4, 11), PILOT, id="a mode of a later PX4"),
     ],
 )
-
-
-def in_flight(autopilot: Autopilot, permissions: Permissions = ALL) -> Rig:
-    """The pilot gave it to the mesh in the air, and it flies as ordered."""
-    rig = Rig(autopilot, permissions)
-    lift(rig.vehicle, 8.0)
-    rig.ready()
-    rig.vehicle.choose_mode(Mode.FOLLOW)
-    rig.run_until("it can fly", lambda: not rig.status().why_not_fly, within_s=3.0)
-    rig.goal(100.0, 0.0, 8.0)
-    rig.run_until("it is on its way", lambda: rig.place.latitude > 10.0)
-    return rig
 
 
 def refuses(rig: Rig, ask: Callable[[float, float, float], None]) -> bool:
