@@ -15,7 +15,6 @@ from proofs.damage import (
     damage_row,
     keys_of,
     trial,
-    with_row,
 )
 from proofs.fuzz import crowd, fuzz, tables
 
@@ -136,14 +135,6 @@ def test_the_table_has_a_cell_for_each_case():
     assert cells[0] == name
     assert all("later 0 %" in cell for cell in cells[1:4])
     assert cells[4] == ""
-
-
-def test_a_new_row_replaces_the_old_one_of_its_attack_in_the_page():
-    page = "\n".join(("before", *TABLE_HEAD, "| one | 1 |", "| two | 2 |", "", "after"))
-    page = with_row(page, "| one | 3 |")
-    page = with_row(page, "| four | 4 |")
-    rows = ("| one | 3 |", "| two | 2 |", "| four | 4 |")
-    assert page == "\n".join(("before", *TABLE_HEAD, *rows, "", "after"))
 
 
 def test_an_unknown_attack_is_an_error_in_one_line(capsys):
