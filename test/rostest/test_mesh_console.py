@@ -79,7 +79,8 @@ class Page:
             self.samples += message.get("samples", [])
             self.alarms = message.get("alarms", self.alarms)
             for node, fields in message.get("nodes", {}).items():
-                self.nodes.setdefault(node, {}).update(fields)
+                # As a whole: the test reads it in another thread.
+                self.nodes[node] = {**self.nodes.get(node, {}), **fields}
 
     def all_connected(self) -> bool:
         return all(n["condition"] == "connected" for n in list(self.nodes.values()))

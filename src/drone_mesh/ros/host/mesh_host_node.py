@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 from functools import partial
 from typing import Callable, Collection
@@ -19,7 +20,11 @@ from drone_mesh.msg import HostProgress
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import start_node
 from drone_mesh.ros.graph.conversions import ros_time
-from drone_mesh.ros.graph.fleet_parameter import get_fleet_parameter, get_present_drones
+from drone_mesh.ros.graph.fleet_parameter import (
+    drones_if_known,
+    get_fleet_parameter,
+    get_present_drones,
+)
 from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
 from drone_mesh.ros.graph.master import NO_ANSWER, MasterWatch
 from drone_mesh.ros.graph.orderly_stop import OrderlyStop
@@ -151,26 +156,21 @@ def share_of_host(fleet: FactoryConfiguration, drones: PresentDrones) -> range:
     return ids
 
 
-class FollowedFleet:
-    """Keeps a host's nodes equal to its share of /drone_mesh/drones. One thread."""
+def _follow(host: MeshHost, share: Collection[int], served: dict[int, Role]) -> dict[int, Role]:
+    """Start and end nodes so that the host runs its share of /drone_mesh/drones; returns them.
 
-    def __init__(self, host: MeshHost, share: Collection[int]) -> None:
-        """`share`: ids of the drones that this host runs unless another host does."""
-        self._host = host
-        self._share = share
-        self._served: dict[int, Role] = {}
-
-    def follow(self) -> None:
-        """Read the parameter once; start the missing nodes, and end those that are not in it."""
-        try:
-            wanted = get_present_drones().of_host(rospy.get_name(), self._share)
-        except (KeyError, *NO_ANSWER) as error:  # the master is ending or has just started
-            _log.debug("the drones are not known: %s", error)
-            return
-        for node_id in self._served.keys() - wanted.keys():
-            self._host.end_node(node_id)
-        self._host.start_nodes({n: role for n, role in wanted.items() if n not in self._served})
-        self._served = wanted
+    `share`: ids of the drones that this host runs unless another host does. `served`: what it runs.
+    """
+    drones = None
+    with contextlib.suppress(*NO_ANSWER):  # the master is ending or has just started
+        drones = drones_if_known()
+    if drones is None:
+        return served
+    wanted = drones.of_host(rospy.get_name(), share)
+    for node_id in served.keys() - wanted.keys():
+        host.end_node(node_id)
+    host.start_nodes({n: role for n, role in wanted.items() if n not in served})
+    return wanted
 
 
 def main() -> None:
@@ -210,10 +210,9 @@ def main() -> None:
                 "DroneFactory to subscribe to the progress", clock.is_followed, stop.requested
             )
             clock.report_progress()
-            drones = FollowedFleet(host, ids)
-            drones.follow()
+            served = _follow(host, ids, {})
             while not stop.wait(PROGRESS_PERIOD_S):
                 clock.report_progress()
-                drones.follow()
+                served = _follow(host, ids, served)
         finally:
             host.stop()

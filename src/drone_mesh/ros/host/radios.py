@@ -83,20 +83,17 @@ class AntennaPanel:
         self._slot = slot
         self._is_on = is_on
         self._switch = switch
-        self._service: rospy.Service | None = None
-        self._debugging = ExitStack()  # what ends with it
+        self._offered, self._debugging = ExitStack(), ExitStack()  # what ends with each
 
     def start(self) -> None:
         """Offer the switch."""
-        self._service = rospy.Service(
-            names.power_switch(self._node_id), PowerSwitch, self._power_switched
-        )
+        name = names.power_switch(self._node_id)
+        service = rospy.Service(name, PowerSwitch, self._power_switched)
+        self._offered.callback(service.shutdown)
 
     def stop(self) -> None:
         """Withdraw the switch. A second call changes nothing."""
-        if self._service is not None:
-            self._service.shutdown()
-            self._service = None
+        self._offered.close()
 
     def debugging_mode(self, info: IMeshDebugInfo, on: bool) -> None:
         """Start or stop publishing NodeDebugInfo."""

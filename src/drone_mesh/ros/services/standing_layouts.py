@@ -167,7 +167,7 @@ class StandingLayouts:
             self._shown.pop(number, None)
             if progress is None:
                 return None
-            self._later(self._report_withdrawn, progress, handle)
+            self._later(self._report, progress, handle, True)
             self._save()
         return progress.in_words()
 
@@ -235,22 +235,19 @@ class StandingLayouts:
     # The reporter's thread -------------------------------------------------------------------
 
     def _report(
-        self, progress: StandingProgress, handle: actionlib.ServerGoalHandle | None
+        self,
+        progress: StandingProgress,
+        handle: actionlib.ServerGoalHandle | None,
+        withdrawn: bool = False,
     ) -> None:
-        self._publisher.publish(progress_msg(progress, progress.is_over))
-        if progress.is_over:
-            _log.info("%s: %s", progress.name, progress.in_words())
-        if handle is not None:
-            _tell(handle, progress)
-
-    def _report_withdrawn(
-        self, progress: StandingProgress, handle: actionlib.ServerGoalHandle | None
-    ) -> None:
-        words = progress.in_words()
-        self._publisher.publish(progress_msg(progress, over=True))
-        if handle is not None:
+        words, over = progress.in_words(), withdrawn or progress.is_over
+        self._publisher.publish(progress_msg(progress, over))
+        if over:
+            _log.info("%s: %s%s", progress.name, "withdrawn: " if withdrawn else "", words)
+        if handle is not None and withdrawn:
             handle.set_canceled(LayoutResult(progress.number, False, words), words)
-        _log.info("%s: withdrawn: %s", progress.name, words)
+        elif handle is not None:
+            _tell(handle, progress)
 
     # At the start ----------------------------------------------------------------------------
 

@@ -21,16 +21,8 @@ from drone_mesh.ros.graph.command_line import require_master, run_tool
 from drone_mesh.ros.views.bag import RecordedMesh
 from drone_mesh.view.window_process import require_screen
 
-RECORDED = "|".join(
-    (
-        names.STATE_TOPIC,
-        names.EVENTS_TOPIC,
-        names.PACKETS_TOPIC,
-        "Nodes/[0-9]+/debug",
-        names.DIAGNOSTICS_TOPIC,
-        names.CLOCK_TOPIC,
-    )
-)
+OF_THE_MESH = (names.STATE_TOPIC, names.EVENTS_TOPIC, names.PACKETS_TOPIC, "Nodes/[0-9]+/debug")
+RECORDED = "|".join((*OF_THE_MESH, names.DIAGNOSTICS_TOPIC, names.CLOCK_TOPIC))
 # Topics that rosbag must not publish, because running nodes do; --clock publishes the time.
 NOT_PLAYED = {"/rosout", "/rosout_agg"}
 
