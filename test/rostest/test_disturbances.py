@@ -30,7 +30,7 @@ from std_msgs.msg import String
 from drone_mesh.msg import DroneInfo, RequestGatewayDroneFlight
 from drone_mesh.ros.graph.direct_publisher import DirectPublisher
 from drone_mesh.ros.world.world_runner import STUCK_SUBSCRIBER_S
-from drone_mesh.srv import AreaScan, RequestDroneFlight
+from drone_mesh.srv import AreaScan
 
 
 def near(node_id: int) -> list[int]:
@@ -67,24 +67,6 @@ class RestartsTest(unittest.TestCase):
         self.assertNotIn(9, near(6))
         self.assertLessEqual(len(log.lines("lost the simulator")), 1)
         self.assertEqual(log.failures(), [])
-
-    def test_an_order_to_the_manager_that_came_back_moves_a_drone(self) -> None:
-        self.mesh.wait("all but 9 connected", 60, lambda: self.mesh.connected(range(9)))
-        kill_and_wait_for_respawn("/DroneManager")
-
-        def ordered() -> bool:
-            try:
-                answer = call(
-                    "/DroneManager/requestDroneMovement", RequestDroneFlight, 2, 4.0, 3.0, 0
-                )
-            except rospy.ServiceException:
-                return False  # the master may know the address of the dead one for a moment
-            return bool(answer.status == 1)
-
-        self.mesh.wait("the manager did not find the gateway", 120, ordered)
-        self.mesh.wait_at(2, 3.0, 4.0, within_s=60)
-        self.mesh.wait("0 and 1 connected", 8, lambda: self.mesh.connected([0, 1]))
-        self.assertEqual(self.log.failures(), [])
 
 
 STUCK = 30

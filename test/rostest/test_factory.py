@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import math
-import time
 import unittest
 
 import numpy as np
@@ -13,7 +12,7 @@ import rostest
 from rosgraph_msgs.msg import Clock
 from rostest_support import LogWatch, MeshWatch, call, wait_for
 
-from drone_mesh.msg import DroneInfo, Location, MeshState
+from drone_mesh.msg import DroneInfo, Location
 from drone_mesh.srv import SetSpeed
 
 
@@ -23,7 +22,6 @@ class FactoryTest(unittest.TestCase):
         cls.log = LogWatch()
         cls.mesh = MeshWatch(3)
         cls.mesh.wait("the first debug messages", 30, lambda: len(cls.mesh.hops()) == 3)
-        cls.start_places = [cls.mesh.place(node_id) for node_id in range(3)]
 
     def fly(self, node_id: int, latitude: float, longitude: float, height: int) -> None:
         publisher = rospy.Publisher(f"/Drones/{node_id}/goal", Location, queue_size=1)
@@ -42,23 +40,6 @@ class FactoryTest(unittest.TestCase):
         self.assertEqual({step % 10_000_000 for step in steps}, {0})
         self.assertGreater(steps.count(10_000_000), 100)
 
-    def test_the_world_can_be_paused_and_goes_on(self) -> None:
-        self.assertTrue(call("/DroneFactory/setSpeed", SetSpeed, True, 0.0).success)
-        states: list[MeshState] = []
-        state = rospy.Subscriber("/mesh/state", MeshState, states.append)
-
-        def last_tick_arrived() -> bool:
-            stamps = [s.header.stamp.to_sec() for s in states[-2:] if s.paused]
-            return len(stamps) == 2 and stamps[0] == stamps[1] == rospy.get_time()
-
-        wait_for("the world stands still", 10, last_tick_arrived)
-        state.unregister()
-        stopped_s = rospy.get_time()
-        time.sleep(0.5)  # in which nothing may happen
-        self.assertEqual(rospy.get_time(), stopped_s)
-        self.assertTrue(call("/DroneFactory/setSpeed", SetSpeed, False, 0.0).success)
-        wait_for("the clock did not go on", 10, lambda: rospy.get_time() > stopped_s + 1.0)
-
     def test_a_speed_out_of_bounds_is_refused_with_the_bounds(self) -> None:
         for factor in (math.nan, math.inf, -1.0, 1e-300, 1e-5, 100_000.0):
             answer = call("/DroneFactory/setSpeed", SetSpeed, False, factor)
@@ -72,9 +53,6 @@ class FactoryTest(unittest.TestCase):
         self.assertTrue(call("/DroneFactory/setSpeed", SetSpeed, False, 4.0).success)
         # At 0.001 the world makes one step in 10 s.
         wait_for("the clock to go on", 5, lambda: rospy.get_time() > stood_s + 1.0)
-
-    def test_drones_start_where_the_protocol_says(self) -> None:
-        self.assertEqual(self.start_places, [(-1.0, 0.0, 0), (0.0, 0.0, 0), (1.0, 0.0, 0)])
 
     def test_a_goal_is_flown_to_and_told_at_most_20_times_a_second(self) -> None:
         heard: list[DroneInfo] = []

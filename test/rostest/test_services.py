@@ -113,12 +113,6 @@ class SimulatorTest(unittest.TestCase):
         self.b.announce((0.0, 0.0, 0.0), "/stranger_b", on=True)
         wait_for("2 was not switched on", 5, lambda: self.in_range(1) == [2])
 
-    def test_an_engine_moves_its_node(self) -> None:
-        self.far.announce((9.0, 0.0, 0.1))
-        wait_for("3 did not move", 5, lambda: self.in_range(1) == [2, 3])
-        self.far.announce((10.5, 0.0, 0.1))
-        wait_for("3 did not move back", 5, lambda: self.in_range(1) == [2])
-
     def test_a_killed_receiver_does_not_count_as_reached(self) -> None:
         receiver = subprocess.Popen([sys.executable, "-c", RECEIVER])
         try:

@@ -107,13 +107,6 @@ class StandingLayoutsTest(unittest.TestCase):
         done = self.wait_until_over(number)
         self.assertEqual(bytes(done.arrived), bytes([1, 17]), done.message)
 
-    def test_3_an_unknown_layout_is_refused_with_a_list_of_those_that_exist(self) -> None:
-        client = actionlib.SimpleActionClient("/DroneManager/layout", LayoutAction)
-        self.assertTrue(client.wait_for_server(rospy.Duration(60)), "no action server")
-        client.send_goal_and_wait(LayoutGoal(77, False))
-        self.assertEqual(client.get_state(), GoalStatus.ABORTED)
-        self.assertIn("unknown case 77", client.get_result().message)
-
     def test_4_a_restarted_manager_goes_on_and_a_withdrawn_layout_ends(self) -> None:
         self.mesh.switch(17, False)
         number = self.order(100)
