@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import logging
 import math
+from dataclasses import dataclass
 
 from drone_mesh.communication.control.places import PlaceRequests
 from drone_mesh.communication.interfaces import NO_ROUTE
@@ -122,25 +123,19 @@ class Swallowing:
         self._unanswered = 0
 
 
+@dataclass(eq=False)
 class RelayCheck:
     """The checks of one router. If packets are swallowed, it finds a detour for heartbeats."""
 
-    def __init__(
-        self,
-        node_id: int,
-        is_needed: bool,
-        check_period_s: float,
-        deadlines: Deadlines,
-        requests: PlaceRequests,
-        detours: Detours,
-    ) -> None:
-        """`is_needed`: the mesh has a key, and its technique takes shortcuts."""
-        self._node_id = node_id
-        self._is_needed = is_needed
-        self._deadlines = deadlines
-        self._requests = requests
-        self._detours = detours
-        self.swallowing = Swallowing(check_period_s)
+    _node_id: int
+    _is_needed: bool  # the mesh has a key, and its technique takes shortcuts
+    _check_period_s: float
+    _deadlines: Deadlines
+    _requests: PlaceRequests
+    _detours: Detours
+
+    def __post_init__(self) -> None:
+        self.swallowing = Swallowing(self._check_period_s)
         self._detour = NO_ROUTE
 
     def run(self, gateway: int, next_hop: int, hops: int, heartbeat_s: float) -> bool:

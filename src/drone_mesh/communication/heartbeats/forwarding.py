@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Hashable, Sequence
 
 from drone_mesh.communication.events.complaints import Complaints
@@ -17,27 +18,21 @@ _HEARTBEAT = int(MessageType.HEARTBEAT)
 CREATORS_TOLD = 8  # MISSING to one creator of users' data, per limits.LIMIT_PERIOD_S
 
 
+@dataclass(eq=False)
 class Forwarding:
     """Sends packets of other nodes to their next hop. Called only by the node's component."""
 
-    def __init__(
-        self,
-        node_id: int,
-        routing: IRoutingTechnique,
-        delivery: Delivery,
-        medium: Medium,
-        complaints: Complaints,
-        report: Reporter,
-    ) -> None:
-        self._node_id = node_id
-        self._routing = routing
-        self._floods = routing.FLOODS
-        self._delivery = delivery
-        self._searches = medium.shared
-        self._complaints = complaints
-        self._report = report
+    _node_id: int
+    _routing: IRoutingTechnique
+    _delivery: Delivery
+    _medium: Medium
+    _complaints: Complaints
+    _report: Reporter
+
+    def __post_init__(self) -> None:
+        self._floods = self._routing.FLOODS
         self._told = RateLimit(CREATORS_TOLD)
-        self._circulates_s = medium.stretched(CIRCULATION_S)
+        self._circulates_s = self._medium.stretched(CIRCULATION_S)
         self._circulation = CirculationGuard(self._circulates_s)
 
     def forward(
@@ -143,7 +138,7 @@ class Forwarding:
         if kind != MessageType.MOVE_TO_LOCATION:
             return
         reason = f"no route to drone {forward}"
-        if self._searches:
+        if self._medium.shared:
             self._complaints.counts[reason] += 1  # its gateway looks for the drone
         else:
             self._complaints.add(reason, "an order for it ends here", now_s)

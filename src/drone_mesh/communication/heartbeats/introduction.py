@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import random
+from dataclasses import dataclass
 from typing import Protocol
 
 from drone_mesh.communication.control.node_part import due
@@ -35,34 +36,26 @@ class IIntroduced(Protocol):
     def send_heartbeat(self, other: int) -> bool: ...
 
 
+@dataclass(eq=False)
 class Introduction:
     """Broadcasts the PRESENT of one node, at once or later, and makes its heartbeats."""
 
-    def __init__(
-        self,
-        node_id: int,
-        plane: IIntroduced,
-        technique: IRoutingTechnique,
-        antenna: IWirelessCommunication,
-        seals: IMeshSeals,
-        deadlines: Deadlines,
-        check_period_s: float,
-        frame: CommonFrame,
-        rng: random.Random,
-    ) -> None:
-        self._node_id = node_id
-        self._plane = plane
-        self._technique = technique
+    _node_id: int
+    _plane: IIntroduced
+    _technique: IRoutingTechnique
+    _antenna: IWirelessCommunication
+    _seals: IMeshSeals
+    _deadlines: Deadlines
+    _check_period_s: float
+    _frame: CommonFrame
+    _rng: random.Random
+
+    def __post_init__(self) -> None:
         self._room = {
-            kind: messages.EXTENSION_ROOM[kind] - seals.reserved_bytes(kind)
+            kind: messages.EXTENSION_ROOM[kind] - self._seals.reserved_bytes(kind)
             for kind in (_PRESENT, _HEARTBEAT)
         }
-        self._antenna = antenna
-        self._deadlines = deadlines
-        self._check_period_s = check_period_s
-        self._frame = frame
-        self._rng = rng
-        self._medium = antenna.medium
+        self._medium = self._antenna.medium
         self._search_again_s = self._medium.search_s if self._medium.shared else math.inf
         self._is_answer = False  # the planned one answers a node that needs a gateway
 

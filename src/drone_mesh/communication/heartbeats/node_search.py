@@ -10,6 +10,7 @@ for unknown nodes").
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Callable
 
 from drone_mesh.communication.control.control_plane import NUMBERS_PER_S, SEARCH_AGAIN_S
@@ -26,24 +27,18 @@ FIRST_PAUSE_S = 1.0  # a search passes through 100 nodes within half a second
 LONGEST_PAUSE_S = 60.0  # a search in vain doubles the pause, up to this
 
 
+@dataclass(eq=False)
 class NodeSearch:
     """Searches of one node, and its part in others' searches. Called only by its component."""
 
-    def __init__(
-        self,
-        node_id: int,
-        antenna: IWirelessCommunication,
-        deadlines: Deadlines,
-        complaints: Complaints,
-        answer: Callable[[int], bool],
-    ) -> None:
-        """`answer` sends a heartbeat to the gateway that searches for this node."""
-        self._node_id = node_id
-        self._antenna = antenna
-        self._medium = antenna.medium
-        self._deadlines = deadlines
-        self._complaints = complaints
-        self._answer = answer
+    _node_id: int
+    _antenna: IWirelessCommunication
+    _deadlines: Deadlines
+    _complaints: Complaints
+    _answer: Callable[[int], bool]  # sends a heartbeat to the gateway that searches for this node
+
+    def __post_init__(self) -> None:
+        self._medium = self._antenna.medium
         self._searched_s = -math.inf
         self._pauses_s: dict[int, tuple[float, float]] = {}  # by node: until when, and the next one
         self._seen_s: dict[tuple[int, int, int], float] = {}  # creator, node, number

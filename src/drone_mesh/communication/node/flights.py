@@ -67,8 +67,9 @@ class RouterFlights(Flights):
                 heard = self._neighbours.place_of(neighbour)
                 if heard is not None and heard.place.distance_m(goal) >= self._repair.range_m:
                     self._control.neighbour_leaves(neighbour)
+        is_short = self._is_short()
         self._neighbours.takes_off(by_order=True)
-        if not self._is_short():
+        if not is_short:
             self._repair.on_ordered_flight()
 
     def _is_short(self) -> bool:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import random
+from dataclasses import dataclass
 
 from drone_mesh.communication.control.control_plane import IControlPlane
 from drone_mesh.communication.control.node_part import due
@@ -21,28 +22,18 @@ OFF_S = 30.0  # the antenna of a node that gives way is off for 1 to 2 times thi
 INTRODUCTIONS = 3  # in OFF_S, so that the other one hears one each time it comes back
 
 
+@dataclass(eq=False)
 class OwnId:
     """Another radio with the id of one node. Belongs to the component's thread."""
 
-    def __init__(
-        self,
-        control: IControlPlane,
-        antenna: IWirelessCommunication,
-        deadlines: Deadlines,
-        complaints: Complaints,
-        rng: random.Random,
-        new_for_s: float,
-    ) -> None:
-        """`rng` spreads the time off, so that two nodes that gave way do not return together.
+    _control: IControlPlane
+    _antenna: IWirelessCommunication
+    _deadlines: Deadlines
+    _complaints: Complaints
+    _rng: random.Random  # spreads the time off: two that gave way do not return together
+    _new_for_s: float  # it gives way until it has been connected for longer than this
 
-        A node gives way until it has been connected for longer than `new_for_s`.
-        """
-        self._control = control
-        self._antenna = antenna
-        self._deadlines = deadlines
-        self._complaints = complaints
-        self._rng = rng
-        self._new_for_s = new_for_s
+    def __post_init__(self) -> None:
         self._connected_s = math.inf  # when the node was first connected, since it last gave way
         self._heard_s = -math.inf
         self._introductions = RateLimit(INTRODUCTIONS, OFF_S)

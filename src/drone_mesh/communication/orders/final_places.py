@@ -79,8 +79,9 @@ class FinalPlaces:
             if place is not None and (known is None or since_s >= known.since_s):
                 places[drone] = _Place(since_s, place)
 
-        note(self._node_id, self._deadlines.now_s, self._pilot.place())
-        for node, heard in self._neighbours.places().items():
+        here, others = self._pilot.place(), self._neighbours.places()
+        note(self._node_id, self._deadlines.now_s, here)
+        for node, heard in others.items():
             note(node, heard.heard_s, heard.place)
         for reported in reports:
             note(reported.node_id, reported.heard_s, reported.report.place)

@@ -109,7 +109,6 @@ class ChildTableTree(IRoutingTechnique):
         self.other_can_communicate_with_node(other, node)
 
     def get_table_size(self) -> int:
-        """Children and all their grandchildren; a node under two children counts twice."""
         return len(self._children) + self._entries
 
     def get_set_of_children(self) -> frozenset[int]:

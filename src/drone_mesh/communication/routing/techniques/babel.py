@@ -50,7 +50,6 @@ class Babel(GatewayRoutes):
         super().maintain_routing()
 
     def learn(self, creator: int, from_: int, kind: int, payload: bytes) -> bool:
-        """A PRESENT carries the updates of its creator."""
         if kind == MessageType.PRESENT:
             extension = messages.extension(payload)
             for at in range(0, len(extension) - UPDATE.size + 1, UPDATE.size):
@@ -60,7 +59,6 @@ class Babel(GatewayRoutes):
         return super().learn(creator, from_, kind, payload)
 
     def extension(self, kind: int, room: int) -> bytes:
-        """The updates that fit into a PRESENT."""
         if kind != MessageType.PRESENT:
             return b""
         me, packed = self._essentials.get_node_id(), []
@@ -83,7 +81,6 @@ class Babel(GatewayRoutes):
         return min(costs, key=lambda n: (costs[n], n)) if costs else NO_ROUTE
 
     def forget_neighbour(self, neighbour: int) -> None:
-        """Drop its updates; if no other route is left, advertise that soon."""
         for gateway, updates in list(self._updates.items()):
             if updates.pop(neighbour, None) and self.next_hop_to_gateway(gateway) == NO_ROUTE:
                 self._starve(gateway)

@@ -41,7 +41,6 @@ class Dsdv(GatewayRoutes):
         super().maintain_routing()
 
     def learn(self, creator: int, from_: int, kind: int, payload: bytes) -> bool:
-        """A PRESENT carries the entries of its creator."""
         if kind == MessageType.PRESENT:
             extension = messages.extension(payload)
             for at in range(0, len(extension) - ENTRY.size + 1, ENTRY.size):
@@ -62,12 +61,10 @@ class Dsdv(GatewayRoutes):
         return b"".join(packed[: room // ENTRY.size])
 
     def next_hop_to_gateway(self, gateway: int) -> int:
-        """The next hop of the entry, unless it is broken."""
         entry = self._vectors.get(gateway)
         return NO_ROUTE if entry is None or entry.hops == INFINITE_HOPS else entry.next_hop
 
     def forget_neighbour(self, neighbour: int) -> None:
-        """Mark routes through it as broken, and advertise that soon."""
         for gateway, entry in self._vectors.items():
             if entry.next_hop == neighbour and entry.hops != INFINITE_HOPS:
                 self._break(gateway, entry)

@@ -45,7 +45,6 @@ class EtxTree(GatewayRoutes):
         return super().learn(creator, from_, kind, payload)
 
     def extension(self, kind: int, room: int) -> bytes:
-        """The node's own rank, for PRESENT."""
         if kind != MessageType.PRESENT:
             return b""
         gateway = self._essentials.get_preferred_gateway()
