@@ -23,7 +23,6 @@ class OwnGateway(GatewayConnection):
         self.gateway, self.hops = self._node_id, 0
 
     def next_hop(self) -> int:
-        """Itself."""
         return self._node_id
 
     def on_present(self, neighbour: int, hops: int, know_gateway: bool) -> bool:
@@ -61,7 +60,6 @@ class GatewayHeartbeats(HeartbeatPlane):
 
     @receives(MessageType.HEARTBEAT)
     def on_heartbeat(self, payload: bytes, creator: int, from_: int) -> None:
-        """A heartbeat for this node."""
         _know_gateway, preferred_gateway, hops = messages.heartbeat_body(payload)
         self._host.on_node_heard(creator, hops + 1)
         self._search.found(creator)

@@ -109,7 +109,6 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
 
     @property
     def parts(self) -> Sequence[object]:
-        """Itself and its parts that handle packets and timers."""
         return self, self._introduction, self._search
 
     # Time and surroundings -------------------------------------------------------------------
@@ -148,11 +147,9 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         self._technique.on_time(self._deadlines.now_s)
 
     def on_power(self, on: bool) -> None:
-        """Introduce the node soon after the antenna is switched on."""
         self._introduction.on_power(on)
 
     def on_registered(self) -> None:
-        """Introduce the node soon."""
         if self._antenna.on():
             self._introduction.on_registered()
 
@@ -187,7 +184,6 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         self._connection.end(event)
 
     def give_up_routes(self) -> None:
-        """Forget every route to the gateway and inform the neighbours."""
         if self.gateway != NO_ROUTE:
             self._delivery.gateway_lost(self.gateway)
 
@@ -275,12 +271,10 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         self._delivery.delivered(neighbour, tries)
 
     def on_undelivered(self, payload: bytes, tries: int) -> None:
-        """Send the packet over another route, if there is one; the routes learn from this."""
         if not self._delivery.undelivered(payload, tries):
             self._forwarding.stranded(payload, self._deadlines.now_s)
 
     def search(self, node: int) -> bool:
-        """Ask all nodes for `node`, which answers with a heartbeat."""
         return self._search.search(node)
 
     # For the delivery: see IWayFinder --------------------------------------------------------

@@ -21,7 +21,6 @@ class QueuedDelivery(Delivery):
         self._gave_up: set[int] = set()  # neighbours that were heard but took no packets
 
     def _transmit(self, payload: bytes, to: int, failures: int, came_from: int) -> bool:
-        """Have the antenna queue a packet; it reports the outcome later."""
         taken = self._antenna.send_message_to(payload)
         self.total_sent += taken
         return taken
@@ -74,5 +73,4 @@ class QueuedDelivery(Delivery):
         self.send(packet.to_payload(), neighbour)
 
     def neighbour_leaves(self, neighbour: int) -> None:
-        """Look for other routes."""
         self.neighbour_lost(neighbour)

@@ -282,7 +282,6 @@ class MeshnetworkComponent(NodeSnapshots, IMeshNetwork, IControlHost):
             self._antenna_is_off()
 
     def on_antenna_registered(self, now_s: float) -> None:
-        """The medium is back: introduce the node soon, each node at a different moment."""
         self._deadlines.now_s = now_s
         self.control.on_registered()
 

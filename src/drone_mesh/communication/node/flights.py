@@ -88,7 +88,6 @@ class RouterFlights(Flights):
 
     @due(Due.ASK_POSITION)
     def watch(self) -> None:
-        """Look where the drone is, in flight."""
         if not self._pilot.watch():
             self._repair.on_flight_second()
         elif self._repair.on_arrived():

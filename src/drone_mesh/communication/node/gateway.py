@@ -83,7 +83,6 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         self._internet.connect(self)
 
     def stop(self) -> None:
-        """Stop the internet connection, the antenna and debugging."""
         self._internet.disconnect()
         super().stop()
 

@@ -35,7 +35,6 @@ class EtxTree(GatewayRoutes):
         self._parents: dict[int, int] = {}  # by gateway
 
     def learn(self, creator: int, from_: int, kind: int, payload: bytes) -> bool:
-        """A PRESENT carries the rank of its creator."""
         if kind == MessageType.PRESENT:
             gateway, rank = ADVERTISEMENT.unpack_from(messages.extension(payload))
             if rank:

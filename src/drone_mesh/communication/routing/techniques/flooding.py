@@ -81,7 +81,6 @@ class Flooding(ChildTableTree):
         """Nothing to do: there are no routes to prove."""
 
     def other_can_communicate_with_node(self, other: int, node: int) -> None:
-        """Nothing to do: only neighbours matter."""
         self.can_communicate_with_node(other)
 
     def gateway_lost(self, gateway: int) -> bool:
