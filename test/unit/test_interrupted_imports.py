@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from drone_mesh.stopping import INTERRUPTED, ends_as, run_with_extra
+from drone_mesh.stopping import INTERRUPTED, run_with_extra
 
 ROOT = Path(__file__).resolve().parents[2]
 # Python runs this module, if it is found, before each program.
@@ -55,17 +55,19 @@ def test_ctrl_c_while_the_packages_of_an_extra_load_ends_the_program_at_once() -
 
 
 def test_after_its_imports_a_program_handles_ctrl_c_itself() -> None:
-    @ends_as("tool")
-    def main() -> int:
-        os.kill(os.getpid(), signal.SIGINT)
-        return 0
+    program = """
+import os, signal, sys
+from drone_mesh.stopping import ends_as
 
-    before = signal.signal(signal.SIGINT, signal.SIG_DFL)  # as during the imports
-    try:
-        if os.fork() == 0:
-            os._exit(main())
-        _pid, status = os.wait()
-    finally:
-        signal.signal(signal.SIGINT, before)
-    assert os.WIFEXITED(status)
-    assert os.WEXITSTATUS(status) == INTERRUPTED
+signal.signal(signal.SIGINT, signal.SIG_DFL)  # as during the imports
+
+@ends_as("tool")
+def main():
+    os.kill(os.getpid(), signal.SIGINT)
+    return 0
+
+sys.exit(main())
+"""
+    environment = {**os.environ, "PYTHONPATH": str(ROOT / "src")}
+    ended = subprocess.run([sys.executable, "-c", program], env=environment, check=False)
+    assert ended.returncode == INTERRUPTED

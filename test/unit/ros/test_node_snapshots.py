@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import threading
 
 import pytest
@@ -48,10 +47,10 @@ def test_a_state_that_was_taken_does_not_change(worker, component):
     snapshots = NodeSnapshots(wait_s=60.0)
     snapshots.add(component, worker, lambda: NodeStatus(1), lambda: True)
     (state,) = snapshots.collect()
-    before = copy.deepcopy(state)
+    before = repr(state)  # NaN, an unknown battery, is not equal to itself
     component.on_antenna_power(False, 20.0)
     (later,) = snapshots.collect()
-    assert state == before
+    assert repr(state) == before
     assert not later.connected
 
 
