@@ -2,7 +2,7 @@
 
 import difflib
 import re
-from typing import Any, ClassVar, Dict, FrozenSet, List, NamedTuple, Optional, Tuple
+from typing import Any, ClassVar, Dict, FrozenSet, List, NamedTuple, Optional
 
 from pydantic import (
     AfterValidator,
@@ -261,11 +261,6 @@ class Wind(Part):
 class Fault(Part):
     """One event in the network, at a time or when a condition holds."""
 
-    ACTIONS: ClassVar[Tuple[str, ...]] = (
-        "kill", "revive", "mute", "deaf", "cut_link", "jam", "gateway_off", "loss", "battery",
-        "churn", "order", "layouts", "send", "load", "wind",
-    )  # fmt: skip
-
     at_s: Optional[AtLeast0] = None
     when: Optional[str] = None
     kill: Optional[Pick] = None
@@ -293,17 +288,21 @@ class Fault(Part):
 
     @model_validator(mode="after")
     def _has_one_action_and_one_start(self) -> "Fault":
-        actions = [name for name in self.ACTIONS if getattr(self, name) is not None]
-        if len(actions) != 1:
-            raise ValueError(f"a fault is exactly one of {', '.join(self.ACTIONS)}")
+        if len(self._given) != 1:
+            actions = [name for name in type(self).model_fields if name not in ("at_s", "when")]
+            raise ValueError(f"a fault is exactly one of {', '.join(actions)}")
         if (self.at_s is None) == (self.when is None):
             raise ValueError("a fault needs either at_s or when")
         return self
 
     @property
     def action(self) -> str:
-        """The name of its action, one of ACTIONS."""
-        return next(name for name in self.ACTIONS if getattr(self, name) is not None)
+        """The name of its action."""
+        return self._given[0]
+
+    @property
+    def _given(self) -> List[str]:
+        return [name for name, value in self if value is not None and name not in ("at_s", "when")]
 
     @property
     def what(self) -> Any:
