@@ -26,7 +26,7 @@ def still_where_they_were(network, before):
 
 
 @pytest.mark.parametrize(("routers", "gridsize"), GRIDS)
-@pytest.mark.parametrize("gone_s", [35.0, 60.0, 120.0, 600.0])
+@pytest.mark.parametrize("gone_s", [35.0, 120.0, 600.0])
 @pytest.mark.parametrize("registered", [True, False], ids=["simulator", "jammer"])
 def test_after_a_blackout_all_are_connected_and_no_drone_stands_on_another(
     routers, gridsize, gone_s, registered
@@ -52,7 +52,7 @@ def test_after_a_blackout_all_are_connected_and_no_drone_stands_on_another(
 
 
 @pytest.mark.parametrize(("routers", "gridsize"), GRIDS)
-@pytest.mark.parametrize("gone_s", [45.0, 120.0, 300.0, 600.0])
+@pytest.mark.parametrize("gone_s", [45.0, 120.0, 600.0])
 def test_while_the_gateway_is_off_at_most_one_drone_a_minute_flies_and_none_stands_on_another(
     routers, gridsize, gone_s
 ):

@@ -87,19 +87,6 @@ def test_a_partition_is_noticed_and_mended_links_are_found_again():
     assert network.all_connected()
 
 
-def test_a_node_that_is_switched_on_again_rejoins():
-    network = line(3)
-    network.run_for(20.0)
-    network.power(2, False)
-    network.run_for(8.0)
-    assert not network.connected(2)
-    network.power(2, True)
-    assert network.run_until(network.all_connected, within_s=20.0)
-    network.run_for(10.0)
-    assert_hops_are_paths(network)
-    assert flown(network) == set()
-
-
 def test_all_nodes_learn_that_a_node_is_missing_and_that_it_is_back():
     network = line(4)
     network.run_for(20.0)

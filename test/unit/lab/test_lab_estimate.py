@@ -94,12 +94,6 @@ def test_every_cell_has_a_trial_even_without_any_time_for_it(
     assert clock.now_s < (len(plan.cells) + 1) * guess.run_s / 2
 
 
-def test_a_long_run_is_extrapolated_by_its_second_half() -> None:
-    samples = [(0.0, 0.0), (1.0, 5.0), (2.0, 6.0), (3.0, 7.0), (4.0, 8.0)]
-    assert estimating._extrapolated(samples, 10.0) == 8.0 + 6 * 1.0
-    assert estimating._extrapolated(samples[:2], 10.0) == 50.0
-
-
 def test_a_cell_with_few_trials_weighs_as_much_as_the_others(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
