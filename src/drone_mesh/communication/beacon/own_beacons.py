@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from dataclasses import dataclass
 from typing import Callable
 
 from drone_mesh.communication.beacon.packets import NOT_LISTED, Beacon, Below, Motion, ids_that_fit
@@ -169,20 +170,18 @@ DIGEST_EVERY = 4  # beacons: one of so many carries the digest of the origin
 SEALED_ROOM = 20  # bytes of a beacon with a seal
 
 
+@dataclass(eq=False)
 class OwnBeacons:
     """Composes the beacons of one node: what does not fit one takes turns."""
 
-    def __init__(
-        self,
-        seals: IMeshSeals,
-        frame: CommonFrame,
-        routes: BeaconRoutes,
-        below: NodesBelow,
-        step_m: float,
-    ) -> None:
-        """A node within `step_m` of where it is expected is there, and so is a gateway."""
-        self._frame, self._routes, self._below, self._step_m = frame, routes, below, step_m
-        self.room = messages.BODY_BYTES - seals.reserved_bytes(MessageType.BEACON)
+    _seals: IMeshSeals
+    _frame: CommonFrame
+    _routes: BeaconRoutes
+    _below: NodesBelow
+    _step_m: float  # a node so near to where it is expected is there, and so is a gateway
+
+    def __post_init__(self) -> None:
+        self.room = messages.BODY_BYTES - self._seals.reserved_bytes(MessageType.BEACON)
         self.asks = True  # whether the next one asks for those of the neighbours
         self._told_place: Location | None = None  # what this node's beacons have said
         self._sent = 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import dataclass
 from typing import Callable, Iterator
 
 from drone_mesh.communication.beacon.courier import DROP, HOLD, Transit
@@ -25,16 +26,17 @@ GAP_HOPS = 400  # between two searches; each takes time on the air for every nod
 Broadcast = Callable[[int, int, bytes], None]
 
 
+@dataclass(eq=False)
 class Searches:
     """The searches of one node, and its part in those of others."""
 
-    def __init__(
-        self, node_id: int, routes: BeaconRoutes, broadcast: Broadcast, hop_s: float
-    ) -> None:
-        self._node_id = node_id
-        self._routes = routes
-        self._broadcast = broadcast
-        self._gap_s = GAP_HOPS * hop_s
+    _node_id: int
+    _routes: BeaconRoutes
+    _broadcast: Broadcast
+    _hop_s: float
+
+    def __post_init__(self) -> None:
+        self._gap_s = GAP_HOPS * self._hop_s
         self._free_s = -math.inf  # when the last search that was heard or sent is over
         self._number = 0
         self._searched: dict[int, tuple[float, int]] = {}  # by node: when, how often in vain

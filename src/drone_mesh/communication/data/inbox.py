@@ -48,13 +48,14 @@ class _Partial:
     has: int = 0  # the fragments that have arrived, as bits
 
 
+@dataclass(eq=False)
 class Reassembly:
     """Reassembles the messages of one sender. Memory: MOST_PARTIAL messages at most."""
 
-    def __init__(self, room: int, open_message: Open) -> None:
-        """`room`: bytes of a body."""
-        self._room = room
-        self._open = open_message
+    _room: int  # bytes of a body
+    _open: Open
+
+    def __post_init__(self) -> None:
         self._partial: OrderedDict[int, _Partial] = OrderedDict()  # by number, oldest first
         self._done: OrderedDict[int, _Done] = OrderedDict()  # the latest complete ones, by number
         self._heard_s = -math.inf
@@ -175,28 +176,24 @@ class Reassembly:
                 del self._partial[number]
 
 
+@dataclass(eq=False)
 class Inbox:
     """Reassembles the messages of one sender, and decides what to acknowledge and when."""
 
-    def __init__(
-        self,
-        room: int,
-        acknowledge: Callable[[Ack], None] | None,
-        open_message: Open,
-        medium: Medium,
-    ) -> None:
-        """`acknowledge` sends an ACK to the sender; None: its messages are to all, with numbers of
-        their own, and get no ACK. `room`: bytes of a body.
-        """
-        self._ack_delay_s = medium.stretched(ACK_DELAY_S)
-        self._ack_within_s = medium.stretched(ACK_LATEST_S)
-        self._repeat_s = medium.stretched(REPEAT_S)
-        self._room = room
-        self._open = open_message
-        self._acknowledge = acknowledge
+    _room: int  # bytes of a body
+    # Sends an ACK to the sender; None: its messages are to all, with numbers of their own, and get
+    # no ACK.
+    _acknowledge: Callable[[Ack], None] | None
+    _open: Open
+    _medium: Medium
+
+    def __post_init__(self) -> None:
+        self._ack_delay_s = self._medium.stretched(ACK_DELAY_S)
+        self._ack_within_s = self._medium.stretched(ACK_LATEST_S)
+        self._repeat_s = self._medium.stretched(REPEAT_S)
         self._session = -1
         self._former = (-1, -math.inf)  # the session before, and when it ended
-        self._reassembly = Reassembly(room, open_message)
+        self._reassembly = Reassembly(self._room, self._open)
         self._ports: OrderedDict[tuple[int, bool], PortOrder] = OrderedDict()
         self._unacknowledged = 0  # fragments of complete messages
         self._complete = 0  # number of the latest complete reliable message

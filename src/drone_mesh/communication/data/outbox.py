@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from dataclasses import dataclass
 from typing import Callable, Iterator
 
 from drone_mesh.communication.data import packets
@@ -30,28 +31,21 @@ from drone_mesh.communication.data.packets import COMPLETE, NO_ANSWER, Ack, Poll
 MOST_DOUBLED = 6  # with a search of half a second, to about half a minute
 
 
+@dataclass(eq=False)
 class Outbox:
     """The messages from one node to one destination, in the order of submission."""
 
-    def __init__(
-        self,
-        to: int,
-        session: int,
-        room: int,
-        ended: Callable[[TicketState], None],
-        seal: Seal,
-        hint: Callable[[], str],
-    ) -> None:
-        """`room`: bytes of a body; `ended` is called with the last state of each message.
+    to: int
+    _session: int
+    _room: int  # bytes of a body
+    _ended: Callable[[TicketState], None]  # called with the last state of each message
+    _seal: Seal
+    _hint: Callable[[], str]  # a possible reason why messages do not arrive
 
-        `hint` returns a possible reason why messages do not arrive.
-        """
-        self.to = to
-        self._ended = ended
-        self._hint = hint
+    def __post_init__(self) -> None:
         self.waiting: deque[OutgoingMessage] = deque()  # for their first fragment to leave
         self._open: dict[int, OutgoingMessage] = {}  # under way, by number, oldest first
-        self._fragmentation = Fragmentation(session, room, seal, self._open)
+        self._fragmentation = Fragmentation(self._session, self._room, self._seal, self._open)
         self._window = CongestionWindow()
         self._round_trip = RoundTrip()
         self._train: Train | None = None  # if there are relays

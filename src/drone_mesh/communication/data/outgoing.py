@@ -104,17 +104,16 @@ class DataPacket(NamedTuple):
     ends_train: bool = False
 
 
+@dataclass(eq=False)
 class Fragmentation:
     """Numbers the messages to one destination, and cuts them into fragments."""
 
-    def __init__(
-        self, session: int, room: int, seal: Seal, open_messages: Mapping[int, OutgoingMessage]
-    ) -> None:
-        """`open_messages`: those under way by number, oldest first; the outbox keeps them."""
-        self.session = session
-        self._room = room
-        self._seal = seal
-        self._open = open_messages
+    session: int
+    _room: int
+    _seal: Seal
+    _open: Mapping[int, OutgoingMessage]  # under way, by number, oldest first: of the outbox
+
+    def __post_init__(self) -> None:
         self._number = 0  # of the next message
         self._orders: dict[tuple[int, bool], int] = {}  # next place, by port and reliability
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hmac
 import random
+from dataclasses import dataclass
 from typing import Callable, NamedTuple
 
 from drone_mesh.communication.control.control_plane import IControlPlane
@@ -84,39 +85,26 @@ class DataFigures(NamedTuple):
     received_s: float = 0.0
 
 
+@dataclass(eq=False)
 class Transport:
     """Sends and receives the messages of one node. Belongs to the component's thread."""
 
-    def __init__(
-        self,
-        node_id: int,
-        control: IControlPlane,
-        antenna: IWirelessCommunication,
-        seals: IMeshSeals,
-        deadlines: Deadlines,
-        complaints: Complaints,
-        rng: random.Random,
-    ) -> None:
-        """`rng` draws the number of the session, with the first message."""
+    _node_id: int
+    _control: IControlPlane
+    _antenna: IWirelessCommunication
+    _seals: IMeshSeals
+    _deadlines: Deadlines
+    _complaints: Complaints
+    _rng: random.Random  # draws the number of the session, with the first message
+
+    def __post_init__(self) -> None:
+        node_id, antenna = self._node_id, self._antenna
+        seals, deadlines = self._seals, self._deadlines
         room = messages.BODY_BYTES - seals.reserved_bytes(packets.FRAGMENTS.start)
         assert room >= packets.LEAST_ROOM, "a seal leaves too little room for users' data"
-        self._node_id = node_id
-        self._control = control
-        self._seals = seals
-        self._deadlines = deadlines
-        self._complaints = complaints
+        own = (self._send_packet, self._to_self, self._ended, self.hint)
         self._outboxes = Outboxes(
-            node_id,
-            control,
-            antenna,
-            seals,
-            deadlines,
-            rng,
-            room,
-            self._send_packet,
-            self._to_self,
-            self._ended,
-            self.hint,
+            node_id, self._control, antenna, seals, deadlines, self._rng, room, *own
         )
         self._inboxes = Inboxes(
             node_id, antenna, seals, deadlines, room, self._send_packet, self._arrived
