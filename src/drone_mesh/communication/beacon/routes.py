@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from dataclasses import dataclass
 from operator import attrgetter, itemgetter
 from typing import Callable, Iterator, NamedTuple, Tuple
 
@@ -57,32 +58,24 @@ class Way(NamedTuple):
     shown_s: float
 
 
+@dataclass(eq=False)
 class BeaconRoutes(IRoutes):
     """All that one node knows about the others. Belongs to its component's thread."""
 
-    def __init__(
-        self,
-        node_id: int,
-        is_gateway: bool,
-        range_m: float,
-        place_of: Callable[[int], HeardPlace | None],
-        shared: bool,
-        clock: Deadlines,
-        may_be_gateway: Callable[[int], bool] = lambda _node: True,
-    ) -> None:
-        """`place_of`: where a node was seen last; `shared`: whether the channel is.
+    _node_id: int
+    _is_gateway: bool
+    _range_m: float
+    _place_of: Callable[[int], HeardPlace | None]  # where a node was seen last
+    shared: bool  # whether the channel is
+    clock: Deadlines
+    _may_be_gateway: Callable[[int], bool] = lambda _node: True  # as for IMeshSeals
 
-        `may_be_gateway`: as for IMeshSeals.
-        """
-        self._node_id = node_id
-        self._may_be_gateway = may_be_gateway
+    def __post_init__(self) -> None:
         self.tried: Counter[int] = Counter()  # by gateway: heartbeats before its first proof
-        self._is_gateway = is_gateway
-        self._has_internet = is_gateway
-        self._range_m = range_m
+        self._has_internet = self._is_gateway
         self.neighbours: dict[int, Neighbour] = {}
-        self.gateway = node_id if is_gateway else NO_ROUTE
-        self.hops = 0 if is_gateway else NO_ROUTE
+        self.gateway = self._node_id if self._is_gateway else NO_ROUTE
+        self.hops = 0 if self._is_gateway else NO_ROUTE
         self.parent = NO_ROUTE
         self.ancestors = NO_ANCESTORS
         self.number = 0
@@ -98,10 +91,7 @@ class BeaconRoutes(IRoutes):
         # By gateway: the number on which the parent said that it has no internet, and when.
         self._offline: dict[int, tuple[int, float]] = {}
         self._hints: dict[int, tuple[int, float]] = {}  # by node: a neighbour that led to it, when
-        self._place_of = place_of
-        self._shared = shared
-        self.clock = clock
-        self._losses = Losses(range_m)
+        self._losses = Losses(self._range_m)
 
     @property
     def now_s(self) -> float:
@@ -215,7 +205,7 @@ class BeaconRoutes(IRoutes):
         was_deaf = neighbour.deaf
         neighbour.refuses(now_s)
         is_due = now_s - neighbour.alive_s <= DUE * neighbour.beacon.interval_s
-        if not self._shared or not is_due or neighbour.doubted_s > neighbour.alive_s:
+        if not self.shared or not is_due or neighbour.doubted_s > neighbour.alive_s:
             neighbour.failed_s = now_s
         neighbour.doubted_s = now_s
         return neighbour.deaf and not was_deaf

@@ -12,6 +12,7 @@ import hashlib
 import random
 import struct
 from collections import deque
+from dataclasses import dataclass, field
 from hmac import compare_digest
 from typing import Callable, NamedTuple
 
@@ -102,12 +103,12 @@ def reserved_bytes(kind: int) -> int:
     return SEAL_BYTES
 
 
+@dataclass(eq=False)
 class _Nonce:
     """A nonce that this node announced, and the sequence numbers received for it."""
 
-    def __init__(self, value: int) -> None:
-        self.value = value
-        self.windows: dict[int, ReplayWindow] = {}  # by creator
+    value: int
+    windows: dict[int, ReplayWindow] = field(default_factory=dict)  # by creator
 
 
 class _Sealed(NamedTuple):
@@ -131,15 +132,16 @@ class Expired(NotProven):
     """A proven packet for a nonce that was valid a moment ago: it waited for a busy channel."""
 
 
+@dataclass(eq=False)
 class EndToEnd:
     """Seals the packets that one node creates, and checks those for it. Component's thread only."""
 
-    def __init__(self, node_id: int, keys: Keys, rng: random.Random) -> None:
-        """`rng` draws the nonces."""
-        self._node_id = node_id
-        self._keys = keys
-        self._rng = rng
-        self._nonces = deque([_Nonce(rng.getrandbits(32))], maxlen=NONCES)
+    _node_id: int
+    _keys: Keys
+    _rng: random.Random  # draws the nonces
+
+    def __post_init__(self) -> None:
+        self._nonces = deque([_Nonce(self._rng.getrandbits(32))], maxlen=NONCES)
         self._expired: deque[int] = deque(maxlen=EXPIRED)
         self._changed_s = 0.0
         self._heard: dict[int, int] = {}  # the nonces of others; any node can claim one

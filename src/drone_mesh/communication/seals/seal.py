@@ -16,6 +16,7 @@ import math
 import random
 import struct
 from collections import OrderedDict, deque
+from dataclasses import dataclass
 from hmac import compare_digest
 from typing import NamedTuple
 
@@ -88,14 +89,12 @@ class _Challenge(NamedTuple):
     doubted: bool  # the node was known, so the reason may be a packet of somebody else
 
 
+@dataclass
 class _Asked:
     """When a node may be challenged again."""
 
-    __slots__ = ("doubts", "next_s")
-
-    def __init__(self, next_s: float = -math.inf) -> None:
-        self.next_s = next_s
-        self.doubts = 0  # challenges in a row that its answers showed to be needless
+    next_s: float = -math.inf
+    doubts: int = 0  # challenges in a row that its answers showed to be needless
 
 
 class NotOpened(enum.Enum):
@@ -107,19 +106,18 @@ class NotOpened(enum.Enum):
     REPLAYED = "a packet of long ago"
 
 
+@dataclass(eq=False)
 class HopSeal:
     """Seals and opens the packets of one node. Belongs to its component's thread."""
 
-    def __init__(self, node_id: int, keys: Keys, rng: random.Random, fresh_s: float) -> None:
-        """`rng` draws epochs and nonces: a cryptographic one on real nodes.
+    _node_id: int
+    _keys: Keys
+    _rng: random.Random  # draws epochs and nonces: a cryptographic one on real nodes
+    # A neighbour that was silent for longer is challenged again, so that a packet that an attacker
+    # has held back is worthless after that time.
+    _fresh_s: float
 
-        `fresh_s`: a neighbour that was silent for longer is challenged again, so that a packet that
-        an attacker has held back is worthless after that time.
-        """
-        self._node_id = node_id
-        self._keys = keys
-        self._rng = rng
-        self._fresh_s = fresh_s
+    def __post_init__(self) -> None:
         self._peers: dict[int, _Peer] = {}
         self._challenges: OrderedDict[int, _Challenge] = OrderedDict()  # oldest first
         self._asked: dict[int, _Asked] = {}
@@ -128,7 +126,7 @@ class HopSeal:
         self._all_answers = RateLimit(MOST_ANSWERS, CHALLENGE_AGAIN_S)  # all nodes together: 0
         self._answered: dict[int, deque[int]] = {}  # by node: its nonces that had an answer
         self._epoch = self._count = 0
-        self._state_to_all = _epoch_state(keys.network, 0)
+        self._state_to_all = _epoch_state(self._keys.network, 0)
         self._states: dict[int, hashlib.blake2s] = {}  # by receiver
         self._begin_epoch()
 
