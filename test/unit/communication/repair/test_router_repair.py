@@ -802,23 +802,18 @@ def test_a_gateway_with_an_impossible_place_does_not_break_the_bids():
     assert len(rig.sent(BID)) >= 1
 
 
-def test_a_neighbour_that_does_not_bid_is_waited_for_no_longer_than_a_period():
+@pytest.mark.parametrize(("dies", "after_s"), [(True, TO_DECISION_S), (False, 10.0)])
+def test_a_neighbour_that_does_not_bid_is_waited_for_until_it_dies_or_for_a_period(dies, after_s):
     rig = bidding_rig(3, 4)
     rig.hear(bid(3, 1.0))
-    rig.wait_until(BIDS_S + 9.8)
+    if dies:
+        rig.antenna.dead = {2, 4}
+        rig.mesh.control.send_heartbeat(4)
+    rig.wait_until(BIDS_S + after_s - 0.2)
     assert rig.engine.goals == []
-    rig.wait_until(BIDS_S + 10.0)
+    rig.wait_until(BIDS_S + after_s)
     assert rig.engine.goals == [BESIDE_NEIGHBOUR]
     assert rig.kinds().count("EMERGENCY") == 1
-
-
-def test_a_neighbour_that_dies_in_the_middle_is_not_waited_for():
-    rig = bidding_rig(3, 4)
-    rig.hear(bid(3, 1.0))
-    rig.antenna.dead = {2, 4}
-    rig.mesh.control.send_heartbeat(4)
-    rig.wait(TO_DECISION_S)
-    assert rig.engine.goals == [BESIDE_NEIGHBOUR]
 
 
 def test_a_neighbour_that_dies_while_the_bid_is_sent_is_not_waited_for():
@@ -951,14 +946,6 @@ def test_a_bid_that_one_neighbour_brings_and_another_distorts_is_passed_on_once(
     assert sorted(sent[3] for sent in rig.sent(BID) if sent[0] == 9) == [3, 5]
 
 
-def test_an_emergency_flight_forgets_the_routes_when_it_starts():
-    rig = bidding_rig(3)
-    decide(rig, bid(3, 1.0))
-    assert rig.routing.empty()
-    assert rig.mesh.get_neighbours() == {}
-    assert "FLIGHT_DECIDED" in rig.kinds()
-
-
 def test_a_node_in_flight_does_not_negotiate():
     rig = Rig()
     rig.connect_to_gateway()
@@ -1080,6 +1067,9 @@ def test_the_winner_announces_its_flight_with_its_goal_and_asks_at_once_who_is_t
     goal = "00 00 00 41 cd cc 8c bf"  # BESIDE_NEIGHBOUR
     assert rig.sent(BID) == [packet(f"01 01 07 03 03 28 6b ee 4e 01 00 00 {goal}")]
     assert rig.broadcasts() == [packet(f"01 01 02 fe fe {goal} 01 80")]
+    assert rig.routing.empty()
+    assert rig.mesh.get_neighbours() == {}
+    assert "FLIGHT_DECIDED" in rig.kinds()
 
 
 def test_a_drone_keeps_clear_of_the_goal_of_one_that_took_off_and_was_not_heard_again():
@@ -1577,11 +1567,18 @@ def test_the_last_leg_ends_at_the_goal_and_not_just_before_it():
     assert rig.engine.goals == [BESIDE_GATEWAY]
 
 
-def test_in_flight_it_accepts_no_connection():
+@pytest.mark.parametrize("its_goal_is_taken", [False, True])
+def test_in_flight_it_accepts_a_connection_only_if_it_hears_that_its_goal_is_taken(
+    its_goal_is_taken,
+):
     rig = flying_rig()
     fly(rig, Location(10.0, 0.0, 2.0))
-    rig.hear("00 09 04 01 01 01 00 01")
-    assert not rig.mesh.get_connected_to_gateway()
+    if its_goal_is_taken:
+        rig.hear(NEIGHBOUR_2_AT_0_8)  # 2 lives there after all
+    fly(rig, Location(9.5, 0.0, 2.0))
+    rig.hear("00 02 04 01 01 01 00 01")
+    assert rig.mesh.get_connected_to_gateway() is its_goal_is_taken
+    assert (rig.engine.goals[-1] == Location(9.5, 0.0, 0.0)) is its_goal_is_taken
 
 
 @pytest.mark.parametrize(
@@ -1616,16 +1613,6 @@ def test_with_exact_only_a_drone_that_said_within_five_seconds_where_it_is_takes
     spot = goal_beside([])
     moved_on = goal_beside([(spot.latitude, spot.longitude)])
     assert (moved_on.distance_m(spot) >= 1.0) == keeps_clear
-
-
-def test_if_it_hears_that_its_goal_is_taken_it_stops_where_it_is_connected():
-    rig = flying_rig()
-    fly(rig, Location(10.0, 0.0, 2.0))
-    rig.hear("02 02 01 01 01 00 00 00 41")  # 2 lives there after all
-    fly(rig, Location(9.5, 0.0, 2.0))
-    rig.hear("00 02 04 01 01 01 00 01")
-    assert rig.mesh.get_connected_to_gateway()
-    assert rig.engine.goals[-1] == Location(9.5, 0.0, 0.0)
 
 
 def test_it_stops_where_it_is_connected_if_a_gateway_reached_its_group():
@@ -1711,16 +1698,6 @@ def test_the_flight_ends_although_a_gateway_answers_on_the_ground():
     assert "LANDED" in rig.kinds()
 
 
-def test_a_next_hop_passes_on_where_the_gateway_is():
-    rig = connected_rig()
-    rig.hear("02 02 01 01 01 00 00 00 41 00 00 00 00 00 00 00 00 00 00 0b 00 00 00 00 80 40")
-    assert rig.mesh.places.gateway == Location(4.0, 0.0, 0.0)
-    assert rig.mesh.places.gateway_seen_s == -10.0  # ten seconds ago
-    rig.hear("09 09 02 01 01")
-    (answer,) = rig.sent(LOCATION)
-    assert answer[19:] == bytes.fromhex("0b 00 00 00 00 80 40").ljust(13, b"\0")
-
-
 def test_a_router_learns_where_the_gateway_is_from_an_answer_that_it_forwards():
     rig = connected_rig()
     rig.know_neighbour(5)
@@ -1729,10 +1706,16 @@ def test_a_router_learns_where_the_gateway_is_from_an_answer_that_it_forwards():
     assert [payload[4] for payload in rig.sent(LOCATION)] == [5, 5]
 
 
-def test_older_news_of_the_gateway_changes_nothing():
+def test_a_next_hop_passes_on_where_the_gateway_is_unless_newer_news_came():
     rig = connected_rig()
-    rig.hear("00 02 01 01 01 00 00 80 3f")
-    rig.hear("02 02 01 01 01 00 00 00 41 00 00 00 00 00 00 00 00 00 00 0b 00 00 00 00 80 40")
+    relayed = "02 02 01 01 01 00 00 00 41 00 00 00 00 00 00 00 00 00 00 0b 00 00 00 00 80 40"
+    rig.hear(relayed)
+    assert rig.mesh.places.gateway == Location(4.0, 0.0, 0.0)
+    assert rig.mesh.places.gateway_seen_s == -10.0  # ten seconds ago
+    rig.hear("09 09 02 01 01")
+    (answer,) = rig.sent(LOCATION)
+    assert answer[19:] == bytes.fromhex("0b 00 00 00 00 80 40").ljust(13, b"\0")
+    rig.hear("00 02 01 01 01 00 00 80 3f", relayed)
     assert rig.mesh.places.gateway == Location(1.0, 0.0, 0.0)
 
 
