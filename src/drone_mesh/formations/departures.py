@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Collection, Iterable, Iterator, Mapping, NamedTuple
+from typing import Collection, Iterable, Iterator, Mapping, NamedTuple, Sequence
 
 import numpy as np
 
@@ -20,7 +20,6 @@ from drone_mesh.drone.goal import ROUNDING_M
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
 from drone_mesh.formations.airspace import APART_M, Airspace
-from drone_mesh.formations.reach import Reach
 from drone_mesh.state.model import MeshStatus, NodeStatus, position_is_known, waypoints
 
 AT_PLACE_M = 0.5  # heights are rounded to whole metres, and physics moves drones
@@ -28,6 +27,38 @@ CONNECTED_SHARE = 0.8  # of the drones stay connected while others fly
 MEMBERS_IN_FLIGHT = "beacon"  # the technique that keeps flying drones connected
 ASIDE_M = (1.5, 3.0, 4.5, 6.0)  # how far a drone goes to let another one pass
 _ASIDE_WAYS = 8
+
+
+class Reach:
+    """The links that positions allow; obstacles are not considered."""
+
+    def __init__(
+        self, places: Mapping[int, Sequence[float]], gateways: Iterable[int], range_m: float
+    ) -> None:
+        """`places` of all nodes that are on, in metres."""
+        self._gateways = list(gateways)
+        ids: np.ndarray = np.fromiter(places, int, len(places))
+        points: np.ndarray = np.array(list(places.values()), dtype=float).reshape(-1, 3)
+        away = points[:, None] - points[None]
+        near = (away * away).sum(axis=-1) < range_m**2
+        self._near = {int(one): set(ids[near[row]].tolist()) for row, one in enumerate(ids)}
+
+    def over(self, relays: Collection[int]) -> set[int]:
+        """The drones, without gateways, that have a path to a gateway over these drones."""
+        return self.hops(relays).keys() - set(self._gateways)
+
+    def hops(self, relays: Collection[int]) -> dict[int, int]:
+        """The hops of each of them and of the gateways."""
+        allowed = set(relays) | set(self._gateways)
+        reached = dict.fromkeys(self._gateways, 0)
+        left, frontier, count = allowed - reached.keys(), set(reached), 0
+        while frontier:
+            count += 1
+            near: set[int] = set().union(*(self._near[node] for node in frontier))
+            frontier = near & left
+            left -= frontier
+            reached.update(dict.fromkeys(frontier, count))
+        return reached
 
 
 class FlightRules(NamedTuple):

@@ -13,8 +13,13 @@ from drone_mesh.drone.fleet import drones_in_words, ids_in_words
 from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
-from drone_mesh.formations.departures import AT_PLACE_M, MEMBERS_IN_FLIGHT, Departures, FlightRules
-from drone_mesh.formations.reach import Reach
+from drone_mesh.formations.departures import (
+    AT_PLACE_M,
+    MEMBERS_IN_FLIGHT,
+    Departures,
+    FlightRules,
+    Reach,
+)
 from drone_mesh.state.model import MeshStatus, NodeStatus, position_is_known
 from drone_mesh.state.observation import path_ahead
 

@@ -6,7 +6,7 @@ import enum
 import math
 from collections import Counter
 from dataclasses import dataclass
-from typing import Sequence
+from typing import Mapping, Sequence
 
 from drone_mesh.drone.roles import Role
 from drone_mesh.state.links import reaches_gateway
@@ -68,35 +68,28 @@ class Summary:
 def find_trouble(nodes: Sequence[NodeStatus]) -> list[Trouble]:
     """One entry for each node with a problem, by id."""
     by_id = {node.id: node for node in nodes}
-    troubles = []
-    for node in nodes:
-        condition = condition_of(node)
-        if condition is Condition.SILENT:
-            troubles.append(
-                Trouble(node.id, Severity.STALE, f"no report for {node.report_age:.0f} s")
-            )
-        elif condition is Condition.OFF:
-            text = "battery empty" if node.battery == 0.0 else "switched off"
-            text = f"{another_radio(node.id)}: off until it is gone" if node.shares_id else text
-            troubles.append(Trouble(node.id, Severity.WARN, text))
-        elif not node.connected:
-            text = "flying" if condition is Condition.FLYING else "not connected to a gateway"
-            if node.crashed:
-                text = f"crashed, {text}"
-            if node.shares_id:
-                text = f"{another_radio(node.id)}, {text}"
-            troubles.append(Trouble(node.id, Severity.ERROR, text))
-        elif node.shares_id:
-            troubles.append(Trouble(node.id, Severity.WARN, another_radio(node.id)))
-        elif node.crashed:
-            troubles.append(Trouble(node.id, Severity.WARN, "crashed"))
-        elif node.role == Role.ROUTER and not reaches_gateway(node.route, by_id):
-            route = " > ".join(map(str, node.route))
-            text = f"its route breaks off: {route}" if route else "no route to a gateway"
-            troubles.append(Trouble(node.id, Severity.WARN, text))
-        elif node.why_not_fly and math.isfinite(node.battery):
-            troubles.append(Trouble(node.id, Severity.WARN, f"cannot fly: {node.why_not_fly}"))
-    return troubles
+    found = ((node.id, *_worst_of(node, by_id)) for node in nodes)
+    return [Trouble(*trouble) for trouble in found if trouble[1] is not Severity.OK]
+
+
+def _worst_of(node: NodeStatus, by_id: Mapping[int, NodeStatus]) -> tuple[Severity, str]:
+    condition, other = condition_of(node), another_radio(node.id) if node.shares_id else ""
+    if condition is Condition.SILENT:
+        return Severity.STALE, f"no report for {node.report_age:.0f} s"
+    if condition is Condition.OFF:
+        text = "battery empty" if node.battery == 0.0 else "switched off"
+        return Severity.WARN, f"{other}: off until it is gone" if other else text
+    if not node.connected:
+        text = "flying" if condition is Condition.FLYING else "not connected to a gateway"
+        return Severity.ERROR, ", ".join(filter(None, (other, "crashed" * node.crashed, text)))
+    if other or node.crashed:
+        return Severity.WARN, other or "crashed"
+    if node.role == Role.ROUTER and not reaches_gateway(node.route, by_id):
+        route = " > ".join(map(str, node.route))
+        return Severity.WARN, f"its route breaks off: {route}" if route else "no route to a gateway"
+    if node.why_not_fly and math.isfinite(node.battery):
+        return Severity.WARN, f"cannot fly: {node.why_not_fly}"
+    return Severity.OK, ""
 
 
 def summarise(nodes: Sequence[NodeStatus], troubles: Sequence[Trouble]) -> Summary:

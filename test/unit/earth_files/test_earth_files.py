@@ -1,4 +1,4 @@
-"""Places and lines of other programs become metres of the common frame, and back."""
+"""Places and lines of other programs become metres of the common frame, and back; tracks."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.location import Location
-from drone_mesh.earth_files import WRITERS, Path, Placemarks, Point, read_placemarks
+from drone_mesh.earth_files import WRITERS, Path, Placemarks, Point, read_placemarks, tracks_of
 from drone_mesh.errors import ConfigurationError
 
 ORIGIN = Origin(52.0907, 5.1214, 3.0)
@@ -241,3 +241,17 @@ def test_far_more_points_than_drones_are_counted_and_not_compared():
 def test_what_only_python_takes_for_a_number_is_no_coordinate(number):
     point = f"<Point><coordinates>{number},52.0907</coordinates></Point>"
     assert f"'{number},52.0907' is not longitude,latitude" in refusal(kml(point), "a.kml")
+
+
+def test_a_track_has_a_place_whenever_the_drone_has_moved_half_a_metre():
+    still = [(float(t), 1, (5.0, 5.0, 0.0)) for t in range(10)]
+    moving = [(float(t), 2, (0.3 * min(t, 4), 0.0, 1.0)) for t in range(10)]
+    places = [Location(0.0, x, 1.0) for x in (0.0, 0.6, 1.2)]
+    assert tracks_of(sorted(still + moving)).paths == [Path(2, places, [0.0, 2.0, 4.0])]
+
+
+def test_long_tracks_are_thinned_out_but_keep_both_ends(monkeypatch):
+    monkeypatch.setattr("drone_mesh.earth_files.placemarks.MOST_PLACES", 4)
+    (path,) = tracks_of((float(t), 2, (float(t), 0.0, 0.0)) for t in range(10)).paths
+    assert path.times_s == [0.0, 3.0, 6.0, 9.0]
+    assert [place.longitude for place in path.places] == path.times_s
