@@ -116,8 +116,8 @@ def nursery() -> Iterator[Nursery]:
     nursery.close()
 
 
-@pytest.fixture
-def start_console(nursery: Nursery) -> Iterator[Callable[..., ConsoleProcess]]:
+@contextlib.contextmanager
+def consoles(nursery: Nursery) -> Iterator[Callable[..., ConsoleProcess]]:
     """Starts consoles with these arguments of console_process.py, and stops them in the end."""
     started: list[ConsoleProcess] = []
 
@@ -130,6 +130,12 @@ def start_console(nursery: Nursery) -> Iterator[Callable[..., ConsoleProcess]]:
     yield start
     for console in started:
         console.stop()
+
+
+@pytest.fixture
+def start_console(nursery: Nursery) -> Iterator[Callable[..., ConsoleProcess]]:
+    with consoles(nursery) as start:
+        yield start
 
 
 @pytest.fixture(scope="session")
@@ -252,8 +258,8 @@ class Visit:
         self.wait_for(f"{count} drones on the map", lambda: self.drawn("drones") == count)
 
 
-@pytest.fixture
-def visit(browser: Browser) -> Iterator[Callable[..., Visit]]:
+@contextlib.contextmanager
+def visits_of(browser: Browser) -> Iterator[Callable[..., Visit]]:
     """Opens pages: visit(url, **options of the browser's context). None may have complaints."""
     contexts, visits = [], []
 
@@ -271,3 +277,18 @@ def visit(browser: Browser) -> Iterator[Callable[..., Visit]]:
     for context in contexts:
         context.close()
     assert unexpected == []
+
+
+@pytest.fixture
+def visit(browser: Browser) -> Iterator[Callable[..., Visit]]:
+    with visits_of(browser) as open_page:
+        yield open_page
+
+
+@pytest.fixture(scope="module")
+def shared_page(nursery: Nursery, browser: Browser) -> Iterator[Visit]:
+    """For tests that order nothing and leave the page as it was: the default fleet, at rest."""
+    with consoles(nursery) as start, visits_of(browser) as open_page:
+        page = open_page(start("--skip", "25").url)
+        page.wait_for_drones(18)
+        yield page

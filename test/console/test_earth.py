@@ -100,18 +100,15 @@ def test_a_gateway_moves_only_after_a_question(page, tmp_path):
     page.page.wait_for_selector("#toasts :text('ordered 2 of 2 drones')")
 
 
-@pytest.mark.parametrize(
-    ("name", "text", "why"),
-    [
+def test_a_bad_file_is_refused_with_the_reason(page, tmp_path):
+    for name, text, why in (
         ("a.kml", "<kml>", "a.kml: not XML: no element found"),
         ("a.geojson", "{}", "a.geojson: not GeoJSON: expected a FeatureCollection"),
         ("a.kmz", "PK", "a.kmz: a compressed file"),
         ("a.kml", "<!DOCTYPE x><kml/>", "a.kml: declares a document type"),
-    ],
-)
-def test_a_bad_file_is_refused_with_the_reason(page, tmp_path, name, text, why):
-    load(page, tmp_path / name, text)
-    page.page.wait_for_selector(f"#toasts .bad :text('{why}')")
+    ):
+        load(page, tmp_path / name, text)
+        page.page.wait_for_selector(f"#toasts .bad :text('{why}')")
 
 
 def test_places_and_tracks_are_saved_in_degrees(page):

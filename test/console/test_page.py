@@ -50,13 +50,13 @@ def test_the_page_loads_without_errors_and_from_one_server_only(start_console, v
     assert {url.split("/")[2] for url in page.requests} == {f"127.0.0.1:{console.port}"}
 
 
-def test_the_map_shows_the_true_number_of_drones_links_and_routes(page):
-    page.wait_for("all links", lambda: page.drawn("links") == LINKS)
-    assert page.drawn("links-drawn") == LINKS
-    page.wait_for("all routes", lambda: page.drawn("route-links") == 17)
-    page.wait_for(
+def test_the_map_shows_the_true_number_of_drones_links_and_routes(shared_page):
+    shared_page.wait_for("all links", lambda: shared_page.drawn("links") == LINKS)
+    assert shared_page.drawn("links-drawn") == LINKS
+    shared_page.wait_for("all routes", lambda: shared_page.drawn("route-links") == 17)
+    shared_page.wait_for(
         "all connected",
-        lambda: page.page.inner_text("#summary") == "17 of 17 routers connected",
+        lambda: shared_page.page.inner_text("#summary") == "17 of 17 routers connected",
     )
 
 
@@ -119,23 +119,23 @@ def test_typed_numbers_send_a_drone(page):
     page.wait_for("13 flies", lambda: page.row(13, STATE) == "flying")
 
 
-@pytest.mark.parametrize(
-    ("axis", "typed", "why"),
-    [
+def test_a_goal_that_cannot_be_flown_to_is_refused_beside_the_field(page):
+    page.page.click("#nodes tr[data-id='13']")
+    for axis, typed, why in (
         ("x", "far away", "x must be a number from -5000 to 5000"),
         ("y", "", "y must be a number from -5000 to 5000"),
         ("x", "5001", "x must be a number from -5000 to 5000"),
         ("z", "-5", "z must be a whole number from 0 to 500"),
         ("z", "1.5", "z must be a whole number from 0 to 500"),
         ("x", "0x10", "x must be a number from -5000 to 5000"),
-    ],
-)
-def test_a_goal_that_cannot_be_flown_to_is_refused_beside_the_field(page, axis, typed, why):
-    page.page.click("#nodes tr[data-id='13']")
-    page.page.fill(f"#fly-{axis}", typed)
-    page.page.click("#fly-form button")
-    page.wait_for("a reason", lambda: page.page.inner_text("#fly-error") == why)
-    assert page.page.get_attribute(f"#fly-{axis}", "aria-invalid") == "true"
+    ):
+        field = f"#fly-{axis}"
+        before = page.page.input_value(field)
+        page.page.fill(field, typed)
+        page.page.click("#fly-form button")
+        page.wait_for("a reason", lambda why=why: page.page.inner_text("#fly-error") == why)
+        assert page.page.get_attribute(field, "aria-invalid") == "true", typed
+        page.page.fill(field, before)
     page.page.wait_for_timeout(500)
     assert page.row(13, STATE) == "connected"
 
@@ -250,14 +250,17 @@ def test_the_map_moves_and_zooms_by_keyboard(page):
     page.wait_for("fits again", lambda: on_screen(page, 0.0, 0.0) == pytest.approx(before, abs=1.0))
 
 
-def test_the_table_sorts_by_the_column_that_is_clicked(page):
+def test_the_table_sorts_by_the_column_that_is_clicked(shared_page):
     ids = "#nodes tbody tr td:first-child"
-    page.page.click("#nodes th:nth-child(4) button")
-    page.page.click("#nodes th:nth-child(4) button")
-    hops = [int(h) for h in page.page.locator("#nodes tbody tr td:nth-child(4)").all_inner_texts()]
+    shared_page.page.click("#nodes th:nth-child(4) button")
+    shared_page.page.click("#nodes th:nth-child(4) button")
+    hops = [
+        int(h)
+        for h in shared_page.page.locator("#nodes tbody tr td:nth-child(4)").all_inner_texts()
+    ]
     assert hops == sorted(hops, reverse=True)
-    page.page.click("#nodes th:nth-child(1) button")
-    assert page.page.locator(ids).all_inner_texts() == [str(n) for n in range(18)]
+    shared_page.page.click("#nodes th:nth-child(1) button")
+    assert shared_page.page.locator(ids).all_inner_texts() == [str(n) for n in range(18)]
 
 
 def test_the_log_shows_events_with_simulated_time_and_neighbours_on_request(page):
@@ -271,12 +274,12 @@ def test_the_log_shows_events_with_simulated_time_and_neighbours_on_request(page
     page.page.wait_for_selector("#events li:has-text('found')")
 
 
-def test_the_charts_have_something_to_show(page):
-    page.wait_for("a share", lambda: page.page.inner_text("#share-now") == "100 %")
-    page.wait_for("a rate", lambda: int(page.page.inner_text("#rate-now")) > 0)
-    assert re.fullmatch(r"\d\.\d / \d", page.page.inner_text("#hops-now"))
-    page.page.hover("#chart-share")
-    assert re.fullmatch(r"100 % at \d+ s", page.page.inner_text("#share-now"))
+def test_the_charts_have_something_to_show(shared_page):
+    shared_page.wait_for("a share", lambda: shared_page.page.inner_text("#share-now") == "100 %")
+    shared_page.wait_for("a rate", lambda: int(shared_page.page.inner_text("#rate-now")) > 0)
+    assert re.fullmatch(r"\d\.\d / \d", shared_page.page.inner_text("#hops-now"))
+    shared_page.page.hover("#chart-share")
+    assert re.fullmatch(r"100 % at \d+ s", shared_page.page.inner_text("#share-now"))
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
@@ -386,12 +389,14 @@ def test_the_map_fits_again_when_a_drone_leaves_it_unless_the_user_has_moved_it(
     assert scale() == zoomed
 
 
-def test_a_drone_under_the_pointer_says_what_it_is_and_does(page):
-    page.page.mouse.move(*on_screen(page, *PLACES[14]))
-    page.page.mouse.move(*on_screen(page, *PLACES[9]), steps=3)
-    page.wait_for("a label", lambda: page.page.inner_text("#hover") == "Router 9, connected")
-    page.page.mouse.move(*on_screen(page, 3.0, 3.0))
-    page.wait_for("no label", lambda: not page.page.is_visible("#hover"))
+def test_a_drone_under_the_pointer_says_what_it_is_and_does(shared_page):
+    shared_page.page.mouse.move(*on_screen(shared_page, *PLACES[14]))
+    shared_page.page.mouse.move(*on_screen(shared_page, *PLACES[9]), steps=3)
+    shared_page.wait_for(
+        "a label", lambda: shared_page.page.inner_text("#hover") == "Router 9, connected"
+    )
+    shared_page.page.mouse.move(*on_screen(shared_page, 3.0, 3.0))
+    shared_page.wait_for("no label", lambda: not shared_page.page.is_visible("#hover"))
 
 
 def test_many_events_and_ids_are_only_a_few_tab_stops(page):
@@ -413,9 +418,9 @@ def test_many_events_and_ids_are_only_a_few_tab_stops(page):
     assert page.page.inner_text("#node-name").split()[1] == chosen
 
 
-def test_the_clock_is_not_announced_and_every_button_has_a_name_in_words(page):
-    assert page.page.get_attribute("#clock", "role") == "timer"
-    assert page.page.locator("output").count() == 0
+def test_the_clock_is_not_announced_and_every_button_has_a_name_in_words(shared_page):
+    assert shared_page.page.get_attribute("#clock", "role") == "timer"
+    assert shared_page.page.locator("output").count() == 0
     for name in (
         "Zoom in",
         "Zoom out",
@@ -424,7 +429,7 @@ def test_the_clock_is_not_announced_and_every_button_has_a_name_in_words(page):
         "Close",
         "Send drones to layout",
     ):
-        assert page.page.get_by_label(name, exact=True).count() == 1, name
+        assert shared_page.page.get_by_label(name, exact=True).count() == 1, name
 
 
 DRAW_LOST = """async (count) => {
@@ -453,9 +458,9 @@ DRAW_LOST = """async (count) => {
 }"""
 
 
-def test_lost_links_of_a_crowd_fade_and_only_the_shortest_are_drawn(page):
-    assert page.page.evaluate(DRAW_LOST, 40) == [40, 1]
-    drawn, alpha = page.page.evaluate(DRAW_LOST, 20_000)
+def test_lost_links_of_a_crowd_fade_and_only_the_shortest_are_drawn(shared_page):
+    assert shared_page.page.evaluate(DRAW_LOST, 40) == [40, 1]
+    drawn, alpha = shared_page.page.evaluate(DRAW_LOST, 20_000)
     assert drawn == 1500
     assert alpha == pytest.approx(0.25)
 
@@ -471,11 +476,11 @@ def test_the_whole_table_fits_beside_the_map_at_1400_pixels(start_console, visit
     assert wide <= room
 
 
-def test_charts_have_several_times_and_no_false_start(page):
-    page.wait_for(
+def test_charts_have_several_times_and_no_false_start(shared_page):
+    shared_page.wait_for(
         "times below each chart",
         lambda: all(
-            int(page.page.get_attribute(f"#chart-{name}", "data-ticks") or 0) >= 2
+            int(shared_page.page.get_attribute(f"#chart-{name}", "data-ticks") or 0) >= 2
             for name in ("share", "rate", "hops")
         ),
     )
@@ -545,12 +550,12 @@ DRAWING_ORDER = """async () => {
 }"""
 
 
-def test_gateways_are_drawn_above_routers_and_the_selected_node_above_all(page):
-    assert page.page.evaluate(DRAWING_ORDER) == [1, 3, 0, 2]
+def test_gateways_are_drawn_above_routers_and_the_selected_node_above_all(shared_page):
+    assert shared_page.page.evaluate(DRAWING_ORDER) == [1, 3, 0, 2]
 
 
-def test_ids_of_three_digits_fit_into_their_dots(page):
-    widths = page.page.evaluate(
+def test_ids_of_three_digits_fit_into_their_dots(shared_page):
+    widths = shared_page.page.evaluate(
         """async () => {
           const { idSize } = await import("/static/draw.js");
           const context = document.createElement("canvas").getContext("2d");
@@ -563,8 +568,8 @@ def test_ids_of_three_digits_fit_into_their_dots(page):
     assert max(widths) < 0.95
 
 
-def test_beside_small_drones_there_are_the_ids_of_all_or_of_none(page):
-    sizes = page.page.evaluate(
+def test_beside_small_drones_there_are_the_ids_of_all_or_of_none(shared_page):
+    sizes = shared_page.page.evaluate(
         """async () => {
           const { labelSize } = await import("/static/draw.js");
           const sizes = (radius) => [[7, 99], [7, 253]].map((ids) => labelSize(ids, radius));

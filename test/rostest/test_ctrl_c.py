@@ -93,8 +93,8 @@ class CtrlCTest(unittest.TestCase):
             self.assertEqual(processes_of(port), {})
 
     def test_while_the_mesh_runs(self) -> None:
-        ready = ("started 31 nodes", "offering the flights of 31 drones as actions")
-        self.run_and_interrupt(ready, "routers:=30", "actions:=true")
+        ready = ("started 9 nodes", "offering the flights of 9 drones as actions")
+        self.run_and_interrupt(ready, "routers:=8", "actions:=true")
 
     def test_while_the_world_waits_for_its_next_step(self) -> None:
         self.run_and_interrupt(("started 2 nodes",), "routers:=1", "real_time_factor:=0.001")
@@ -103,7 +103,7 @@ class CtrlCTest(unittest.TestCase):
         self.run_and_interrupt(("fleet: gateways 1, routers 30",), "routers:=30")
 
     def test_while_emulated_radios_are_in_each_others_way(self) -> None:
-        self.run_and_interrupt(("started 18 nodes",), "radio:=nrf24")
+        self.run_and_interrupt(("started 6 nodes",), "routers:=5", "radio:=nrf24")
 
     def test_while_a_simulator_of_others_hangs(self) -> None:
         self.run_and_interrupt(
@@ -119,7 +119,15 @@ class CtrlCTest(unittest.TestCase):
         port = free_port()
         uri = f"http://127.0.0.1:{port}"
         launch = subprocess.Popen(
-            ["roslaunch", "-p", str(port), "drone_mesh", "factory.launch", "actions:=true"],
+            [
+                "roslaunch",
+                "-p",
+                str(port),
+                "drone_mesh",
+                "factory.launch",
+                "routers:=5",
+                "actions:=true",
+            ],
             env={**os.environ, "ROS_MASTER_URI": uri},
             stdout=subprocess.PIPE,
             text=True,
@@ -127,7 +135,7 @@ class CtrlCTest(unittest.TestCase):
         master = 0
         try:
             assert launch.stdout is not None
-            wanted = {"started 18 nodes", "offering the flights"}
+            wanted = {"started 6 nodes", "offering the flights"}
             while wanted:
                 line = launch.stdout.readline()
                 self.assertTrue(line, f"it ended without '{wanted}'")

@@ -17,7 +17,7 @@ from rostest_support import wait_for
 
 from drone_mesh.msg import MeshEvent, MeshState
 
-DRONES = 100
+DRONES = 50
 START_S = 100.0  # wall
 SIMULATED_S = 11.0  # each node checks its connection at least once
 WITHIN_S = 120.0  # wall; an eighth of full speed

@@ -111,6 +111,7 @@ class StandingLayoutsTest(unittest.TestCase):
         self.mesh.switch(17, False)
         number = self.order(100)
         wait_for("it waits for 17", FLIGHTS_S, lambda: bytes([17]) == self.waiting(number))
+        wait_for("that is stored", FLIGHTS_S, lambda: self.stored(number) == ["17"])
         before = pid_of("/DroneManager")
         os.kill(before, signal.SIGKILL)
         wait_for("another manager", 60, lambda: pid_of("/DroneManager") not in (None, before))
@@ -182,6 +183,11 @@ class StandingLayoutsTest(unittest.TestCase):
 
     def open(self) -> list[LayoutProgress]:
         return [progress for progress in self.progress.values() if not progress.over]
+
+    def stored(self, number: int) -> list[str]:
+        """The drones that a manager which starts now would order."""
+        orders = json.loads(rospy.get_param("/DroneManager/standing", "[]"))
+        return [drone for order in orders if order["number"] == number for drone in order["goals"]]
 
     def waiting(self, number: int) -> bytes | None:
         """Its drones without a route, once no other drone is to fly any more."""
