@@ -11,8 +11,7 @@ APPLY = """async (events) => {
   const mesh = new Mesh();
   const list = document.createElement("ol");
   document.body.append(list);
-  const off = Object.assign(document.createElement("input"), { checked: false });
-  new EventLog(mesh, list, off, off);
+  new EventLog(mesh, list, () => true);
   for (const [t, node, kind, peers] of events) {
     const event = { t, node, kind, peers: peers ?? [], detail: "" };
     mesh.apply({ clock: {}, events: [event] });

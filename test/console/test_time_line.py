@@ -113,6 +113,38 @@ def test_the_whole_of_a_recording_can_be_viewed_while_it_is_played(start_console
     assert before_s - 0.5 <= clock_s(page) < 60.0  # the recording has two states a second
 
 
+def test_a_link_opens_the_moment_and_the_node_that_it_was_copied_from(start_console, visit):
+    recording = ("--recording", "run.bag", "--recorded", "80")
+    url = start_console("--skip", "2", "--haste", "1", *recording).url
+    page = visit(url)
+    page.wait_for_drones(18)
+    page.page.click("#nodes tr[data-id='5']")
+    drag_to(page, 0.9)
+    page.wait_for("later than what was played", lambda: clock_s(page) > 65.0)
+    page.page.click("#time-link")
+    page.wait_for("a link", lambda: "&t=" in page.page.url)
+    assert page.page.inner_text("#time-play") == "Play"
+    shown_s = clock_s(page)
+    page.wait_for("it says so", lambda: "to this moment" in page.page.inner_text("#toasts"))
+    other = visit(page.page.url)
+    other.wait_for("the same moment", lambda: clock_s(other) == shown_s)
+    other.wait_for("the same node", lambda: other.page.inner_text("#node-name") == "Router 5")
+    own = other.page.inner_text("#node-events")
+    assert "5 was switched off" in own
+    assert "started" in own.splitlines()[-1]
+    other.wait_for("it keeps its link", lambda: other.page.url == page.page.url)
+
+
+def test_a_link_to_a_moment_that_is_not_remembered_says_so_and_shows_the_present(
+    start_console, visit
+):
+    page = visit(start_console(*HASTE).url + "#node=3&t=9999")
+    page.wait_for("why", lambda: "9999 s is not on the time line" in page.page.inner_text("body"))
+    page.wait_for("the node", lambda: page.page.inner_text("#node-name") == "Router 3")
+    page.wait_for("its address", lambda: page.page.url.endswith("#node=3"))
+    assert not page.page.is_visible("#past")
+
+
 @pytest.mark.parametrize("size", [(1400, 880), (390, 844)], ids=["desk", "phone"])
 def test_the_track_keeps_its_ends_when_a_drag_enters_the_past(start_console, visit, size):
     page = visit(start_console(*HASTE).url, viewport={"width": size[0], "height": size[1]})

@@ -7,7 +7,7 @@ gets a larger difference, and nothing is queued for it.
 
 The fields of a node are those of NodeState.msg, plus decisions that the page only displays: the
 node's condition, the name of its colour, its trouble, its slot among nodes at the same position,
-the progress of its latest order, and its links with nodes of higher ids.
+the progress of its latest order, what it does now, and its links with nodes of higher ids.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from drone_mesh.console.history import History
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.state.alarms import AlarmBook
 from drone_mesh.state.condition import Trouble, condition_of, find_trouble, summarise
+from drone_mesh.state.doing import doings
 from drone_mesh.state.links import LinkForecast, LostLinks, known_links, links_by_use
 from drone_mesh.state.model import (
     EventRecord,
@@ -116,10 +117,11 @@ class FrameStore:
             del self._changed_at[gone]
             self._gone_at[gone] = self.version
         self._replace("obstacles", [_obstacle(box) for box in mesh.obstacles])
-        slots = fan_out(mesh.nodes)
+        slots, does = fan_out(mesh.nodes), doings(mesh.nodes)
         for node in mesh.nodes:
             fields = _fields(node, troubles.get(node.id))
-            fields.update(self._order_of(node), slot=slots.get(node.id), **more.get(node.id, {}))
+            fields.update(self._order_of(node), slot=slots.get(node.id), does=does[node.id])
+            fields.update(more.get(node.id, {}))
             self._update_node(node.id, fields)
         for node_id, fields in self._links(mesh, wall_s).items():
             self._update_node(node_id, fields)

@@ -8,7 +8,7 @@ import { Fleet } from "./fleet.js";
 import { assigned, Formations } from "./formations.js";
 import { Groups } from "./groups.js";
 import { Flights, names } from "./flights.js";
-import { EventLog } from "./log.js";
+import { EventLog, isAbout, isNotable } from "./log.js";
 import { keepFocus } from "./focus.js";
 import { MapView } from "./map.js";
 import { goalOf, Mesh } from "./mesh.js";
@@ -117,7 +117,12 @@ new Alarms(
   () => showTab("events"),
 );
 connection.addEventListener("told", (event) => toast(event.detail, false));
-new EventLog(mesh, byId("events"), byId("show-neighbours"), byId("only-selected"));
+const allNeighbours = byId("show-neighbours");
+const log = new EventLog(mesh, byId("events"), (e) => allNeighbours.checked || isNotable(e));
+allNeighbours.addEventListener("change", () => log.rebuild());
+const isOfSelected = (event) => isNotable(event) && isAbout(mesh.selected, event);
+const ofSelected = new EventLog(mesh, byId("node-events"), isOfSelected, 20);
+mesh.addEventListener("select", () => ofSelected.rebuild());
 const charts = new Charts(mesh);
 const packets = new PacketDots(mesh, map, connection, byId("map-card"));
 const tiles = new Tiles(mesh, map.camera, (text) => toast(text, true));
@@ -388,23 +393,60 @@ function follow(on) {
 }
 byId("follow").addEventListener("change", (event) => follow(event.target.checked));
 mesh.addEventListener("select", () => mesh.selected === null && follow(false));
-mesh.addEventListener("select", () => {
-  const link = mesh.selected === null ? location.pathname : `#node=${mesh.selected}`;
-  if (location.hash !== link) history.replaceState(null, "", link);
-});
 
-/** A link like #node=3 selects that node, as soon as it is known. */
-function selectLinked() {
-  const id = Number(/^#node=(\d+)$/.exec(location.hash)?.[1] ?? NaN);
-  if (mesh.nodes.has(id)) {
-    mesh.select(id);
-    map.show(id);
-  }
-  return Number.isNaN(id) || mesh.nodes.has(id);
+/** What an address like #node=3&t=61.2 selects: a node and a moment, as numbers; null: none. */
+function linked() {
+  const words = new URLSearchParams(location.hash.slice(1));
+  const of = (name) => (/^[0-9.]+$/.test(words.get(name)) ? Number(words.get(name)) : null);
+  return { node: of("node"), t: of("t") };
 }
-window.addEventListener("hashchange", selectLinked);
-const untilLinked = () => selectLinked() && mesh.removeEventListener("frame", untilLinked);
-mesh.addEventListener("frame", untilLinked);
+let awaited = linked(); // what has not come yet
+
+/** The address of what the page shows: in the past, while it stands still, with the moment. */
+function address(still = mesh.timeline.paused) {
+  const { live, now } = mesh.timeline;
+  const words = { node: mesh.selected, t: live === false && still ? now : null };
+  const named = Object.entries(words).filter(([, value]) => value !== null);
+  return named.length ? `#${named.map((pair) => pair.join("=")).join("&")}` : location.pathname;
+}
+
+function showAddress() {
+  if (awaited.node !== null || awaited.t !== null) return;
+  const shown = location.hash || location.pathname;
+  if (shown !== address()) history.replaceState(null, "", address());
+}
+
+function followLink() {
+  const { node, t } = awaited;
+  const { start, end } = mesh.timeline;
+  if (node !== null && mesh.nodes.has(node)) {
+    awaited.node = null;
+    mesh.select(node);
+    map.show(node);
+  }
+  if (t !== null && start !== undefined) {
+    awaited.t = null;
+    if (start <= t && t <= end) connection.ask({ do: "time", t, paused: true });
+    else toast(`${t} s is not on the time line: it has ${start} to ${end} s`, true);
+  }
+  showAddress();
+}
+window.addEventListener("hashchange", () => {
+  awaited = linked();
+  followLink();
+});
+for (const what of ["frame", "timeline", "select"]) mesh.addEventListener(what, followLink);
+
+byId("time-link").addEventListener("click", async () => {
+  const link = new URL(address(true), location.href).href;
+  connection.ask({ do: "time", paused: true });
+  const where = "to this moment is in the address bar";
+  const copied = navigator.clipboard?.writeText(link).then(
+    () => "to this moment was copied",
+    () => where,
+  );
+  toast(`the link ${(await copied) ?? where}`, false);
+});
 
 byId("help-button").addEventListener("click", () => byId("help").showModal());
 

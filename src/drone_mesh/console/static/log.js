@@ -44,36 +44,34 @@ const SENTENCES = {
 };
 const FORMS = /(an order|[a-z]+)\|([a-z]+)/g;
 
+/** Whether it is more than neighbours that come and go. */
+export function isNotable({ kind }) {
+  return !NEIGHBOUR_KINDS.has(kind);
+}
+
+/** Whether it is about this node. */
+export function isAbout(id, { node, peers }) {
+  return node === id || peers.includes(id);
+}
+
 export class EventLog {
   #said = []; // the newest sentences: {kind, of, others, events: [{t, id, detail}], row, open}
 
-  constructor(mesh, list, showNeighbours, onlySelected) {
+  /** Shows in `list` the newest `rows` of the events for which `wanted(event)` is true. */
+  constructor(mesh, list, wanted, rows = ROWS_SHOWN) {
     this.mesh = mesh;
     this.list = list;
-    this.showNeighbours = showNeighbours;
-    this.onlySelected = onlySelected;
+    this.wanted = wanted;
+    this.rows = rows;
     mesh.addEventListener("frame", (event) => {
-      if (event.detail.full) this.#rebuild();
+      if (event.detail.full) this.rebuild();
       else this.#add(event.detail.events);
     });
-    mesh.addEventListener("select", () => this.onlySelected.checked && this.#rebuild());
-    for (const box of [showNeighbours, onlySelected])
-      box.addEventListener("change", () => this.#rebuild());
     arrowKeys(list, "button");
   }
 
-  #wanted(event) {
-    if (!this.showNeighbours.checked && NEIGHBOUR_KINDS.has(event.kind)) return false;
-    const selected = this.mesh.selected;
-    return (
-      !this.onlySelected.checked ||
-      selected === null ||
-      event.node === selected ||
-      event.peers.includes(selected)
-    );
-  }
-
-  #rebuild() {
+  /** Other events are wanted now. */
+  rebuild() {
     this.list.replaceChildren();
     this.#said = [];
     this.#add(this.mesh.events);
@@ -81,14 +79,14 @@ export class EventLog {
 
   #add(events) {
     const changed = new Set();
-    for (const event of events) if (this.#wanted(event)) changed.add(this.#take(event));
+    for (const event of events) if (this.wanted(event)) changed.add(this.#take(event));
     const rows = [];
     for (const said of changed) {
       this.#write(said);
       if (!said.row.isConnected) rows.unshift(said.row);
     }
-    if (rows.length) this.list.prepend(...rows.slice(0, ROWS_SHOWN));
-    while (this.list.children.length > ROWS_SHOWN) this.list.lastElementChild.remove();
+    if (rows.length) this.list.prepend(...rows.slice(0, this.rows));
+    while (this.list.children.length > this.rows) this.list.lastElementChild.remove();
   }
 
   /** Adds the event to a recent sentence that says the same of others, or begins a new one. */

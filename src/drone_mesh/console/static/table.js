@@ -13,12 +13,13 @@ const COLUMNS = [
     condition: true,
   },
   {
-    name: "GW",
-    title: "The gateway that it uses, or used last",
-    sort: (n) => n.gateway,
-    text: (n) => orDash(n.gateway),
+    name: "Does now",
+    title: "What it does: its flight, its repair, or for whom it relays",
+    sort: (n) => n.does,
+    text: (n) => n.does || "–",
+    long: true,
   },
-  { name: "Hops", title: "Hops to that gateway", sort: (n) => n.hops, text: (n) => orDash(n.hops) },
+  { name: "Hops", title: "Hops to its gateway", sort: (n) => n.hops, text: (n) => orDash(n.hops) },
   {
     name: "Next hop",
     title: "The neighbour on its route to that gateway",
@@ -27,22 +28,16 @@ const COLUMNS = [
   },
   { name: "Nb", title: "Neighbours", sort: (n) => n.neighbours, text: (n) => String(n.neighbours) },
   {
-    name: "Known",
-    title: "Known nodes; one known through two neighbours counts twice",
-    sort: (n) => n.known_nodes,
-    text: (n) => String(n.known_nodes ?? "–"),
+    name: "GW",
+    title: "The gateway that it uses, or used last",
+    sort: (n) => n.gateway,
+    text: (n) => orDash(n.gateway),
   },
   {
     name: "Sent",
     title: "Messages sent successfully",
     sort: (n) => n.total_messages,
     text: (n) => String(n.total_messages ?? "–"),
-  },
-  {
-    name: "Fallback",
-    title: "The node whose position it would fly to",
-    sort: (n) => n.fallback,
-    text: (n) => orDash(n.fallback),
   },
   { name: "x", title: "m", sort: (n) => n.position?.[0] ?? 0, text: (n) => metres(n, 0) },
   { name: "y", title: "m", sort: (n) => n.position?.[1] ?? 0, text: (n) => metres(n, 1) },
@@ -122,7 +117,7 @@ export class NodeTable {
   #matches(node) {
     if (this.onlyProblems.checked && !node.trouble && !node.since) return false;
     const text = this.filter.value.trim().toLowerCase();
-    const known = [node.id, node.condition, node.trouble, node.order, node.since, node.repair];
+    const known = [node.id, node.condition, node.trouble, node.order, node.since, node.does];
     return !text || known.join(" ").toLowerCase().includes(text);
   }
 
@@ -159,7 +154,9 @@ export class NodeTable {
     COLUMNS.forEach((column, index) => {
       const cell = column.condition ? row.cells[index].firstChild : row.cells[index];
       const text = column.text(node);
-      if (cell.textContent !== text) cell.textContent = text;
+      if (cell.textContent === text) return;
+      cell.textContent = text;
+      if (column.long) cell.title = text;
     });
   }
 

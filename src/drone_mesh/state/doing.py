@@ -1,0 +1,42 @@
+"""What each node does now, in a few words: for lists of a whole fleet."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Iterable
+
+from drone_mesh.drone.location import Location
+from drone_mesh.drone.roles import Role
+from drone_mesh.state.condition import Condition, condition_of
+from drone_mesh.state.model import NodeStatus, position_is_known, waypoints
+
+
+def doings(nodes: Iterable[NodeStatus]) -> dict[int, str]:
+    """By node: its flight, its repair, or whose packets it forwards; empty: none of these."""
+    nodes = tuple(nodes)
+    others = Counter(on_route for node in nodes for on_route in node.route[1:])
+    return {node.id: _doing(node, others[node.id]) for node in nodes}
+
+
+def _doing(node: NodeStatus, others: int) -> str:
+    """`others`: how many nodes have a route that leads through it, or to it."""
+    condition = condition_of(node)
+    if condition in (Condition.OFF, Condition.SILENT, Condition.CRASHED):
+        return ""
+    if node.repair:
+        return node.repair
+    if len(node.path):
+        corners = waypoints(node.path)
+        if not position_is_known(node) or tuple(corners[-1]) == tuple(node.position):
+            return "flies"
+        end, here = Location.from_vector(corners[-1]), Location.from_vector(node.position)
+        place = f"x {end.longitude:.1f}, y {end.latitude:.1f}"
+        return f"flies to {place}: {here.distance_m(end):.0f} m left"
+    if len(node.heading):
+        return "flies with its pilot"
+    if condition is not Condition.CONNECTED:
+        return "looks for a gateway"
+    routers = "1 router" if others == 1 else f"{others} routers"
+    if node.role == Role.GATEWAY:
+        return f"serves {routers}"
+    return f"relays for {routers}" if others else "relays for nobody"

@@ -1,0 +1,49 @@
+"""What each node does now, in words."""
+
+from __future__ import annotations
+
+import pytest
+
+from drone_mesh.drone.roles import Role
+from drone_mesh.state.doing import doings
+from drone_mesh.state.model import NodeStatus
+
+HERE = (1.0, 2.0, 0.0)
+
+
+def router(**fields: object) -> NodeStatus:
+    return NodeStatus(3, **{"connected": True, "position": HERE, **fields})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("node", "words"),
+    [
+        (router(), "relays for nobody"),
+        (router(connected=False), "looks for a gateway"),
+        (router(connected=False, repair="waits 12 s for a gateway"), "waits 12 s for a gateway"),
+        (router(path=(4.0, 6.0, 0.0)), "flies to x 4.0, y 6.0: 5 m left"),
+        (router(path=HERE), "flies"),  # a real one does not report its goal
+        (router(path=(4.0, 6.0, 0.0), position=(float("nan"),) * 3), "flies"),
+        (router(heading=(4.0, 6.0, 0.0)), "flies with its pilot"),
+        (router(on=False, path=(4.0, 6.0, 0.0)), ""),
+        (router(report_age=9.0), ""),
+        (router(crashed=True), ""),
+    ],
+)
+def test_the_words_of_one_router(node, words):
+    assert doings([node]) == {3: words}
+
+
+def test_a_relay_and_a_gateway_count_the_routes_that_lead_there():
+    nodes = [
+        NodeStatus(0, role=Role.GATEWAY, connected=True),
+        NodeStatus(1, connected=True, route=bytes([1, 0])),
+        NodeStatus(2, connected=True, route=bytes([2, 1, 0])),
+        NodeStatus(3, connected=True, route=bytes([3, 2, 1, 0])),
+    ]
+    assert doings(nodes) == {
+        0: "serves 3 routers",
+        1: "relays for 2 routers",
+        2: "relays for 1 router",
+        3: "relays for nobody",
+    }
