@@ -402,10 +402,16 @@ function linked() {
 }
 let awaited = linked(); // what has not come yet
 
+/** Seconds with two digits, never before `t`: rounded down it could show the state before. */
+function upToCentis(t) {
+  const rounded = Number(t.toFixed(2));
+  return rounded < t ? Number((rounded + 0.01).toFixed(2)) : rounded;
+}
+
 /** The address of what the page shows: in the past, while it stands still, with the moment. */
 function address(still = mesh.timeline.paused) {
   const { live, now } = mesh.timeline;
-  const words = { node: mesh.selected, t: live === false && still ? now : null };
+  const words = { node: mesh.selected, t: live === false && still ? upToCentis(now) : null };
   const named = Object.entries(words).filter(([, value]) => value !== null);
   return named.length ? `#${named.map((pair) => pair.join("=")).join("&")}` : location.pathname;
 }
@@ -426,7 +432,7 @@ function followLink() {
   }
   if (t !== null && start !== undefined) {
     awaited.t = null;
-    if (start <= t && t <= end) connection.ask({ do: "time", t, paused: true });
+    if (start <= t && t <= upToCentis(end)) connection.ask({ do: "time", t, paused: true });
     else toast(`${t} s is not on the time line: it has ${start} to ${end} s`, true);
   }
   showAddress();
