@@ -93,9 +93,9 @@ def test_a_drag_sends_the_drone_there(page):
     page.page.select_option("#speed", "5")
     page.wait_for(
         "17 arrived",
-        lambda: page.row(17, STATE) != "flying" and abs(float(page.row(17, 10)) - 3.0) < 0.2,
+        lambda: page.row(17, STATE) != "flying" and abs(float(page.row(17, 9)) - 3.0) < 0.2,
     )
-    page.wait_for("its y", lambda: abs(float(page.row(17, 11)) - 3.0) < 0.2)
+    page.wait_for("its y", lambda: abs(float(page.row(17, 10)) - 3.0) < 0.2)
 
 
 def test_a_drag_that_ends_with_escape_sends_no_drone(page):

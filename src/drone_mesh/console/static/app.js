@@ -433,7 +433,10 @@ function followLink() {
   if (t !== null && start !== undefined) {
     awaited.t = null;
     if (start <= t && t <= upToCentis(end)) connection.ask({ do: "time", t, paused: true });
-    else toast(`${t} s is not on the time line: it has ${start} to ${end} s`, true);
+    else {
+      const has = `${start.toFixed(1)} to ${end.toFixed(1)} s`;
+      toast(`${t} s is not on the time line: it has ${has}`, true);
+    }
   }
   showAddress();
 }
