@@ -12,7 +12,7 @@ from test_page import PLACES
 from drone_mesh.drone.geodesy import EarthPlace, Origin
 from drone_mesh.drone.location import Location
 
-X, Y = 10, 11  # columns of the table
+X, Y = 9, 10  # columns of the table
 AT = "52.0907,5.1214,3"
 ORIGIN = Origin.parse(AT)
 

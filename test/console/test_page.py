@@ -15,7 +15,7 @@ LINKS = sum(
     for i, (ax, ay) in enumerate(PLACES)
     for bx, by in PLACES[:i]
 )
-STATE, HOPS, NEXT, NEIGHBOURS = 2, 4, 5, 6  # columns of the table
+STATE, HOPS, NEXT, NEIGHBOURS, X, Y = 2, 4, 5, 6, 9, 10  # columns of the table
 FAST = ("--skip", "25")
 FAR_FROM_17 = (3.0, 3.0)  # a flight of eleven seconds: a slow page sees it, too
 
@@ -93,9 +93,9 @@ def test_a_drag_sends_the_drone_there(page):
     page.page.select_option("#speed", "5")
     page.wait_for(
         "17 arrived",
-        lambda: page.row(17, STATE) != "flying" and abs(float(page.row(17, 9)) - 3.0) < 0.2,
+        lambda: page.row(17, STATE) != "flying" and abs(float(page.row(17, X)) - 3.0) < 0.2,
     )
-    page.wait_for("its y", lambda: abs(float(page.row(17, 10)) - 3.0) < 0.2)
+    page.wait_for("its y", lambda: abs(float(page.row(17, Y)) - 3.0) < 0.2)
 
 
 def test_a_drag_that_ends_with_escape_sends_no_drone(page):
@@ -385,7 +385,7 @@ def test_the_map_fits_again_when_a_drone_leaves_it_unless_the_user_has_moved_it(
     page.page.evaluate(DRAWN)
     page.wait_for("marks of drones outside", lambda: page.drawn("outside") > 0)
     zoomed = scale()
-    page.wait_for("17 arrived", lambda: abs(float(page.row(17, 10)) - 60.0) < 0.2)
+    page.wait_for("17 arrived", lambda: abs(float(page.row(17, X)) - 60.0) < 0.2)
     assert scale() == zoomed
 
 
