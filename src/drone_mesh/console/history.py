@@ -42,9 +42,11 @@ def packed(mesh: MeshStatus) -> bytes:
 
 def unpacked(state: bytes) -> MeshStatus:
     """The state in such a compressed form. Any thread. Raises TypeError or ValueError."""
-    mesh = MeshStatus(*json.loads(zlib.decompress(state)))
+    mesh: Any = MeshStatus(*json.loads(zlib.decompress(state)))  # of lists where records belong
     nodes = [NodeStatus(*_with_bytes(values)) for values in mesh.nodes]
-    return replace(mesh, nodes=nodes, obstacles=[ObstacleStatus(*box) for box in mesh.obstacles])
+    obstacles = [ObstacleStatus(*box) for box in mesh.obstacles]
+    whole: MeshStatus = replace(mesh, nodes=nodes, obstacles=obstacles)
+    return whole
 
 
 def _plain(value: Any) -> Any:

@@ -4,11 +4,12 @@
 from __future__ import annotations
 
 import sys
+from typing import Callable
 
-from drone_mesh.stopping import Main, run_with_extra
+from drone_mesh.stopping import run_with_extra
 
 
-def _load() -> Main:
+def _load() -> Callable[[], int]:
     from drone_mesh.lab.command import main
 
     return main

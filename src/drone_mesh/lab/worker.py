@@ -62,8 +62,14 @@ def execute(spec: RunSpec) -> Outcome:
             message = f"{type(error).__name__}: {message}"
         else:
             message = f"still running after {spec.timeout_s:g} s of wall time"
-        failure = {"failure": kind, "message": message, "traceback": traceback.format_exc()}
-        return Outcome(spec, time.perf_counter() - started, code_with(spec.own_code), **failure)
+        return Outcome(
+            spec,
+            time.perf_counter() - started,
+            code_with(spec.own_code),
+            failure=kind,
+            message=message,
+            traceback=traceback.format_exc(),
+        )
     wall_s = time.perf_counter() - started
     return Outcome(spec, wall_s, code_with(spec.own_code), values, event_hash, outages)
 

@@ -93,8 +93,11 @@ def metrics(unit: str, better: str = "", **definitions: str) -> Callable[[Severa
     """Register several metrics, by name: the decorated function measures them, in this order."""
 
     def note(measure: Several) -> Several:
+        def only(place: int) -> Measure:
+            return lambda run: measure(run)[place]
+
         for place, (name, definition) in enumerate(definitions.items()):
-            METRICS[name] = Metric(unit, definition, lambda run, i=place: measure(run)[i], better)
+            METRICS[name] = Metric(unit, definition, only(place), better)
         return measure
 
     return note
