@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import random
 from unittest.mock import Mock
 
@@ -45,10 +46,27 @@ def test_the_later_of_two_radios_with_one_id_gives_way_and_both_name_it(routing,
     twin.stop()
 
 
+@pytest.mark.parametrize("routing", ["child_table_tree", "beacon"])
+def test_a_gateway_gives_way_to_no_other_radio_with_its_id(routing):
+    mesh = Network(2, radio="chips", rate="1M", routing=routing)
+    mesh.add_gateway(0, 0.0, 0.0)
+    mesh.add_router(1, 6.0, 0.0)
+    assert mesh.run_until(mesh.all_connected, within_s=30.0)
+    twin = Network(3, radio=mesh.air, routing=routing)
+    twin.add_gateway(0, 6.0, 5.0, start_s=mesh.now_s())
+    for _ in range(60):
+        mesh.run_for(1.0)
+        assert mesh.nodes[0].antenna.powered
+        assert twin.nodes[0].antenna.powered
+    assert mesh.nodes[0].component.get_shares_id()
+    mesh.stop()
+    twin.stop()
+
+
 def test_whoever_comes_back_after_giving_way_finds_the_id_introduced_again():
     """The other one introduces itself only so often, but anew when the first can be back."""
     control, antenna, deadlines = Mock(), Mock(), Deadlines()
-    own_id = OwnId(control, antenna, deadlines, Mock(), random.Random(1), 10.0)
+    own_id = OwnId(control, antenna, deadlines, Mock(), random.Random(1), 10.0, math.inf)
     control.says_connected.return_value = False
     for now_s in (11.0, 41.0):
         deadlines.now_s = now_s

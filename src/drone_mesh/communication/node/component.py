@@ -146,9 +146,8 @@ class MeshnetworkComponent(NodeSnapshots, IMeshNetwork, IControlHost):
         )
         self.control = control = _control_plane(node, routing)
         self._learn, self._forward = control.learn, control.forward  # called for each packet
-        # A gateway never gives way: it is looked for as soon as it starts.
-        new_for_s = -math.inf if states is None else check_s
-        self._own_id = OwnId(control, antenna, deadlines, complaints, rng, new_for_s)
+        connected_s = -math.inf if states is None else math.inf  # a gateway never gives way
+        self._own_id = OwnId(control, antenna, deadlines, complaints, rng, check_s, connected_s)
         self._orders = OrderIntake(
             node_id, control, self._pilot, engine, deadlines, medium, complaints, self._report
         )

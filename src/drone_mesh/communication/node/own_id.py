@@ -32,9 +32,11 @@ class OwnId:
     _complaints: Complaints
     _rng: random.Random  # spreads the time off: two that gave way do not return together
     _new_for_s: float  # it gives way until it has been connected for longer than this
+    # When the node was first connected, since it last gave way; a gateway always was: its drones
+    # look for it as soon as it starts.
+    _connected_s: float
 
     def __post_init__(self) -> None:
-        self._connected_s = math.inf  # when the node was first connected, since it last gave way
         self._heard_s = -math.inf
         self._introductions = RateLimit(INTRODUCTIONS, OFF_S)
 
