@@ -76,6 +76,12 @@ def all_stand_connected(state: MeshState) -> bool:
     )
 
 
+def is_flown(state: MeshState) -> bool:
+    """Whether the layout is: its drones set out one after another."""
+    done = f"layout {CASE}: {ROUTERS} of {ROUTERS} at their places"
+    return done in state.layouts and all_stand_connected(state)
+
+
 def a_drone_flies(state: MeshState) -> bool:
     return any(len(node.path) for node in state.nodes)
 
@@ -112,7 +118,7 @@ def take_pictures(browser: Browser, folder: Path) -> None:
         controls.speed(False, FAST)
         controls.layout(CASE)
         watch.wait_for("the drones take off", a_drone_flies)
-        watch.wait_for("all connected in their places", all_stand_connected)
+        watch.wait_for("all connected in their places", is_flown)
         settled_until_s = watch.time_s + ROUNDS_S
         watch.wait_for("some check periods", lambda _state: watch.time_s >= settled_until_s)
         controls.power(LOST_ROUTER, False)

@@ -223,6 +223,13 @@ def test_a_link_selects_a_node_and_a_selection_makes_a_link(start_console, visit
     page.wait_for("the link of 5", lambda: page.page.url.endswith("#node=5"))
 
 
+@pytest.mark.parametrize("words", ["node=77", "node=1.2.3", "node=77&t=1..2"])
+def test_who_selects_a_node_no_longer_waits_for_the_one_of_the_link(start_console, visit, words):
+    page = visit(f"{start_console(*FAST).url}#{words}")
+    page.page.click("#nodes tr[data-id='5']")
+    page.wait_for("the link of 5", lambda: page.page.url.endswith("#node=5"))
+
+
 def test_the_map_follows_a_drone(page):
     page.page.click("#nodes tr[data-id='17']")
     page.page.click("#follow")

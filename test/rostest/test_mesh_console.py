@@ -33,9 +33,10 @@ from rostest_support import (
 
 from drone_mesh.console.memory import memory_of, read_memory
 from drone_mesh.state.alarms import AlarmBook
+from drone_mesh.web import LOOPBACK
 
 HOST = "127.0.0.1:18181"
-MEMORY = memory_of(18181)
+MEMORY = memory_of(LOOPBACK, 18181)
 TOKEN = "a-token-for-this-test"
 CONSOLE = program("console", "__name:=guarded_console", "_port:=0")
 

@@ -103,7 +103,7 @@ def main(
         access = token.access(options.bind)
         server = ConsoleServer(store, controls, access, actions=controls.ACTIONS, tiles=tiles)
         runner = ConsoleRunner(server, options.bind, options.port)
-        memory = ConsoleMemory(store, memory_of(options.port))
+        memory = ConsoleMemory(store, memory_of(options.bind, options.port))
         runner.start()
         print(token.greeting(options.bind, runner.port), flush=True)
         feed = GatewayFeed(client, store, runner, memory)

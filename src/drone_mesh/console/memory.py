@@ -17,6 +17,7 @@ from drone_mesh.console.history import KeptState, unpacked
 from drone_mesh.drone.location import Location
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
 from drone_mesh.state.outages import MeshSample
+from drone_mesh.web import LOOPBACK
 
 # Of another version there may be other fields, and their order is all that the file knows.
 _VERSION = " ".join(f.name for of in (MeshStatus, NodeStatus, MeshSample) for f in fields(of))
@@ -25,15 +26,24 @@ CREATE TABLE IF NOT EXISTS about (version TEXT, run TEXT, seen INTEGER, saved TE
 CREATE TABLE IF NOT EXISTS states (t REAL PRIMARY KEY, packed BLOB, sample TEXT);
 CREATE TABLE IF NOT EXISTS events (t REAL, event TEXT);
 """
+WAIT_S = 1.0  # for another program that has the file open
 _DAMAGED = (KeyError, TypeError, ValueError, sqlite3.Error, zlib.error)
 
 log = logging.getLogger(__name__)
 
 
-def memory_of(port: int) -> Path | None:
-    """The file of the console on this port, which has it alone; None for port 0: any port."""
-    home = os.environ.get("XDG_STATE_HOME") or Path("~/.local/state").expanduser()
-    return Path(home, "drone_mesh", f"console-{port}.sqlite") if port else None
+def memory_of(address: str, port: int) -> Path | None:
+    """The file of the console that listens there, which has it alone.
+
+    None: port 0 is any port, or the user has no home.
+    """
+    home = os.environ.get("XDG_STATE_HOME", "")
+    if not os.path.isabs(home):  # such a one is to be ignored: XDG Base Directory Specification
+        home = os.path.expanduser("~/.local/state")
+    if not port or not os.path.isabs(home):
+        return None
+    where = str(port) if address == LOOPBACK else f"{address.replace('/', '_')}-{port}"
+    return Path(home, "drone_mesh", f"console-{where}.sqlite")
 
 
 class Left(NamedTuple):
@@ -79,9 +89,11 @@ class ConsoleMemory:
         self._is_new = True
         self._saved_s, self._events, self._noted = float("-inf"), 0, ""
         self._unsaved: list[_News] = []
-        if path is not None and path.exists():
+        if path is not None:
             try:
-                self._left = read_memory(path)
+                self._left = read_memory(path) if path.exists() else None
+            except (OSError, sqlite3.OperationalError) as error:
+                self._give_up(error)
             except _DAMAGED as error:
                 log.warning("console: %s is ignored: %s", path, error)
                 with contextlib.suppress(OSError):
@@ -137,8 +149,13 @@ class ConsoleMemory:
                 with _open(self._path) as database:
                     _write(database, self._unsaved.pop(0))
             except (OSError, sqlite3.Error) as error:
-                log.warning("console: what the page shows is not kept: %s: %s", self._path, error)
-                self._path = None
+                self._give_up(error)
+
+    def _give_up(self, error: Exception) -> None:
+        """Keep nothing; the file may be good, for a console that can open it."""
+        reason = error.strerror if isinstance(error, OSError) else error
+        log.warning("console: what the page shows is not kept: %s: %s", self._path, reason)
+        self._path = None
 
 
 @contextlib.contextmanager
@@ -146,7 +163,7 @@ def _open(path: Path) -> Iterator[sqlite3.Connection]:
     """The file, which only its owner may access, in one transaction."""
     path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
     os.close(os.open(str(path), os.O_CREAT | os.O_RDWR, 0o600))
-    with contextlib.closing(sqlite3.connect(str(path), timeout=1.0)) as database:
+    with contextlib.closing(sqlite3.connect(str(path), timeout=WAIT_S)) as database:
         database.executescript(f"PRAGMA synchronous = OFF; {_TABLES}")  # the disk may take its time
         with database:
             yield database

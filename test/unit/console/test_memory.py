@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import os
+import pwd
 import sqlite3
 import stat
 from pathlib import Path
@@ -14,6 +17,7 @@ from drone_mesh.console.history import History
 from drone_mesh.console.memory import ConsoleMemory, memory_of
 from drone_mesh.drone.location import Location
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
+from drone_mesh.web import LOOPBACK
 
 EVENTS = [
     EventRecord(1.0, 3, "connected", (0,)),
@@ -176,7 +180,52 @@ def test_a_place_that_cannot_be_written_is_said_once_and_nothing_is_kept(tmp_pat
     assert [record.levelname for record in caplog.records] == ["WARNING"]
 
 
-def test_a_console_on_any_free_port_keeps_nothing(monkeypatch):
+@pytest.mark.parametrize("asked", ["open", "stat"])
+def test_a_file_that_cannot_be_opened_is_said_and_left_alone(path, caplog, monkeypatch, asked):
+    def refuse(*_about: object, **_more: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, asked, refuse)
+        patch.setattr(Path, "exists", lambda file: bool(os.stat(str(file))))
+        console = Console(path)
+        console.update(9.0)
+        console.save()
+    assert [record.levelname for record in caplog.records] == ["WARNING"]
+    assert len(Console(path).frame["events"]) == len(EVENTS)
+
+
+def test_a_file_that_another_console_uses_is_left_alone(path, caplog, monkeypatch):
+    monkeypatch.setattr("drone_mesh.console.memory.WAIT_S", 0.01)
+    with contextlib.closing(sqlite3.connect(str(path))) as other:
+        other.execute("BEGIN EXCLUSIVE")
+        console = Console(path)
+        console.update(9.0)
+        console.save()
+    assert [record.levelname for record in caplog.records] == ["WARNING"]
+    assert len(Console(path).frame["events"]) == len(EVENTS)
+
+
+@pytest.mark.parametrize("home", ["", "relative/state"])
+def test_without_an_absolute_folder_in_the_environment_it_is_the_one_of_the_user(monkeypatch, home):
+    monkeypatch.setenv("XDG_STATE_HOME", home)
+    monkeypatch.setenv("HOME", "/home/somebody")
+    assert memory_of(LOOPBACK, 1) == Path("/home/somebody/.local/state/drone_mesh/console-1.sqlite")
+
+
+def test_a_user_without_a_home_keeps_nothing(monkeypatch):
+    monkeypatch.delenv("XDG_STATE_HOME", raising=False)
+    monkeypatch.delenv("HOME")
+    monkeypatch.setattr(pwd, "getpwuid", {}.__getitem__)
+    assert memory_of(LOOPBACK, 8080) is None
+
+
+def test_a_console_on_any_free_port_keeps_nothing():
+    assert memory_of(LOOPBACK, 0) is None
+
+
+def test_consoles_on_one_port_of_two_addresses_have_files_of_their_own(monkeypatch):
     monkeypatch.setenv("XDG_STATE_HOME", "/state")
-    assert memory_of(0) is None
-    assert memory_of(8080) == Path("/state/drone_mesh/console-8080.sqlite")
+    assert memory_of(LOOPBACK, 8080) == Path("/state/drone_mesh/console-8080.sqlite")
+    assert memory_of("::1", 8080) == Path("/state/drone_mesh/console-::1-8080.sqlite")
+    assert memory_of("a/../b", 8080) == Path("/state/drone_mesh/console-a_.._b-8080.sqlite")

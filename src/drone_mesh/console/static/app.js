@@ -397,7 +397,7 @@ mesh.addEventListener("select", () => mesh.selected === null && follow(false));
 /** What an address like #node=3&t=61.2 selects: a node and a moment, as numbers; null: none. */
 function linked() {
   const words = new URLSearchParams(location.hash.slice(1));
-  const of = (name) => (/^[0-9.]+$/.test(words.get(name)) ? Number(words.get(name)) : null);
+  const of = (name) => (/^\d+(\.\d+)?$/.test(words.get(name)) ? Number(words.get(name)) : null);
   return { node: of("node"), t: of("t") };
 }
 let awaited = linked(); // what has not come yet
@@ -423,13 +423,14 @@ function showAddress() {
 }
 
 function followLink() {
-  const { node, t } = awaited;
-  const { start, end } = mesh.timeline;
+  const { node } = awaited;
   if (node !== null && mesh.nodes.has(node)) {
     awaited.node = null;
     mesh.select(node);
     map.show(node);
   }
+  const { t } = awaited;
+  const { start, end } = mesh.timeline;
   if (t !== null && start !== undefined) {
     awaited.t = null;
     if (start <= t && t <= upToCentis(end)) connection.ask({ do: "time", t, paused: true });
@@ -444,7 +445,11 @@ window.addEventListener("hashchange", () => {
   awaited = linked();
   followLink();
 });
-for (const what of ["frame", "timeline", "select"]) mesh.addEventListener(what, followLink);
+for (const what of ["frame", "timeline"]) mesh.addEventListener(what, followLink);
+mesh.addEventListener("select", () => {
+  if (mesh.selected !== null) awaited.node = null; // whoever looks at another node has given it up
+  followLink();
+});
 
 byId("time-link").addEventListener("click", async () => {
   const link = new URL(address(true), location.href).href;

@@ -117,6 +117,7 @@ export class NodeTable {
   #matches(node) {
     if (this.onlyProblems.checked && !node.trouble && !node.since) return false;
     const text = this.filter.value.trim().toLowerCase();
+    if (/^\d+$/.test(text)) return String(node.id).includes(text); // what it does has numbers, too
     const known = [node.id, node.condition, node.trouble, node.order, node.since, node.does];
     return !text || known.join(" ").toLowerCase().includes(text);
   }

@@ -199,7 +199,7 @@ def _run() -> int:
         if reading is not None:
             reading.start()
         MasterWatch().start()
-        memory = ConsoleMemory(store, memory_of(port)) if whole is None else None
+        memory = ConsoleMemory(store, memory_of(address, port)) if whole is None else None
         MeshFeed(store, server, runner, memory).watch(stop)
     finally:
         if reading is not None:
