@@ -63,14 +63,14 @@ def test_a_test_gives_each_option(where: str, names: list[str]) -> None:
 
 @pytest.mark.parametrize(("file", "name"), sorted(launch_arguments()))
 def test_a_test_sets_each_launch_argument(file: str, name: str) -> None:
-    # test_launch_arguments.py passes all settings of the factory and all arguments of the console
+    # test_arguments.py passes all settings of the factory and all arguments of the console
     by_name = file in ("factory.launch", "console.launch") and is_passed_on(file, name)
     given = rf'\b{name}:=|<arg name="{name}" value='
     assert by_name or re.search(given, TESTS), f"{file}: no test sets {name}"
 
 
 def is_passed_on(file: str, name: str) -> bool:
-    """Whether it is a parameter of the node that test_launch_arguments.py looks at."""
+    """Whether it is a parameter of the node that test_arguments.py looks at."""
     node = {"factory.launch": "DroneFactory", "console.launch": "mesh_console"}[file]
     tree = ET.parse(LAUNCH / file)
     found = tree.findall(f".//node[@name='{node}']/param[@name='{name}']")

@@ -13,6 +13,7 @@ from drone_mesh.communication.beacon.packets import Beacon
 from drone_mesh.communication.data.outgoing import TicketState
 from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.communication.seals.keys import MeshKey
+from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.drone.location import Location
 from drone_mesh.inprocess import Network
@@ -261,6 +262,15 @@ def test_a_router_that_is_cut_off_knows_it_within_four_seconds():
     network.run_for(5.0)
     network.power(0, False)
     assert network.run_until(lambda: not network.connected(1), within_s=4.0)
+
+
+@pytest.mark.parametrize(
+    ("routing", "given_s", "waits_s"),
+    [("beacon", 0.0, 10.0), ("beacon", 20.0, 20.0), ("child_table_tree", 0.0, 30.0)],
+)
+def test_a_router_waits_as_its_technique_says_unless_the_user_sets_it(routing, given_s, waits_s):
+    network = line(1, routing=routing, timing=MeshTiming(connection_lost_after_s=given_s))
+    assert network.nodes[1].component._timing.connection_lost_after_s == waits_s
 
 
 def test_an_ordered_flight_does_not_end_the_membership():
