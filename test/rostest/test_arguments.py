@@ -72,7 +72,7 @@ class LaunchArgumentsTest(unittest.TestCase):
         self.assertEqual(found["/DroneManager/casus"], "/my.yaml")
         self.assertEqual(found["/drone_mesh/origin"], "1,2,3")
         self.assertEqual(found["/mesh_console/demo"], "repair")
-        self.assertEqual(found["/mesh_console/port"], 99)
+        self.assertEqual(found["/mesh_console/port"], "99")
         self.assertEqual(found["/mesh_console/tiles"], "/my.mbtiles")
         hosts = [(found[f"/mesh_host_{n}/index"], found[f"/mesh_host_{n}/hosts"]) for n in (1, 2)]
         self.assertEqual(hosts, [(1, 2), (2, 2)])
@@ -103,10 +103,10 @@ class LaunchArgumentsTest(unittest.TestCase):
 
     def test_each_argument_of_the_console_is_a_parameter(self) -> None:
         names = sorted(names_in("console.launch"))
-        values = {name: "80" if name == "port" else f"value of {name}" for name in names}
+        values = {name: f"value of {name}" for name in names}
         found = parameters("console.launch", *(f"{n}:={value}" for n, value in values.items()))
         for name, value in values.items():
-            self.assertEqual(str(found[f"/mesh_console/{name}"]), value)
+            self.assertEqual(found[f"/mesh_console/{name}"], value)
 
     def test_a_host_has_its_nodes(self) -> None:
         found = parameters("host.launch", "first:=3", "last:=5")
@@ -124,7 +124,7 @@ class LaunchArgumentsTest(unittest.TestCase):
         replay = ("replay.launch", "bag:=/my.bag", "rate:=2", "start:=7", "port:=99", "tiles:=/t")
         self.assertIn("--rate 2 --start 7 /my.bag", line(replay[0], "/mesh_replay", *replay[1:]))
         found = parameters(*replay, "origin:=1,2,3")
-        console = {"recording": "/my.bag", "port": 99, "origin": "1,2,3", "tiles": "/t"}
+        console = {"recording": "/my.bag", "port": "99", "origin": "1,2,3", "tiles": "/t"}
         for name, value in console.items():
             self.assertEqual(found[f"/mesh_console/{name}"], value)
         shown = printed("--nodes", *replay, "console:=false", "rviz:=true").split()
@@ -215,10 +215,11 @@ class BadArgumentsTest(unittest.TestCase):
                 (said,) = launch.stdout.splitlines()
                 self.assertIn(line, said)
                 self.assertEqual(launch.returncode, 1)
-        launch = launched(*WITH_CONSOLE, "console_port:=99999", by=("roslaunch",))
-        (said,) = [line for line in launch.stdout.splitlines() if line.startswith("console: ")]
-        self.assertIn(port, said)
-        self.assertNotIn("espawning", launch.stdout)
+        for number in ("99999", "abc"):
+            launch = launched(*WITH_CONSOLE, f"console_port:={number}", by=("roslaunch",))
+            (said,) = [line for line in launch.stdout.splitlines() if line.startswith("console: ")]
+            self.assertIn(f"invalid port {number}", said)
+            self.assertNotIn("espawning", launch.stdout)
 
 
 def suite() -> unittest.TestSuite:
