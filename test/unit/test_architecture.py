@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from collections import Counter
 from pathlib import Path
@@ -97,3 +98,15 @@ def test_the_tests_of_a_room_of_the_mesh_lie_in_its_folder():
             continue
         assert (mesh / room).is_dir(), path
         assert room_of.get(path.stem[len("test_") :], room) == room, path
+
+
+def test_no_module_gives_a_name_twice():
+    """The later value would count everywhere, also above it."""
+    twice = []
+    for file in sorted((ROOT / "src" / "drone_mesh").rglob("*.py")):
+        names = []
+        for node in ast.parse(file.read_text(encoding="utf-8")).body:
+            targets = node.targets if isinstance(node, ast.Assign) else []
+            names += [target.id for target in targets if isinstance(target, ast.Name)]
+        twice += [f"{file.name}: {name}" for name, times in Counter(names).items() if times > 1]
+    assert twice == []

@@ -119,9 +119,6 @@ class EmulatedAir:
             raise ConfigurationError(f"--trace {file}: {error.strerror or error}") from error
 
 
-_log = logging.getLogger(__name__)
-
-
 def joining_node(
     options: Options, address: AirAddress, make_internet: MakeInternet | None
 ) -> RadioNode:

@@ -46,7 +46,7 @@ class CommonFrame:
 
 
 UNKNOWN_HOPS = 10  # to the gateway, for a router that never was connected
-SAME_PLACE_M = 0.5  # places travel as float32, heights in whole metres
+SAME_GATEWAY_M = 0.5  # places travel as float32, heights in whole metres
 # A node of 2019 does not say that a place is its goal; it is out of reach by then.
 WRONG_FOR_S = 30.0
 
@@ -100,7 +100,7 @@ class KnownPlaces:
         """Note where another node says the gateway was; if `connected`, only as a doubt."""
         if self.gateway is not None and seen_s < self.gateway_seen_s:
             return
-        if self.gateway is not None and place.distance_m(self.gateway) < SAME_PLACE_M:
+        if self.gateway is not None and place.distance_m(self.gateway) < SAME_GATEWAY_M:
             self.gateway_seen_s = seen_s
         elif self.gateway is not None and (connected or self._by_gateway):
             self.gateway_disputed = True
@@ -160,7 +160,7 @@ class Claims:
         return possible
 
 
-SAME_PLACE_M = 0.09  # so much the spots of other drones allow for (TakenPlaces)
+TOLD_M = 0.09  # so much the spots of other drones allow for (TakenPlaces)
 
 
 @dataclass(eq=False)
@@ -189,7 +189,7 @@ class PlaceRequests:
         """
         goal = self._pilot.goal
         place = goal or self._pilot.location()
-        if place is None or (self._told and self._told.distance_m(place) < SAME_PLACE_M):
+        if place is None or (self._told and self._told.distance_m(place) < TOLD_M):
             return
         self._told = place
         self._broadcast(place, is_goal=goal is not None)
