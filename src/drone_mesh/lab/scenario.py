@@ -254,7 +254,7 @@ class Scenario(Part):
 
     model: Literal["mesh", "ideal"] = "mesh"
     layout: Layout = Layout()
-    range_m: Above0 = RANGE_M
+    range_m: Annotated[float, Field(gt=0, le=10_000)] = RANGE_M  # bounds of RepairOptions
     radio: Radio = Radio()
     key: bool = False  # a gateway has a mesh key, each router its own keys
     routing: str = DEFAULT_ROUTING

@@ -95,6 +95,11 @@ def test_an_argument_overrides_the_file(tmp_path: Path) -> None:
     assert [cell.scenario.radio.loss for cell in loaded.cells] == [0.1, 0.1]
 
 
+def test_a_range_that_no_node_takes_is_refused_when_the_file_is_read(tmp_path: Path) -> None:
+    with pytest.raises(ConfigurationError, match="range_m"):
+        load_experiment(write(tmp_path, GOOD), ["base.range_m=20000"])
+
+
 def test_a_run_keeps_its_id_when_seeds_or_cells_are_added(tmp_path: Path) -> None:
     path = write(tmp_path, GOOD)
     few = {planned.spec.run for planned in Plan(load_experiment(path))}
