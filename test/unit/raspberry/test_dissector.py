@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
+import tempfile
 
 import pytest
 
@@ -35,6 +37,13 @@ pytestmark = [
         shutil.which("tshark") is None, reason="tshark is not installed: apt install tshark"
     ),
 ]
+# Wireshark 4.4 loads no script for root.
+NOBODY = "65534"
+AS_NOBODY = (
+    ["setpriv", f"--reuid={NOBODY}", f"--regid={NOBODY}", "--clear-groups"]
+    if os.geteuid() == 0
+    else []
+)
 ADDRESS = bytes.fromhex("54 4D 52 68 0A")
 ORDER = with_order_number(GoToLocationMessage(0, 3, 5, 5, 1.5, -2.0, 7).to_payload(), 258)
 
@@ -42,12 +51,18 @@ ORDER = with_order_number(GoToLocationMessage(0, 3, 5, 5, 1.5, -2.0, 7).to_paylo
 def shown(path, *fields):
     """The values of these fields for each packet, as tshark prints them."""
     names = [word for field in fields for word in ("-e", field)]
-    done = subprocess.run(
-        ["tshark", "-X", f"lua_script:{DISSECTOR}", "-r", str(path), "-T", "fields", *names],
-        capture_output=True,
-        text=True,
-        check=True,
-    )
+    with tempfile.TemporaryDirectory() as folder, path.open("rb") as packets:
+        os.chmod(folder, 0o755)
+        script = shutil.copy(str(DISSECTOR), folder)
+        done = subprocess.run(
+            [*AS_NOBODY, "tshark", "-X", f"lua_script:{script}", "-r", "-", "-T", "fields", *names],
+            env={**os.environ, "HOME": folder},
+            stdin=packets,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            encoding="utf-8",
+            check=True,
+        )
     assert "Lua" not in done.stderr, done.stderr
     return [line.split("\t") for line in done.stdout.splitlines()]
 
