@@ -50,10 +50,8 @@ def test_each_file_of_the_python_package_is_installed(tmp_path: Path) -> None:
     subprocess.run(command, cwd=str(ROOT), check=True, capture_output=True)
     # Nothing else in src/ counts: pip leaves its notes there (drone_mesh.egg-info).
     assert [path.name for path in tmp_path.iterdir()] == ["drone_mesh"]
-    made_for_mypy = {
-        "msg.pyi",
-        "srv.pyi",
-    }  # by scripts/message_stubs; newer setuptools take them along
+    # By scripts/message_stubs; some versions of setuptools take them along.
+    made_for_mypy = {"msg.pyi", "srv.pyi"}
     files = files_below(ROOT / "src" / "drone_mesh") - made_for_mypy
     assert files_below(tmp_path / "drone_mesh") - made_for_mypy == files
 

@@ -37,13 +37,10 @@ pytestmark = [
         shutil.which("tshark") is None, reason="tshark is not installed: apt install tshark"
     ),
 ]
+
 # Wireshark 4.4 loads no script for root.
-NOBODY = "65534"
-AS_NOBODY = (
-    ["setpriv", f"--reuid={NOBODY}", f"--regid={NOBODY}", "--clear-groups"]
-    if os.geteuid() == 0
-    else []
-)
+NOBODY = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups"]
+AS_NOBODY = NOBODY if os.geteuid() == 0 else []
 ADDRESS = bytes.fromhex("54 4D 52 68 0A")
 ORDER = with_order_number(GoToLocationMessage(0, 3, 5, 5, 1.5, -2.0, 7).to_payload(), 258)
 
@@ -58,8 +55,7 @@ def shown(path, *fields):
             [*AS_NOBODY, "tshark", "-X", f"lua_script:{script}", "-r", "-", "-T", "fields", *names],
             env={**os.environ, "HOME": folder},
             stdin=packets,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
+            capture_output=True,
             encoding="utf-8",
             check=True,
         )
