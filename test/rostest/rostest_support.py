@@ -32,6 +32,9 @@ NODES = Path(rospkg.RosPack().get_path("drone_mesh")) / "nodes"
 FORKS = multiprocessing.get_context("forkserver")
 PRELOADED = ["__main__", "drone_mesh.ros.views.report", "matplotlib.pyplot"]
 FORKS.set_forkserver_preload(PRELOADED)
+# The package of a devel space puts src/ first, where the messages are missing. Python 3.13 gives
+# this path to the process that forks.
+sys.path[:] = [path for path in sys.path if path != str(NODES.parent / "src")]
 
 
 def in_order(*cases: type[unittest.TestCase]) -> unittest.TestSuite:
