@@ -18,9 +18,6 @@ if [ -e "$drone_mesh_root/build/devel/setup.bash" ]; then
       unset drone_mesh_packages
       ;;
   esac
-  if [ -z "$ROS_PACKAGE_PATH" ]; then # nothing in Debian 13 sets it
-    export ROS_PACKAGE_PATH="$drone_mesh_root:/usr/share"
-  fi
   export PYTHONUNBUFFERED=1  # log lines appear at once, also in a pipe
   # ROS gives the name of this machine to other nodes, which must be able to resolve it.
   if [ -z "$ROS_HOSTNAME$ROS_IP" ] && ! getent hosts "$(uname -n)" >/dev/null; then
