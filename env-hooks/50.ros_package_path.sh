@@ -1,3 +1,4 @@
+# shellcheck shell=sh
 # By ROS_PACKAGE_PATH rosrun, roslaunch and rospkg find packages. Nothing in Debian 13 sets it.
 # A devel space names the folders of its sources, an install space none.
 read -r drone_mesh_sources <"$CATKIN_ENV_HOOK_WORKSPACE/.catkin" || true
