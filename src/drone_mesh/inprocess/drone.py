@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import random
 from dataclasses import dataclass
-from typing import Callable, Iterable, Mapping, Optional
+from typing import Any, Callable, Iterable, Mapping, Optional
 
 import numpy as np
 
@@ -204,10 +204,12 @@ class Pilots:
             self._hold(self.flying)
         if not self._nodes:
             return
-        for row in np.flatnonzero(self._ends_s <= now_s).tolist():
+        ended: Any = np.flatnonzero(self._ends_s <= now_s).tolist()
+        for row in ended:
             self._put(row, self._tracks[self._nodes[row]].leg_at(now_s))
         places = self._places + self._velocities * (now_s - self._starts_s)[:, None]
-        for node, (x, y, z) in zip(self._nodes, places.tolist()):
+        rows: Any = places.tolist()
+        for node, (x, y, z) in zip(self._nodes, rows):
             drones[node].put(Location(y, x, z))
         self._air.moved(self._nodes)
         self._clock.call_at(now_s + STEP_S, self._step, None)

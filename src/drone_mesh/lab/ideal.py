@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from typing import Callable, NamedTuple
+from typing import Any, Callable, NamedTuple
 
 import numpy as np
 from scipy.sparse.csgraph import connected_components
@@ -62,7 +62,8 @@ def oracle(swarm: Swarm) -> np.ndarray:
     """
     moves = np.zeros_like(swarm.places)
     rooted = np.flatnonzero(swarm.parts == swarm.parts[swarm.home])
-    for part in set(swarm.parts.tolist()) - {int(swarm.parts[swarm.home])}:
+    parts: Any = swarm.parts.tolist()
+    for part in set(parts) - {parts[swarm.home]}:
         own = np.flatnonzero(swarm.parts == part)
         gaps = swarm.places[rooted][None] - swarm.places[own][:, None]
         lengths = np.linalg.norm(gaps, axis=2)
@@ -170,7 +171,8 @@ def run_ideal(scenario: Scenario, streams: Streams) -> tuple[dict[str, float], s
     number = kill.number if kill.number is not None else round((kill.share or 0.0) * len(fit))
     rng = streams.generator("fault 0")
     if kill.pick == "cut_vertex":  # as in a run with packets, which draws the same victims
-        graph = Graph(within(dict(enumerate(places.tolist())), scenario.range_m))
+        rows: Any = places.tolist()
+        graph = Graph(within(dict(enumerate(rows)), scenario.range_m))
         order = rng.sample(range(len(starts)), len(starts))
         victims = cut_vertices_of(graph, gateways, order, number)
     else:
@@ -227,6 +229,8 @@ def _measured(draw: Draw, repair: Flown) -> tuple[dict[str, float], str]:
     shifts = np.linalg.norm(places - start[draw.alive], axis=1)
     observed_s = (round(scenario.duration_s / STEP_S) - 1) * STEP_S
     values = dict.fromkeys(METRICS, math.nan)
+    before_rows: Any = start.tolist()
+    after_rows: Any = places.tolist()
     values.update(
         healed=float(healed),
         split=float(first_parts.max() > 0),
@@ -251,7 +255,7 @@ def _measured(draw: Draw, repair: Flown) -> tuple[dict[str, float], str]:
         parts_before=1.0,
         parts_after=float(parts.max() + 1),
         degree_after=float(near.sum() / len(near)),
-        coverage=covered(places.tolist(), range_m) / covered(start.tolist(), range_m),
+        coverage=covered(after_rows, range_m) / covered(before_rows, range_m),
     )
     digest = hashlib.sha256(np.round(places, 6).tobytes()).hexdigest()[:16]
     return values, digest

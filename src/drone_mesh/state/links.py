@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 import math
-from typing import Iterable, Mapping, Sequence, Tuple
+from typing import Any, Iterable, Mapping, Sequence, Tuple
 
 import numpy as np
 
@@ -75,7 +75,8 @@ def known_links(nodes: Sequence[NodeStatus]) -> set[Link]:
     for node in nodes:
         listed[node.id, list(node.neighbours)] = True
     linked = np.triu((listed | listed.T) & on & on[:, None], k=1)
-    return {(low, high) for low, high in np.argwhere(linked).tolist()}
+    pairs: Any = np.argwhere(linked).tolist()
+    return {(low, high) for low, high in pairs}
 
 
 def route_links(nodes: Sequence[NodeStatus]) -> set[Link]:
@@ -125,9 +126,9 @@ class LinkForecast:
         found = []
         for one, other in links:
             if {one, other} <= self._velocities.keys() & places.keys():
-                away = np.subtract(places[other], places[one])
-                drift = self._velocities[other] - self._velocities[one]
-                if link_expires_s(away.tolist(), drift.tolist(), range_m) < SOON_S:
+                away: Any = np.subtract(places[other], places[one]).tolist()
+                drift: Any = (self._velocities[other] - self._velocities[one]).tolist()
+                if link_expires_s(away, drift, range_m) < SOON_S:
                     found.append((one, other))
         return sorted(found)
 
