@@ -37,6 +37,6 @@ def _doing(node: NodeStatus, others: int) -> str:
     if condition is not Condition.CONNECTED:
         return "looks for a gateway"
     routers = "1 router" if others == 1 else f"{others} routers"
-    if node.role == Role.GATEWAY:
+    if node.role == Role.GATEWAY and len(node.route) < 2:  # with no internet it is a relay
         return f"serves {routers}"
     return f"relays for {routers}" if others else "relays for nobody"

@@ -47,3 +47,16 @@ def test_a_relay_and_a_gateway_count_the_routes_that_lead_there():
         2: "relays for 1 router",
         3: "relays for nobody",
     }
+
+
+def test_a_gateway_without_internet_relays_for_its_routers_to_another_gateway():
+    nodes = [
+        NodeStatus(0, role=Role.GATEWAY, connected=True, route=bytes([0, 1])),
+        NodeStatus(1, role=Role.GATEWAY, connected=True),
+        NodeStatus(2, connected=True, route=bytes([2, 0, 1])),
+    ]
+    assert doings(nodes) == {
+        0: "relays for 1 router",
+        1: "serves 2 routers",
+        2: "relays for nobody",
+    }
