@@ -13,10 +13,11 @@ from __future__ import annotations
 import abc
 import math
 from dataclasses import dataclass
-from typing import Callable, Iterable
+from typing import Callable, Iterable, Iterator, NamedTuple
+
+import numpy as np
 
 from drone_mesh.channel.packet_queue import ALL_NODES, OutgoingPacket
-from drone_mesh.drone.flight_path import Vector
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.inprocess.clock import VirtualClock
 from drone_mesh.inprocess.interfaces import IInProcessAir, IInProcessAntenna
@@ -26,7 +27,18 @@ from drone_mesh.nrf24.emulator.space import Space
 from drone_mesh.nrf24.registers import NS_PER_S
 from drone_mesh.nrf24.settings import RadioSettings
 
+ROUNDED = 1.000001  # factor on a distance: more than its last digits
 MOST_GAIN_DB = 10.0  # Rayleigh fading exceeds it once in 22,000 blocks
+
+
+class Link(NamedTuple):
+    """From one radio to another, without fading."""
+
+    distance_m: float
+    power_dbm: float
+
+
+NO_LINK = Link(math.inf, -math.inf)  # of a radio that is gone, and to itself
 
 
 @dataclass(eq=False)
@@ -86,6 +98,7 @@ class SharedAir(IInProcessAir):
         self.on_frame: Callable[[OutgoingPacket], object] = id
         self._bits_per_s = settings.data_rate.value
         self._carrier_mhz = 2400 + settings.channel
+        self._sent_dbm = float(settings.power.value)
         self._capture_db = CAPTURE_DB[self._bits_per_s]
         self._packet_s = settings.frame_s
         self._answer_s = settings.answer_frame_s
@@ -93,8 +106,10 @@ class SharedAir(IInProcessAir):
         self._answer_bits = round(self._answer_s * self._bits_per_s)
         self._radios: dict[int, SharedRadio] = {}
         self._active: list[Transmission] = []
-        self._power_dbm: dict[tuple[int, int], float] = {}  # sender, receiver; of standing pairs
-        self._reached: dict[tuple[int, bool], list[SharedRadio]] = {}  # by a standing sender
+        # What depends on places, until a radio moves: sender, receiver, of pairs at rest; in reach.
+        self._links: dict[tuple[int, int], Link] = {}
+        self._reached: dict[tuple[int, bool], list[SharedRadio]] = {}
+        self._places: np.ndarray | None = None  # (n, 3); those in flight may be anywhere: NaN
         self._flying: set[int] = set()
 
     # The radios on the air -------------------------------------------------------------------
@@ -115,7 +130,8 @@ class SharedAir(IInProcessAir):
 
     def moved(self, _nodes: Iterable[int]) -> None:
         self._reached.clear()
-        self._power_dbm.clear()
+        self._links.clear()
+        self._places = None
 
     def in_range(self, node: int) -> dict[int, SharedRadio]:
         if node not in self._radios:
@@ -158,13 +174,14 @@ class SharedAir(IInProcessAir):
         if since_s is None or since_s > frame.start_s or not receiver.recognises(frame):
             return
         sender_id, receiver_id = frame.sender.node_id, receiver.node_id
-        power_dbm = self._power(sender_id, receiver_id)
-        if power_dbm == -math.inf:
+        link = self._link(sender_id, receiver_id)
+        if link.power_dbm == -math.inf:
             return  # obstacles block it
+        power_dbm = self._faded_dbm(sender_id, receiver_id, link)
         hop = Hop(
             sender_id,
             receiver_id,
-            self._distance_m(sender_id, receiver_id),
+            link.distance_m,
             power_dbm,
             self._bits_per_s,
             self._packet_bits if frame.answers is None else self._answer_bits,
@@ -190,44 +207,41 @@ class SharedAir(IInProcessAir):
 
     def _forget(self, node: int) -> None:
         self._reached.clear()
-        self._power_dbm = {pair: dbm for pair, dbm in self._power_dbm.items() if node not in pair}
-
-    def _place(self, node: int) -> Vector:
-        return self._radios[node].drone.get_location().to_vector()
-
-    def _distance_m(self, one: int, other: int) -> float:
-        radios = self._radios
-        if one not in radios or other not in radios:
-            return math.inf
-        return math.dist(radios[one].drone.get_location(), radios[other].drone.get_location())
+        self._places = None
+        self._links = {pair: link for pair, link in self._links.items() if node not in pair}
 
     def _power(self, sender: int, receiver: int) -> float:
         """The power of a frame between two radios now."""
-        power_dbm = self._mean_power(sender, receiver)
-        fading = self.space.fading
+        return self._faded_dbm(sender, receiver, self._link(sender, receiver))
+
+    def _faded_dbm(self, sender: int, receiver: int, link: Link) -> float:
+        fading, power_dbm = self.space.fading, link.power_dbm
         if fading is None or power_dbm == -math.inf:
             return power_dbm
-        places = (self._place(sender), self._place(receiver))
+        radios = self._radios
+        here, there = (radios[end].drone.get_location() for end in (sender, receiver))
+        places = here.to_vector(), there.to_vector()
         now_ns = round(self.clock.now_s * NS_PER_S)
         return power_dbm + fading.gain_db((sender, receiver), places, self._carrier_mhz, now_ns)
 
-    def _mean_power(self, sender: int, receiver: int) -> float:
-        power_dbm = self._power_dbm.get((sender, receiver))
-        if power_dbm is not None:
-            return power_dbm
-        if sender == receiver:
-            return -math.inf  # its own frame, during which it did not listen
-        distance_m = self._distance_m(sender, receiver)
-        if distance_m == math.inf:
-            return -math.inf
-        power_dbm = self.space.links.received_dbm(
-            distance_m, float(self.settings.power.value), self._carrier_mhz
-        )
-        if self.space.obstacles is not None:
-            power_dbm -= self.space.lost_db(self._place(sender), self._place(receiver))
-        if not self._flying.intersection((sender, receiver)):
-            self._power_dbm[sender, receiver] = power_dbm
-        return power_dbm
+    def _link(self, sender: int, receiver: int) -> Link:
+        link = self._links.get((sender, receiver))
+        if link is None:
+            link = self._measured(sender, receiver)
+            if sender not in self._flying and receiver not in self._flying:
+                self._links[sender, receiver] = link
+        return link
+
+    def _measured(self, sender: int, receiver: int) -> Link:
+        radios = self._radios
+        if sender == receiver or sender not in radios or receiver not in radios:
+            return NO_LINK
+        here, there = radios[sender].drone.get_location(), radios[receiver].drone.get_location()
+        distance_m, space = math.dist(here, there), self.space
+        power_dbm = space.links.received_dbm(distance_m, self._sent_dbm, self._carrier_mhz)
+        if space.obstacles is not None:
+            power_dbm -= space.lost_db(here.to_vector(), there.to_vector())
+        return Link(distance_m, power_dbm)
 
     def _noise_exceeds(self, dbm: float, frame: Transmission, receiver: SharedRadio) -> bool:
         """Whether there was more noise than that at some time during the frame."""
@@ -256,18 +270,35 @@ class SharedAir(IInProcessAir):
         reached = self._reached.get((node, faded))
         if reached is None:
             more_db = MOST_GAIN_DB if faded else 0.0
-            reached = [
-                radio
-                for other, radio in self._radios.items()
-                if other != node and self._reaches(node, other, more_db)
-            ]
+            near = self._near(node, more_db)
+            reached = [radio for radio in near if self._reaches(node, radio.node_id, more_db)]
             if not self._flying:
                 self._reached[node, faded] = reached
         return reached
 
+    def _near(self, node: int, more_db: float) -> Iterator[SharedRadio]:
+        """The radios in reach, and a few others: a quick choice among many."""
+        if node not in self._radios:
+            return
+        radios = list(self._radios.values())
+        if self._places is None:
+            unknown = (math.nan,) * 3
+            self._places = np.array(
+                [
+                    unknown if radio.node_id in self._flying else radio.drone.get_location()
+                    for radio in radios
+                ]
+            )
+        away = self._places - self._radios[node].drone.get_location()
+        furthest_m = ROUNDED * self.space.links.furthest_m(
+            self._sent_dbm, self._carrier_mhz, self._bits_per_s, more_db
+        )
+        is_far = np.einsum("ij,ij->i", away, away) > furthest_m**2  # False for NaN
+        for row in np.flatnonzero(~is_far):
+            yield radios[row]
+
     def _reaches(self, node: int, other: int, more_db: float) -> bool:
-        power_dbm = self._mean_power(node, other)
-        distance_m = self._distance_m(node, other)
-        return power_dbm > -math.inf and self.space.links.reaches(
-            distance_m, power_dbm + more_db, self._bits_per_s
+        link = self._link(node, other)
+        return link.power_dbm > -math.inf and self.space.links.reaches(
+            link.distance_m, link.power_dbm + more_db, self._bits_per_s
         )

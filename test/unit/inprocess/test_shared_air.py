@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import random
 from types import SimpleNamespace
 
@@ -16,7 +17,8 @@ from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.clock import VirtualClock
 from drone_mesh.inprocess.shared_antenna import SharedChannel
 from drone_mesh.nrf24.emulator.links import IdealDisc, LogDistance, ScriptedLoss
-from drone_mesh.nrf24.settings import RadioSettings
+from drone_mesh.nrf24.emulator.space import Fading
+from drone_mesh.nrf24.settings import DataRate, RadioSettings
 
 
 class Mesh(IMeshNetwork):
@@ -261,3 +263,40 @@ def test_the_same_seed_gives_the_same_frames():
 
     assert run(1) == run(1)
     assert run(1) != run(2)
+
+
+class Unbounded(ScriptedLoss):
+    """A model that does not say how far its frames reach, so that every radio is asked."""
+
+    def furthest_m(self, tx_dbm, carrier_mhz, bits_per_s, more_db):
+        return math.inf
+
+
+@pytest.mark.parametrize("rate", list(DataRate))
+@pytest.mark.parametrize("scaled", [False, True])
+def test_who_is_too_far_away_to_be_asked_is_out_of_reach(rate, scaled):
+    rng, settings, model = random.Random(3), RadioSettings(data_rate=rate), IdealDisc(9.0)
+    if scaled:
+        model = LogDistance.with_edge_at(9.0, rng, bits_per_s=rate.value)
+    places = [rng.uniform(0.0, 150.0) for _ in range(60)]
+    rigs = [Rig(*places, links=links, settings=settings) for links in (model, Unbounded(model, id))]
+    for rig in rigs:
+        rig.air.space.fading = Fading("rayleigh", rng) if scaled else None
+    reached = 0
+    for step in range(5):
+        for node in rng.sample(range(60), 20):
+            place = Location(rng.uniform(0.0, 9.0), rng.uniform(0.0, 150.0), 0.0)
+            for rig in rigs:
+                rig.antennas[node].drone = GroundEngine(node, place)
+                if step % 2:
+                    rig.air.moved((node,))
+                else:
+                    rig.air.flight(node, node % 2 == 0)
+        for node in range(60):
+            for faded in (False, True):
+                few, all_asked = (
+                    [radio.node_id for radio in rig.air._in_reach(node, faded)] for rig in rigs
+                )
+                assert few == all_asked
+                reached += len(few)
+    assert 0 < reached < 60 * 59 * 5

@@ -51,6 +51,10 @@ class LinkModel(abc.ABC):
         """Whether a frame can arrive over that distance at all; True if unknown."""
         return True
 
+    def furthest_m(self, tx_dbm: float, carrier_mhz: int, bits_per_s: int, more_db: float) -> float:
+        """From further away no frame arrives, even with `more_db` than usual; infinity: unknown."""
+        return math.inf
+
 
 def free_space_dbm(distance_m: float, tx_dbm: float, carrier_mhz: int) -> float:
     """Power between isotropic antennas (ITU-R P.525); 40.06 dB loss over 1 m at 2401 MHz."""
@@ -74,10 +78,16 @@ class IdealDisc(LinkModel):
     def reaches(self, distance_m: float, power_dbm: float, bits_per_s: int) -> bool:
         return distance_m < self._range_m
 
+    def furthest_m(self, tx_dbm: float, carrier_mhz: int, bits_per_s: int, more_db: float) -> float:
+        return self._range_m
+
 
 def bit_error_rate(margin_db: float) -> float:
     """Share of wrong bits at this margin above the sensitivity; 0.1 % at 0 dB, as specified."""
     return 0.5 * math.exp(-6.215 * 10 ** (margin_db / 10))
+
+
+_LEAST_MARGIN_DB = 10 * math.log10(math.log(0.5 / _ADDRESS_LOST_BER) / 6.215)  # its inverse
 
 
 class LogDistance(LinkModel):
@@ -125,6 +135,11 @@ class LogDistance(LinkModel):
     def reaches(self, distance_m: float, power_dbm: float, bits_per_s: int) -> bool:
         return bit_error_rate(power_dbm - SENSITIVITY_DBM[bits_per_s]) <= _ADDRESS_LOST_BER
 
+    def furthest_m(self, tx_dbm: float, carrier_mhz: int, bits_per_s: int, more_db: float) -> float:
+        spare_db = free_space_dbm(1.0, tx_dbm, carrier_mhz) + more_db
+        spare_db -= SENSITIVITY_DBM[bits_per_s] + _LEAST_MARGIN_DB
+        return float(10 ** (spare_db / (10 * self._exponent)) / self.metres_per_metre)
+
 
 class ScriptedLoss(LinkModel):
     """Another model with additional losses on demand, for tests and experiments."""
@@ -141,6 +156,9 @@ class ScriptedLoss(LinkModel):
 
     def reaches(self, distance_m: float, power_dbm: float, bits_per_s: int) -> bool:
         return self._model.reaches(distance_m, power_dbm, bits_per_s)
+
+    def furthest_m(self, tx_dbm: float, carrier_mhz: int, bits_per_s: int, more_db: float) -> float:
+        return self._model.furthest_m(tx_dbm, carrier_mhz, bits_per_s, more_db)
 
 
 _RANGE_FILE = Path(__file__).with_name("nrf24_range.csv")
