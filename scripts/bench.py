@@ -1,4 +1,4 @@
-"""Prints the tables of docs/performance.md: over ROS, in process, shared channel, chips."""
+"""Prints the tables of docs/performance.md: over ROS, in process, shared channel, chips, growth."""
 
 from __future__ import annotations
 
@@ -260,8 +260,8 @@ def main() -> None:
     parser.add_argument(
         "what",
         nargs="?",
-        choices=("ros", "inprocess", "shared", "chips"),
-        help="measure only this; default: all",
+        choices=("ros", "inprocess", "shared", "chips", "growth"),
+        help="measure only this; default: all but growth, which also draws a picture",
     )
     parser.add_argument("--quick", action="store_true", help="fewer sizes and runs: two minutes")
     parser.add_argument("--seconds", type=float, default=20.0, help="each fleet over ROS (20)")
@@ -282,6 +282,10 @@ def main() -> None:
             queued("shared", (26, 50) if quick else (26, 50, 101), runs)
         if what in (None, "chips"):
             queued("chips", (9,) if quick else (9, 17, 26), 1)
+        if what == "growth":
+            from growth import SIZES, growth
+
+            growth(SIZES[::3] if quick else SIZES)
     except KeyboardInterrupt:
         sys.exit("bench: interrupted; the rows above are complete")
 
