@@ -26,6 +26,7 @@ BATCH_S = 0.5  # work sent to a worker at once, so that the scheduler's overhead
 LARGEST_BATCH = 64
 TASKS_PER_WORKER = 2  # one running, one waiting
 DEATHS_ALLOWED = 2  # after one more death of its worker a run counts as failed
+WORKERLESS_S = 120.0  # dask gives up a worker that does not start, on an overloaded machine
 SLURM = "slurm"
 
 
@@ -66,7 +67,8 @@ def _client(workers: int, cluster: str | None) -> Iterator[Client]:
         try:
             if cluster is None:
                 # A terminal sends Ctrl-C to the workers too. Only this process handles it.
-                with ignored(signal.SIGINT):
+                patience = {"distributed.scheduler.no-workers-timeout": f"{WORKERLESS_S} s"}
+                with ignored(signal.SIGINT), dask.config.set(patience):
                     local = LocalCluster(
                         n_workers=workers,
                         threads_per_worker=1,
@@ -106,9 +108,10 @@ def _slurm(workers: int) -> contextlib.AbstractContextManager[object]:
 
 
 def _run_on(client: Client, waiting: deque[RunSpec]) -> Iterator[Outcome]:
-    from distributed import CancelledError, KilledWorker, as_completed
+    from distributed import CancelledError, KilledWorker, as_completed, scheduler
     from distributed.comm.core import CommClosedError
 
+    no_worker = getattr(scheduler, "NoWorkerError", ())  # since distributed 2025
     under_way: dict[Future, list[RunSpec]] = {}
     done = as_completed(loop=client.loop)
     lengths_s: deque[float] = deque(maxlen=50)
@@ -140,6 +143,8 @@ def _run_on(client: Client, waiting: deque[RunSpec]) -> Iterator[Outcome]:
                     alone.extend(batch)
                 else:
                     outcomes = [_died(batch[0], str(error))]
+            except no_worker as error:
+                raise EngineError(f"all workers are gone for {WORKERLESS_S:.0f} s") from error
             except (CancelledError, CommClosedError) as error:
                 raise EngineError(f"the dask scheduler is gone ({type(error).__name__})") from error
             future.release()

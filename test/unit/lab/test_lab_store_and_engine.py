@@ -21,6 +21,7 @@ import pytest
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.lab.campaign import _is_narrow
 from drone_mesh.lab.command import main
+from drone_mesh.lab.engine import EngineError, run_all
 from drone_mesh.lab.experiment import load_experiment
 from drone_mesh.lab.plan import Plan
 from drone_mesh.lab.store import Store, StoreError, read_runs
@@ -416,6 +417,23 @@ def test_a_run_that_always_kills_its_worker_is_a_failure_and_the_others_continue
     assert process.returncode == 1, output
     (failure,) = read_rows(tmp_path / "out/failures.csv")
     assert failure["kind"] == "worker died"
+
+
+@pytest.mark.slow
+def test_workers_that_are_gone_for_good_end_the_batch(
+    slow: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """dask gives up a worker whose start takes too long."""
+    from distributed.deploy.spec import SpecCluster
+
+    monkeypatch.setattr("drone_mesh.lab.engine.WORKERLESS_S", 1.0)
+    plan = Plan(load_experiment(slow))
+    outcomes = run_all((planned.spec for planned in plan), 1, None)
+    next(outcomes)
+    (cluster,) = (one for one in SpecCluster._instances if one.status.name == "running")
+    cluster.scale(0)
+    with pytest.raises(EngineError, match="all workers are gone for 1 s"):
+        list(outcomes)
 
 
 @pytest.mark.slow
