@@ -25,7 +25,9 @@ def requirements(name: str) -> list[str]:
     return found
 
 
-EXTRAS = ("console", "http", "lab", "mqtt", "physics", "raspberry", "report", "simulation")
+EXTRAS = (
+    "console", "http", "lab", "mqtt", "parquet", "physics", "raspberry", "report", "simulation",
+)  # fmt: skip
 
 setup(
     name="drone_mesh",

@@ -9,6 +9,7 @@ import os
 import signal
 import struct
 import subprocess
+import sys
 import tempfile
 import unittest
 from pathlib import Path
@@ -20,6 +21,7 @@ import rospy
 import rostest
 import websockets.exceptions
 import websockets.sync.client
+from mcap.reader import make_reader
 from rosgraph_msgs.msg import Clock
 from rostest_support import WALL_LIMIT_S, in_order, run_program, wait_for
 from test_tools import gateway_record
@@ -115,6 +117,25 @@ class ReplayTest(unittest.TestCase):
         self.assertEqual(lines[-1]["start"], BEGIN_S)
         self.assertLess(lines[-1]["now"], BEGIN_S + LENGTH_S - 0.5)
         self.assertTrue(lines[-1]["live"])
+
+    def test_4_another_program_makes_mcap_of_it_that_others_can_open(self) -> None:
+        record(self.bag)
+        out = self.bag.with_name("run")
+        how = ("--src", self.bag, "--dst", out, "--dst-storage", "mcap")
+        subprocess.run([sys.executable, "-m", "rosbags.convert", *how], check=True)
+        with (out / "run.mcap").open("rb") as file:
+            summary = make_reader(file).get_summary()
+        assert summary is not None
+        assert summary.statistics is not None
+        kinds = {number: summary.schemas[c.schema_id] for number, c in summary.channels.items()}
+        counts = summary.statistics.channel_message_counts
+        found = {c.topic: (kinds[n].name, counts[n]) for n, c in summary.channels.items()}
+        states = int(LENGTH_S * 5)
+        self.assertEqual(found["/mesh/state"], ("drone_mesh/msg/MeshState", states))
+        self.assertEqual(found["/mesh/packets"], ("drone_mesh/msg/PacketSample", states))
+        self.assertEqual(found["/clock"], ("rosgraph_msgs/msg/Clock", int(LENGTH_S * 100)))
+        (state,) = (kind for kind in kinds.values() if kind.name == "drone_mesh/msg/MeshState")
+        self.assertIn(b"MSG: drone_mesh/NodeState", state.data)  # which a viewer needs to read it
 
 
 TOOLS = (

@@ -2,6 +2,7 @@
 
 import importlib
 import os
+import re
 import socket
 import subprocess
 import sys
@@ -13,10 +14,20 @@ import pytest
 from drone_mesh.drone.engines import FlightOptions, create_engine
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import LocationUnknown
+from drone_mesh.lab.command import main as lab
 
 pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).resolve().parents[2]
+EXPERIMENT = """\
+name: half_way
+seeds: 8
+base:
+  layout: {kind: line, drones: 5}
+  faults: [{at_s: 20, kill: {number: 1, pick: cut_vertex}}]
+  duration_s: 90
+sweep: {repair: [thesis, stay]}
+"""
 
 
 @pytest.fixture
@@ -93,3 +104,18 @@ def test_a_users_own_engine_is_chosen_by_name_and_flies(monkeypatch):
 def test_a_users_own_repair_runs_beside_the_default(run_example):
     lines = run_example("own_repair.py", "--runs", "1").splitlines()
     assert [line.partition(": ")[0] for line in lines] == ["thesis", "__main__:LowestId"]
+
+
+def test_the_notebook_reads_and_plots_the_results_of_an_experiment(tmp_path):
+    nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
+    (tmp_path / "half_way.yaml").write_text(EXPERIMENT)
+    out = str(tmp_path / "results" / "half_way")
+    assert lab(["run", str(tmp_path / "half_way.yaml"), "--out", out, "--workers", "0"]) == 0
+    page = nbformat.read(ROOT / "examples" / "read_results.ipynb", as_version=4)
+    nbclient.NotebookClient(page, resources={"metadata": {"path": str(tmp_path)}}).execute()
+    outputs = [output for cell in page.cells for output in cell.get("outputs", ())]
+    assert [o.name for o in outputs if o.output_type == "stream"] == ["stdout"]  # no warnings
+    flown = next(o.text for o in outputs if o.output_type == "stream")
+    mean, low, high = map(float, re.search(r"distance_total_m +(.+)", flown)[1].split())
+    assert low <= mean <= high < 0.0  # who stays flies less
+    assert any("image/png" in output.get("data", {}) for output in outputs)

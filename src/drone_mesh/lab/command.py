@@ -98,8 +98,9 @@ def _parser() -> argparse.ArgumentParser:
     report.add_argument("--out", type=Path, help="the page (default: RESULTS/report.html)")
     report.add_argument(
         "--export", metavar="FORMAT", action="append", default=[],
-        choices=("png", "pdf", "svg", "csv", "latex"),
-        help="also write each figure or table as a file: png, pdf, svg, csv or latex; repeatable",
+        choices=("png", "pdf", "svg", "csv", "latex", "parquet"),
+        help="also write each figure (png, pdf, svg) or table (csv, latex) as a file, or all runs "
+        "and outages (parquet); repeatable",
     )  # fmt: skip
 
     tables = command(_tables, "print the tables of the report as Markdown", results=_RESULTS)

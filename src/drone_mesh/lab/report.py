@@ -44,7 +44,7 @@ def write_report(folder: Path, out: Path | None, formats: Sequence[str]) -> list
     page = out or folder / "report.html"
     try:
         page.write_text(_render(results, tables, drawings), encoding="utf-8")
-        return [page, *_export(folder, tables, drawings, formats)]
+        return [page, *_export(results, tables, drawings, formats)]
     except OSError as error:
         raise ReportError(f"cannot write {error.filename or page}: {error.strerror}") from error
 
@@ -76,10 +76,10 @@ def _render(results: Results, tables: Sequence[Table], drawings: Sequence[Drawin
 
 
 def _export(
-    folder: Path, tables: Sequence[Table], drawings: Sequence[Drawing], formats: Sequence[str]
+    results: Results, tables: Sequence[Table], drawings: Sequence[Drawing], formats: Sequence[str]
 ) -> list[Path]:
     written: list[Path] = []
-    target = folder / EXPORTS
+    target = results.folder / EXPORTS
     if formats:
         target.mkdir(exist_ok=True)
     for kind in dict.fromkeys(formats):
@@ -89,6 +89,8 @@ def _export(
                 path = target / f"{drawing.name}.{kind}"
                 drawing.figure.savefig(path, format=kind, dpi=PNG_DPI, metadata=metadata)
                 written.append(path)
+        elif kind == "parquet":
+            written += _parquet(results, target)
         else:
             for table in tables:
                 path = target / f"{table.name}.{'tex' if kind == 'latex' else 'csv'}"
@@ -96,6 +98,15 @@ def _export(
                 path.write_text(text, encoding="utf-8")
                 written.append(path)
     return written
+
+
+def _parquet(results: Results, target: Path) -> list[Path]:
+    try:
+        from drone_mesh.lab.parquet import write_parquet
+    except ImportError as error:
+        what = f"--export parquet needs the Python package {error.name}"
+        raise ReportError(f"{what}: pip install 'drone_mesh[parquet]'") from None
+    return write_parquet(results, target)
 
 
 def draw_alone(results: Results, name: str, out: Path) -> None:

@@ -35,6 +35,7 @@ CREATE TABLE IF NOT EXISTS failures (run TEXT PRIMARY KEY, row TEXT);
 COMMIT;
 """
 _RUNS, _FAILURES = "SELECT runs.row FROM runs", "SELECT failures.row FROM failures"
+_OUTAGES = "SELECT outages FROM runs"
 _IN_ORDER = "LEFT JOIN plan USING (run) ORDER BY place IS NULL, place, run"  # then earlier plans
 
 _MIXED = "SELECT cell FROM plan JOIN runs USING (run) GROUP BY cell HAVING min(code) != max(code)"
@@ -185,10 +186,9 @@ class Store:
         plan, database = self._plan, self._database
         columns = [*FIRST_COLUMNS, *plan.parameter_columns, *metric_columns(plan.own_metrics)]
         columns = list(dict.fromkeys([*columns, *LAST_COLUMNS, *_columns(database)]))
-        outages = _rows(database, "SELECT outages FROM runs")
         for name, header, rows in (
             (RUNS, columns, _rows(database, _RUNS)),
-            (OUTAGES, OUTAGE_COLUMNS, itertools.chain.from_iterable(outages)),
+            (OUTAGES, OUTAGE_COLUMNS, _each_outage(database)),
             (FAILURES, FAILURE_COLUMNS, _rows(database, _FAILURES)),
             (PLAN, ("run", "repetition", *plan.loaded.axes), map(plan.row, plan)),
         ):
@@ -215,6 +215,12 @@ def read_runs(folder: Path) -> dict[str, dict[str, str]]:
         rows = list(_rows(database, _RUNS))
     empty = dict.fromkeys(itertools.chain.from_iterable(rows), "")
     return {row["run"]: {**empty, **row} for row in rows}
+
+
+def read_outages(folder: Path) -> list[dict[str, str]]:
+    """The rows of all outages of all finished runs. Raises StoreError."""
+    with _reading(folder) as database:
+        return list(_each_outage(database))
 
 
 def read_failures(folder: Path) -> list[dict[str, str]]:
@@ -267,6 +273,10 @@ def describe_folder(folder: Path) -> str:
 
 def _rows(database: sqlite3.Connection, query: str) -> Iterator[Any]:
     return (json.loads(row) for (row,) in database.execute(f"{query} {_IN_ORDER}"))
+
+
+def _each_outage(database: sqlite3.Connection) -> Iterator[Any]:
+    return itertools.chain.from_iterable(_rows(database, _OUTAGES))
 
 
 def _columns(database: sqlite3.Connection) -> list[str]:

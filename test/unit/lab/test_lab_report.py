@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
+import sys
 from pathlib import Path
 
 import pytest
@@ -69,6 +70,35 @@ def test_every_figure_and_table_is_exported(results_folder: Path) -> None:
         assert {f"{name}.csv", f"{name}.tex"} <= names
     assert (results_folder / "exports/phases.png").read_bytes().startswith(b"\x89PNG")
     assert r"\toprule" in (results_folder / "exports/cells.tex").read_text()
+
+
+def test_parquet_holds_what_the_csv_files_hold_with_types(results_folder: Path) -> None:
+    pandas = pytest.importorskip("pandas")
+    assert main(["report", str(results_folder), "--export", "parquet"]) == 0
+    for name in ("runs", "outages"):
+        read = pandas.read_parquet(results_folder / f"exports/{name}.parquet")
+        with (results_folder / f"{name}.csv").open() as file:
+            rows = list(csv.DictReader(file))
+        assert len(read) == len(rows) > 0
+        assert set(read.columns) == set(rows[0])
+        assert read["run"].tolist() == [row["run"] for row in rows]
+    assert read["lost_s"].tolist() == [float(row["lost_s"]) for row in rows]
+    runs = pandas.read_parquet(results_folder / "exports/runs.parquet")
+    assert {str(runs[name].dtype) for name in listed() if name in runs} == {"float64"}
+    assert runs["layout.drones"].tolist() == [5, 6] * 8
+    assert runs["key"].tolist() == [False] * 16
+    assert runs["order_delivery"].isna().all()  # no orders were given
+
+
+def test_without_its_library_the_export_names_the_extra(
+    results_folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    monkeypatch.delitem(sys.modules, "drone_mesh.lab.parquet", raising=False)
+    assert main(["report", str(results_folder), "--export", "parquet"]) == 1
+    assert "needs the Python package pyarrow: pip install 'drone_mesh[parquet]'" in (
+        capsys.readouterr().err
+    )
 
 
 def test_the_tables_hold_what_runs_csv_holds(results_folder: Path) -> None:
