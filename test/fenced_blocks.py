@@ -1,8 +1,10 @@
 """The fenced blocks of README and docs, and how each of them is tested.
 
 A comment line before a block, which is not shown, decides: `<!-- test: simulation -->` for commands
-that test/rostest/test_documentation.py runs beside a simulation, `<!-- test: none, REASON -->` for
-what cannot run on a bare machine. A block of Python without a comment is run by the unit tests.
+that test/rostest/test_documentation.py runs beside a simulation, `<!-- test: clone -->` for those
+that start one, which test/rostest/test_installations.py runs in a copy of the checkout, and
+`<!-- test: none, REASON -->` for what cannot run on a bare machine. A block of Python without a
+comment is run by the unit tests.
 """
 
 from __future__ import annotations

@@ -7,12 +7,17 @@ import os
 import shutil
 import signal
 import subprocess
+import sys
 import tempfile
 import unittest
 from pathlib import Path
 
 import rostest
 from rostest_support import WALL_LIMIT_S, free_port, wait_for
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from fenced_blocks import blocks  # noqa: E402
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 LEFT_OUT = (".*", "build", "logs", "__pycache__")
@@ -44,8 +49,8 @@ class InstallationsTest(unittest.TestCase):
     def output(self, command: str, cwd: Path) -> str:
         return self.start(command, cwd, subprocess.PIPE).communicate(timeout=WALL_LIMIT_S)[0]
 
-    def run_until_connected(self, simulation: str, setup: str, cwd: Path) -> None:
-        """Start a simulation, and look at it in another terminal."""
+    def run_until_connected(self, simulation: str, setup: str, cwd: Path, also: str = "") -> None:
+        """Start a simulation, and look at it in another terminal, until it shows `also` too."""
         run = self.start(f"{simulation} routers:=2 spacing:=6", cwd)
         status = f"{setup} && rosrun drone_mesh status"
         try:
@@ -55,6 +60,7 @@ class InstallationsTest(unittest.TestCase):
                 lambda: CONNECTED in self.output(status, cwd) or run.poll() is not None,
             )
             self.assertIsNone(run.poll(), "it ended")
+            self.assertIn(also, self.output(status, cwd))
         finally:
             if run.poll() is None:
                 os.killpg(run.pid, signal.SIGINT)
@@ -64,7 +70,12 @@ class InstallationsTest(unittest.TestCase):
         root = self.folder / "with space" / "drone mesh"
         shutil.copytree(CHECKOUT, root, ignore=shutil.ignore_patterns(*LEFT_OUT))
         (root / ".venv").symlink_to((CHECKOUT / ".venv").resolve())
-        self.run_until_connected("exec scripts/run", ". scripts/env.bash", root)
+        setup = ". scripts/env.bash"
+        self.run_until_connected("exec scripts/run", setup, root)
+        started = [block for block in blocks("bash") if block.test == "clone"]
+        for command in (command for block in started for command in block.commands()):
+            chosen = command.rpartition(":")[2]  # as in repair:=own_repair:LowestId
+            self.run_until_connected(command, setup, root, chosen)
 
     def test_the_installed_package_needs_its_setup_and_nothing_else(self) -> None:
         # Not into the checkout: rospack would find the package twice.

@@ -129,7 +129,7 @@ class Campaign:
         stop = self.loaded.experiment.stop
         if stop is None or plan.seeds >= stop.max_seeds:
             return None
-        cell_of = {planned.spec.run: planned.cell for planned in plan}
+        cell_of = {one.spec.run: one.cell for one in plan if not one.is_control}
         values: dict[int, list[float]] = {cell: [] for cell in range(len(plan.cells))}
         column = column_of(stop.metric)
         for run, row in read_runs(self.folder).items():

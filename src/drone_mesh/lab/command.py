@@ -28,7 +28,7 @@ _Run = Callable[[argparse.Namespace], int]
 
 @ends_as("lab")
 def main(argv: Sequence[str] | None = None) -> int:
-    """Returns the exit status: 0 done, 1 some runs failed or an error, 2 usage, 130 Ctrl-C."""
+    """Returns the exit status: 0 done, 1 failed (runs, a check, an error), 2 usage, 130 Ctrl-C."""
     given = list(sys.argv[1:] if argv is None else argv)
     parser = _parser()
     options, after_options = parser.parse_known_args(given)
@@ -55,7 +55,7 @@ def _parser() -> argparse.ArgumentParser:
 
     def command(run: _Run, words: str, **paths: str) -> argparse.ArgumentParser:
         """A command named like its function, with these paths."""
-        added = commands.add_parser(run.__name__[1:], help=words)
+        added = commands.add_parser(run.__name__[1:], help=words, description=words)
         added.set_defaults(run=run)
         for name, about in paths.items():
             added.add_argument(name, type=Path, help=about)
@@ -107,6 +107,14 @@ def _parser() -> argparse.ArgumentParser:
     tables.add_argument(
         "--only", nargs="+", choices=("cells", "healing", "paired", "worst"), help="these alone"
     )
+
+    check = command(
+        _check,
+        "judge what the experiment expects (`expect:`) on the intervals; exit status: 0 if all is "
+        "met, 1 if anything is not met or not decided",
+        results=_RESULTS,
+    )
+    check.add_argument("--junit", type=Path, metavar="FILE", help="also write it as JUnit XML")
 
     plot = command(_plot, "write one figure as SVG, light and dark", results=_RESULTS)
     plot.add_argument("figure", help="an axis of the sweep, healed_over_time or phases")
@@ -179,7 +187,8 @@ def _plan(options: argparse.Namespace) -> int:
     if len(plan.cells) > CELLS_SHOWN:
         print(f"... and {len(plan.cells) - CELLS_SHOWN} more")
     cells = len(plan.cells)
-    print(f"{cells} cell{'s' * (cells != 1)} x {plan.seeds} seeds = {len(plan)} runs")
+    control = f" + {plan.seeds} others for each baseline" if plan.controls else ""
+    print(f"{cells} cell{'s' * (cells != 1)} x {plan.seeds} seeds{control} = {len(plan)} runs")
     stop = loaded.experiment.stop
     if stop is not None:
         print(f"more seeds, up to {stop.max_seeds}, until {stop.metric} is precise enough")
@@ -218,6 +227,8 @@ def _run(options: argparse.Namespace) -> int:
     except MeshError as error:
         raise MeshError(f"{error}\ncontinue with: {again}") from error
     print(describe_folder(folder))
+    if loaded.experiment.expect:
+        print(f"`{PROGRAM} check {folder}` judges what it expects")
     if campaign.failures:
         print(f"failed runs: {folder / 'failures.csv'} has the command that repeats each of them")
         return 1
@@ -247,12 +258,31 @@ def _report(options: argparse.Namespace) -> int:
 
 def _tables(options: argparse.Namespace) -> int:
     from drone_mesh.lab.results import load_results
-    from drone_mesh.lab.tables import all_tables
+    from drone_mesh.lab.tables import all_tables, warning_of
 
-    for table in all_tables(load_results(options.results)):
+    results = load_results(options.results)
+    if warning_of(results):
+        print(f"warning: {warning_of(results)}", file=sys.stderr)
+    for table in all_tables(results):
         if options.only is None or table.name in options.only:
             print(f"{table.title}. {table.caption}\n\n{table.to_markdown()}")
     return 0
+
+
+def _check(options: argparse.Namespace) -> int:
+    from drone_mesh.lab.gate import MET, NOT_MET, UNDECIDED, judge, write_junit
+    from drone_mesh.lab.results import load_results
+
+    results = load_results(options.results)
+    verdicts = judge(results)
+    for verdict in verdicts:
+        print(f"{verdict.outcome:11}  {verdict.name}: {verdict.reason}")
+    found = [verdict.outcome for verdict in verdicts]
+    print(", ".join(f"{found.count(kind)} {kind}" for kind in (MET, NOT_MET, UNDECIDED)))
+    if options.junit is not None:
+        write_junit(results, verdicts, options.junit)
+        print(f"wrote {options.junit}")
+    return 0 if found.count(MET) == len(found) else 1
 
 
 def _plot(options: argparse.Namespace) -> int:

@@ -7,11 +7,13 @@ dead workers, from a laptop (LocalCluster) to a laboratory's cluster, with one A
 from __future__ import annotations
 
 import contextlib
+import functools
 import logging
 import shutil
 import signal
 import statistics
 from collections import deque
+from pathlib import Path
 from typing import TYPE_CHECKING, Iterable, Iterator
 
 from drone_mesh.errors import MeshError
@@ -28,6 +30,15 @@ TASKS_PER_WORKER = 2  # one running, one waiting
 DEATHS_ALLOWED = 2  # after one more death of its worker a run counts as failed
 WORKERLESS_S = 120.0  # dask gives up a worker that does not start, on an overloaded machine
 SLURM = "slurm"
+_SOURCE = str(Path(__file__).resolve().parents[2])  # the folder from which this process imports us
+_IMPORT = f"""
+import sys
+try:
+    import {execute_batch.__module__}
+except ImportError:
+    sys.path.append({_SOURCE!r})
+    import {execute_batch.__module__}
+"""
 
 
 class EngineError(MeshError):
@@ -85,7 +96,28 @@ def _client(workers: int, cluster: str | None) -> Iterator[Client]:
             client = stack.enter_context(Client(address, set_as_default=False))
         except (OSError, ValueError, RuntimeError) as error:
             raise EngineError(f"no dask scheduler at {cluster or 'localhost'}: {error}") from error
+        if cluster is not None:
+            _introduce_package(client)
         yield client
+
+
+def _introduce_package(client: Client) -> None:
+    """Let a scheduler and workers that others started import the checkout, if it is there too.
+
+    dask pickles a built-in function without this package, so that it runs where ours cannot.
+    """
+    try:
+        client.run_on_scheduler(exec, _IMPORT)
+        client.register_worker_callbacks(functools.partial(exec, _IMPORT))  # and those to come
+    except ImportError as error:
+        raise _without_package(error) from error
+
+
+def _without_package(error: ImportError) -> EngineError:
+    return EngineError(
+        f"the dask scheduler or a worker says: {error}. Install the same version there (pip "
+        f"install 'drone_mesh[lab]'), or start it with PYTHONPATH={_SOURCE} if it has that folder"
+    )
 
 
 def _slurm(workers: int) -> contextlib.AbstractContextManager[object]:
@@ -151,8 +183,12 @@ def _run_on(client: Client, waiting: deque[RunSpec]) -> Iterator[Outcome]:
             lengths_s.extend(outcome.wall_s for outcome in outcomes)
             yield from outcomes
             submit()
-    except (OSError, RuntimeError, TimeoutError) as error:
+    except ImportError as error:
+        raise _without_package(error) from error
+    except (OSError, TimeoutError) as error:
         raise EngineError(f"the dask scheduler is gone: {error}") from error
+    except RuntimeError as error:
+        raise EngineError(f"dask failed: {error.__cause__ or error}") from error
 
 
 def _died(spec: RunSpec, message: str) -> Outcome:

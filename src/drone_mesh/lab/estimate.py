@@ -40,6 +40,8 @@ def estimate(plan: Plan, workers: int) -> Estimate:
     most_trials = min(plan.seeds, max(MOST_TRIALS, ENOUGH_TRIALS // len(plan.cells)))
     by_cell: dict[int, list[RunSpec]] = {}
     for planned in plan:
+        if planned.is_control:
+            continue
         if planned.spec.repetition >= most_trials:
             break
         by_cell.setdefault(planned.cell, []).append(planned.spec)

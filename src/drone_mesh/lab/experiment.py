@@ -15,9 +15,11 @@ from typing_extensions import Annotated, Literal
 from drone_mesh.air import obstacle_file
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.lab import extensions, formations, places
+from drone_mesh.lab.expectations import Expectation
 from drone_mesh.lab.experiment_checks import NoSuchPlace, Source, check_scenario, nearest_name, put
 from drone_mesh.lab.expression import ExpressionError, Where
 from drone_mesh.lab.metrics import METRICS
+from drone_mesh.lab.metrics.registry import is_censored
 from drone_mesh.lab.scenario import Scenario
 from drone_mesh.lab.scenario_parts import Part
 from drone_mesh.lab.terminal import PROGRAM
@@ -65,6 +67,8 @@ class Experiment(BaseModel):
     stop: Optional[Stop] = None
     metrics: List[str] = []
     compare: Optional[Compare] = None
+    control: bool = False  # run the baseline of `compare` on other seeds, too
+    expect: List[str] = []
     draws: Literal["all", "split", "whole"] = "all"  # which runs the report counts
     timeout_s: Annotated[float, Field(gt=0)] = 600.0  # wall time of one run
 
@@ -76,9 +80,14 @@ class Cell(NamedTuple):
     scenario: Scenario
 
     @property
+    def texts(self) -> Dict[str, str]:
+        """The values as text."""
+        return {axis: as_text(value) for axis, value in self.values.items()}
+
+    @property
     def label(self) -> str:
         """The label for display and tables; empty without a sweep."""
-        return " ".join(f"{axis}={as_text(value)}" for axis, value in self.values.items())
+        return " ".join(f"{axis}={value}" for axis, value in self.texts.items())
 
 
 class LoadedExperiment(NamedTuple):
@@ -161,13 +170,14 @@ def load_experiment(
     if len(cells) > MOST_CELLS:
         raise source.error(("sweep",), f"more than {MOST_CELLS} cells")
     seeds = max(experiment.seeds, experiment.stop.max_seeds if experiment.stop else 0)
-    if len(cells) * seeds > MOST_RUNS:
+    if len(cells) * seeds * (1 + experiment.control) > MOST_RUNS:
         raise source.error(
             ("seeds",), f"{len(cells)} cells x {seeds} seeds: more than {MOST_RUNS} runs"
         )
     if not cells:
         raise source.error(("where",), "where excludes every cell of the sweep")
     _check_compare(experiment, cells, source)
+    _check_expectations(experiment, [] if overrides else cells, source)
     return LoadedExperiment(experiment, cells, path, source.folder, tuple(overrides))
 
 
@@ -313,6 +323,8 @@ def _check_metrics(experiment: Experiment, source: Source) -> None:
 def _check_compare(experiment: Experiment, cells: Sequence[Cell], source: Source) -> None:
     compare = experiment.compare
     if compare is None:
+        if experiment.control:
+            raise source.error(("control",), "control: give the baseline, with compare")
         return
     axes = list(cells[0].values)
     if compare.over not in axes:
@@ -327,6 +339,25 @@ def _check_compare(experiment: Experiment, cells: Sequence[Cell], source: Source
             f"compare.baseline: {compare.baseline!r} is not a value of {compare.over}; "
             f"give one that is, as in compare.baseline={as_text(values[0])}",
         )
+
+
+def _check_expectations(experiment: Experiment, cells: Sequence[Cell], source: Source) -> None:
+    """`cells`: those that they may speak of; empty if it is an override that took some away."""
+    own = {extensions.column_of(name) for name in experiment.metrics}
+    for index, text in enumerate(experiment.expect):
+        try:
+            expectation = Expectation.parse(text)
+            if expectation.metric not in own:
+                extensions.check_metric(expectation.metric)
+            if is_censored(expectation.metric):
+                raise ConfigurationError(
+                    f"{expectation.metric} leaves out runs that did not heal: use healed, or "
+                    "t_capped_s"
+                )
+            if cells:
+                expectation.cells([cell.texts for cell in cells])
+        except ConfigurationError as error:
+            raise source.error(("expect", index), f"expect: {error}") from None
 
 
 def write_template(name: str) -> Path:

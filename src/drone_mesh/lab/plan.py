@@ -11,6 +11,7 @@ from drone_mesh.lab.provenance import own_code
 from drone_mesh.lab.scenario import Scenario
 
 LONGEST_VALUE = 200  # characters in one field of runs.csv; longer values become a hash
+CONTROL_FROM = 1_000_000  # the repetition of the first control run: above all seeds of the cells
 SCHEMA = 1  # of runs.csv; a new number makes every run a new one
 
 
@@ -33,6 +34,11 @@ class PlannedRun(NamedTuple):
     spec: RunSpec
     cell: int
 
+    @property
+    def is_control(self) -> bool:
+        """Whether it repeats its cell, a baseline, on other seeds."""
+        return self.spec.repetition >= CONTROL_FROM
+
 
 class Plan:
     """All runs of an experiment: every cell with one seed, then every cell with the next seed."""
@@ -47,7 +53,14 @@ class Plan:
             json.dumps(cell.scenario.model_dump(mode="json", exclude_none=True))
             for cell in self.cells
         ]
+        compare = loaded.experiment.compare if loaded.experiment.control else None
+        self.controls = [
+            index
+            for index, cell in enumerate(self.cells)
+            if compare is not None and cell.values[compare.over] == compare.baseline
+        ]
         self._folder = str(loaded.folder.resolve())
+        self._has_own_modules = bool(loaded.own_modules)
         self._own_code = [self._code_of(cell.scenario) for cell in self.cells]
         # The values that differ from the defaults. Therefore a parameter added in a later version
         # does not change old run ids; a changed default requires a new SCHEMA.
@@ -64,19 +77,24 @@ class Plan:
         return self._hashes[tuple(modules)]
 
     def __len__(self) -> int:
-        return len(self.cells) * self.seeds
+        return (len(self.cells) + len(self.controls)) * self.seeds
 
     def __iter__(self) -> Iterator[PlannedRun]:
-        experiment = self.loaded.experiment
-        folder = self._folder if self.loaded.own_modules else ""
         for repetition in range(self.seeds):
-            for cell, (text, what) in enumerate(zip(self._texts, self._identities)):
-                run = run_id(what, experiment.seed, repetition, self.own_metrics)
-                spec = RunSpec(
-                    run, text, experiment.seed, repetition, self.own_metrics, folder,
-                    self._own_code[cell], experiment.timeout_s,
-                )  # fmt: skip
-                yield PlannedRun(spec, cell)
+            for cell in range(len(self.cells)):
+                yield self._run(cell, repetition)
+            for cell in self.controls:
+                yield self._run(cell, CONTROL_FROM + repetition)
+
+    def _run(self, cell: int, repetition: int) -> PlannedRun:
+        experiment = self.loaded.experiment
+        spec = RunSpec(
+            run_id(self._identities[cell], experiment.seed, repetition, self.own_metrics),
+            self._texts[cell], experiment.seed, repetition, self.own_metrics,
+            self._folder if self._has_own_modules else "",
+            self._own_code[cell], experiment.timeout_s,
+        )  # fmt: skip
+        return PlannedRun(spec, cell)
 
     def row(self, planned: PlannedRun) -> dict[str, str]:
         """A run of the plan in plan.csv."""

@@ -21,7 +21,7 @@ from drone_mesh.lab.metrics import METRICS
 from drone_mesh.lab.results import Results, load_results
 from drone_mesh.lab.run_report.drawing import in_style, svg_element, svg_of_its_own
 from drone_mesh.lab.store import EXPERIMENT
-from drone_mesh.lab.tables import Table, all_tables
+from drone_mesh.lab.tables import Table, all_tables, warning_of
 from drone_mesh.lab.terminal import PROGRAM
 
 _TEMPLATE = Path(__file__).resolve().parent / "report.html"
@@ -61,9 +61,10 @@ def _render(results: Results, tables: Sequence[Table], drawings: Sequence[Drawin
         done=done,
         planned=len(results.plan),
         cells=len(results.loaded.cells),
-        seeds=len({planned.spec.repetition for planned in results.plan}),
+        seeds=len({one.spec.repetition for one in results.plan if not one.is_control}),
         failures=results.failures,
         draws=experiment.draws,
+        warning=warning_of(results),
         tables={table.name: table for table in tables},
         drawings=[(drawing, svg_element(drawing.figure)) for drawing in drawings],
         definitions=[(name, METRICS[name]) for name in results.metrics if name in METRICS],

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import Iterable, Mapping, NamedTuple, Sequence
 
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.lab import extensions
-from drone_mesh.lab.experiment import LoadedExperiment, as_text, load_experiment
-from drone_mesh.lab.plan import Plan, PlannedRun
+from drone_mesh.lab.expectations import matching
+from drone_mesh.lab.experiment import LoadedExperiment, load_experiment
+from drone_mesh.lab.plan import CONTROL_FROM, Plan, PlannedRun
 from drone_mesh.lab.store import (
     EXPERIMENT,
     StoreError,
@@ -19,7 +19,6 @@ from drone_mesh.lab.store import (
 )
 
 CELLS_SHOWN = 4  # in an error
-_OUTSIDE_BRACKETS = re.compile(r",(?![^\[]*\])")  # commas, but not those of a list
 DEFAULT_METRICS = ("healed", "t_total_s", "uptime", "distance_total_m", "packets")
 
 Row = Mapping[str, str]
@@ -33,6 +32,7 @@ class Results(NamedTuple):
     plan: Sequence[PlannedRun]
     rows: Mapping[str, Row]  # by run id
     by_cell: Mapping[int, dict[int, Row]]  # the same, by cell and repetition
+    controls: Mapping[int, dict[int, Row]]  # of a baseline on other seeds, by its cell
     failures: Sequence[Row]
     sessions: Sequence[Mapping[str, object]]
 
@@ -58,6 +58,7 @@ class Results(NamedTuple):
         return self._replace(
             loaded=self.loaded._replace(experiment=experiment, cells=cells),
             by_cell={place: self.drawn(index) for place, index in enumerate(fit)},
+            controls={place: self.controls.get(index, {}) for place, index in enumerate(fit)},
         )
 
     def check_columns(self, metrics: Sequence[str]) -> None:
@@ -68,29 +69,25 @@ class Results(NamedTuple):
                 raise ConfigurationError(f"{self.folder}: runs.csv has no column {metric}")
 
     def _matching(self, text: str) -> list[int]:
-        """The cells that match axis=value[,axis=value...]."""
-        wanted: dict[str, str] = {}
-        for part in filter(None, _OUTSIDE_BRACKETS.split(text)):
-            axis, equals, value = part.partition("=")
-            if not equals or axis not in self.loaded.axes:
-                axes = ", ".join(self.loaded.axes) or "no axes"
-                raise ConfigurationError(f"cell {text}: expected axis=value with one of {axes}")
-            wanted[axis] = value
-        return [
-            index
-            for index, cell in enumerate(self.loaded.cells)
-            if all(as_text(cell.values[axis]) == value for axis, value in wanted.items())
-        ]
+        return matching([cell.texts for cell in self.loaded.cells], text)
 
     def of_cell(self, cell: int) -> dict[int, Row]:
         """The rows of one cell that count in the report, by repetition.
 
         `draws:` may exclude split runs, or all others.
         """
+        return self._counted(self.drawn(cell))
+
+    def control(self, baseline: int, metric: str) -> tuple[list[float], list[float]]:
+        """A metric of a baseline, and of as many runs of it on other seeds: an A/A comparison."""
+        rows = self.of_cell(baseline), self._counted(self.controls.get(baseline, {}))
+        return paired(*(by_repetition.values() for by_repetition in rows), metric)
+
+    def _counted(self, rows: Mapping[int, Row]) -> dict[int, Row]:
         draws = self.loaded.experiment.draws
         return {
             repetition: row
-            for repetition, row in self.drawn(cell).items()
+            for repetition, row in rows.items()
             if draws == "all" or (row.get("split") == "1") == (draws == "split")
         }
 
@@ -153,10 +150,12 @@ def load_results(folder: Path) -> Results:
     seeds = _seeds(loaded, rows)
     plan = list(Plan(loaded, seeds))
     by_cell: dict[int, dict[int, Row]] = {}
+    controls: dict[int, dict[int, Row]] = {}
     for planned in plan:
         if planned.spec.run in rows:
-            by_cell.setdefault(planned.cell, {})[planned.spec.repetition] = rows[planned.spec.run]
-    return Results(folder, loaded, plan, rows, by_cell, read_failures(folder), sessions)
+            kind = controls if planned.is_control else by_cell
+            kind.setdefault(planned.cell, {})[planned.spec.repetition] = rows[planned.spec.run]
+    return Results(folder, loaded, plan, rows, by_cell, controls, read_failures(folder), sessions)
 
 
 def number(row: Row, column: str) -> float | None:
@@ -179,7 +178,8 @@ def _last_words(axis: str) -> str:
 
 def _seeds(loaded: LoadedExperiment, rows: Mapping[str, Row]) -> int:
     """The number of repetitions, including those added by `stop:`."""
-    most = max((int(row["repetition"]) for row in rows.values()), default=-1) + 1
+    repetitions = (int(row["repetition"]) for row in rows.values())
+    most = max((one for one in repetitions if one < CONTROL_FROM), default=-1) + 1
     stop = loaded.experiment.stop
     if stop is None:
         return loaded.experiment.seeds

@@ -17,6 +17,7 @@ from drone_mesh.lab.statistics import (
     holm,
     mean_interval,
     paired_difference,
+    plain,
     share_interval,
     survival,
 )
@@ -77,6 +78,20 @@ def all_tables(results: Results) -> list[Table]:
     """The tables of a report."""
     kinds = (cells_table, healing_table, paired_table, worst_table)
     return [table for kind in kinds if (table := kind(results)) is not None]
+
+
+def warning_of(results: Results) -> str:
+    """A warning if a repair had nothing to do in most draws, which dilutes figures; or empty."""
+    cells = results.by_cell.values()
+    drawn = [row for rows in cells for row in rows.values() if row["observed_s"]]
+    whole = sum(row.get("split") == "0" for row in drawn)
+    is_asked = {"healed", "t_total_s", "distance_total_m"} & set(results.metrics)
+    if results.loaded.experiment.draws != "all" or not is_asked or 2 * whole <= len(drawn):
+        return ""
+    return (
+        f"{whole} of {len(drawn)} draws needed no repair: their fault left every live router a "
+        "path to a gateway. `draws: split` in the experiment counts only the others."
+    )
 
 
 def summary_of(rows: Mapping[int, Row], metric: str) -> Interval:
@@ -172,33 +187,47 @@ def paired_table(results: Results) -> Table | None:
     if compare is None:
         return None
     found = []
-    cells = results.loaded.cells
-    for index, cell in enumerate(cells):
-        if cell.values[compare.over] == compare.baseline:
-            continue
-        wanted = {**cell.values, compare.over: compare.baseline}
-        base = next((i for i, other in enumerate(cells) if other.values == wanted), None)
-        if base is None:
+    spread: dict[tuple[int, str], float] = {}  # of the control, by its cell and metric
+    baseline = as_text(compare.baseline)
+    cells = [cell.texts for cell in results.loaded.cells]
+    for index, texts in enumerate(cells):
+        wanted = {**texts, compare.over: baseline}
+        base = next((i for i, other in enumerate(cells) if other == wanted), None)
+        if base is None or (base == index and not results.loaded.experiment.control):
             continue
         for metric in results.metrics:
-            xs, ys = paired(*results.pairs(base, index), metric)
+            if base == index:
+                xs, ys = results.control(base, metric)
+                texts = {**texts, compare.over: f"{baseline}, other seeds"}
+            else:
+                xs, ys = paired(*results.pairs(base, index), metric)
+            compared = paired_difference(xs, ys)
+            if base == index:
+                spread[base, metric] = max(map(abs, compared.difference[1:3]))
             seeds = max(results.marked(one, len(xs)) for one in (base, index))
-            found.append((cell.values, metric, seeds, paired_difference(xs, ys)))
+            found.append((base if base != index else None, texts, metric, seeds, compared))
     adjusted = holm([compared.p for *_, compared in found])
     rows = [
         [
-            *map(as_text, values.values()), _with_unit(metric), n, str(compared.difference),
+            *texts.values(), _with_unit(metric), n, str(compared.difference),
             _verdict(compared.difference, p, metric), "-" if math.isnan(p) else f"{p:.2g}",
+            *([_against(compared.difference, spread.get((base, metric)))] if spread else []),
         ]
-        for (values, metric, n, compared), p in zip(found, adjusted)
+        for (base, texts, metric, n, compared), p in zip(found, adjusted)
     ]  # fmt: skip
-    difference = f"difference to {as_text(compare.baseline)}"
+    difference = f"difference to {baseline}"
     header = [*results.axis_names.values(), "metric", "seeds", difference, "", "p (Holm)"]
     caption = (
-        f"Difference to {compare.over} = {as_text(compare.baseline)}, per seed (common random "
-        "numbers): mean with 95 % BCa bootstrap interval; Wilcoxon signed-rank test, Holm over "
-        "the table. A time to heal counts where both healed."
+        f"Difference to {compare.over} = {baseline}, per seed (common random numbers): mean with "
+        "95 % BCa bootstrap interval; Wilcoxon signed-rank test, Holm over the table. A time to "
+        "heal counts where both healed."
     )
+    if spread:
+        header.append("spread of A/A")
+        caption += (
+            " Control (A/A): the baseline on other seeds against itself; the larger end of that "
+            "interval is its spread. A difference within it is not larger than other draws make."
+        )
     return Table("paired", "Paired comparison", caption, header, rows)
 
 
@@ -241,6 +270,13 @@ def _verdict(difference: Interval, p: float, metric: str) -> str:
     return "better" if (difference.value < 0) == (better == "less") else "worse"
 
 
+def _against(difference: Interval, spread: float | None) -> str:
+    """Where the difference is, relative to that of the control; empty for the control itself."""
+    if spread is None or math.isnan(spread) or math.isnan(difference.value):
+        return ""
+    return f"{'within' if abs(difference.value) <= spread else 'beyond'} {plain(spread)}"
+
+
 def _with_unit(metric: str) -> str:
     unit = unit_of(metric)
     return f"{metric}, {unit}" if unit else metric
@@ -257,6 +293,6 @@ def _percent(interval: Interval) -> str:
 
 
 def _latex(text: str) -> str:
-    for plain, escaped in _LATEX.items():
-        text = text.replace(plain, escaped)
+    for character, escaped in _LATEX.items():
+        text = text.replace(character, escaped)
     return text

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import json
+import re
 import sqlite3
 import sys
 from pathlib import Path
-from typing import Callable
+from typing import Callable, Iterator
 
 import pytest
 
-from drone_mesh.lab.command import main
+from drone_mesh.lab.command import _parser, main
 from drone_mesh.lab.provenance import imported_code, own_code
 from drone_mesh.lab.store import read_failures, read_runs
 from drone_mesh.lab.terminal import _program as typed
 
+ROOT = Path(__file__).resolve().parents[3]
+LAB = ROOT / "src/drone_mesh/lab"
 EXPERIMENT = """\
 name: mine
 seeds: 2
@@ -170,14 +173,27 @@ def test_hints_name_the_command_that_was_typed(
     assert typed() == named
 
 
-def test_a_new_experiment_names_commands_that_exist(
-    edit: Callable[[str, str], None], capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert lab("new", "fresh") == 0
-    assert capsys.readouterr().out.endswith("next: python3 -m drone_mesh.lab plan fresh.yaml\n")
-    text = Path("fresh.yaml").read_text()
-    for command in ("plan fresh.yaml", "run fresh.yaml", "report results/fresh", "metrics"):
-        assert f"python3 -m drone_mesh.lab {command}" in text
+def hints() -> Iterator[tuple[Path, str]]:
+    """What the lab prints, with PROGRAM for its own name, and what pages and experiments say."""
+    for path in [*LAB.rglob("*.py"), LAB / "experiment.template.yaml", LAB / "report.html"]:
+        text = path.read_text(encoding="utf-8")
+        yield path, re.sub(r"\{+ ?(?:PROGRAM|program) ?\}+", "PROGRAM", text)
+    for pages in ("README.md", "docs/**/*.md", "experiments/*.yaml"):
+        for path in ROOT.glob(pages):
+            yield path, path.read_text(encoding="utf-8")
+
+
+def test_every_hint_names_a_command_and_options_that_exist() -> None:
+    commands = _parser()._subparsers._group_actions[0].choices  # type: ignore[union-attr]
+    options = {name for one in commands.values() for name in one._option_string_actions}
+    found = 0
+    for path, text in hints():
+        for match in re.finditer(r"(?:PROGRAM|drone-mesh-lab|scripts/lab|`lab) ([a-z]+)", text):
+            assert match[1] in commands, (path, match[0])
+            found += 1
+        if LAB in path.parents and path.name not in ("command.py", "provenance.py"):
+            assert set(re.findall(r"(?<![-\w])--[a-z][a-z-]+", text)) <= options, path
+    assert found > 40
 
 
 def test_the_hash_of_a_module_is_of_what_it_imports_from_the_users_folder_alone(

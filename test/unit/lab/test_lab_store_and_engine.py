@@ -21,7 +21,7 @@ import pytest
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.lab.campaign import _is_narrow
 from drone_mesh.lab.command import main
-from drone_mesh.lab.engine import EngineError, run_all
+from drone_mesh.lab.engine import EngineError, _introduce_package, run_all
 from drone_mesh.lab.experiment import load_experiment
 from drone_mesh.lab.plan import Plan
 from drone_mesh.lab.store import Store, StoreError, read_runs
@@ -438,10 +438,10 @@ def test_workers_that_are_gone_for_good_end_the_batch(
 
 @pytest.mark.slow
 def test_a_killed_scheduler_loses_nothing(slow: Path, slow_rows: bytes, tmp_path: Path) -> None:
-    """Scheduler and worker are processes of their own, as on a cluster."""
+    """Scheduler and worker are processes of their own, as on a cluster, and know no package."""
     out = tmp_path / "out"
     address_file = tmp_path / "scheduler.json"
-    environment = {**os.environ, "PYTHONPATH": str(ROOT / "src")}
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "env": environment}
     scheduler = subprocess.Popen(
         [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port",
@@ -464,6 +464,16 @@ def test_a_killed_scheduler_loses_nothing(slow: Path, slow_rows: bytes, tmp_path
             one.wait()
     assert run(slow, out) == 0
     assert measured(out) == slow_rows
+
+
+def test_a_worker_without_the_package_is_named_with_its_error_and_the_remedy() -> None:
+    class Elsewhere:
+        def run_on_scheduler(self, function: Callable[[str], None], code: str) -> None:
+            function(code.replace(str(ROOT / "src"), "/nowhere").replace("drone_mesh.", "no_mesh."))
+
+    with pytest.raises(EngineError, match=r"No module named 'no_mesh'.*PYTHONPATH=") as caught:
+        _introduce_package(Elsewhere())  # type: ignore[arg-type]
+    assert "\n" not in str(caught.value)
 
 
 SBATCH = """\
