@@ -24,9 +24,13 @@ def test_the_default_run_has_a_quiet_log(radio, routing, has_key):
 @pytest.mark.parametrize(
     ("seed", "what"),
     [
+        (5, "a relay gives up an order that its drone has taken"),
         (6, "an order that waited until its nonce had expired is not forged"),
+        (8, "answers to challenges wait in a queue while the mesh starts"),
         (9, "the gateway answers along an old way"),
         (11, "challenges that nobody took say nothing about a key"),
+        (13, "the only reply is lost, and the drone is heard again half a minute later"),
+        (15, "a challenge by broadcast, which its neighbour does not hear"),
         (26, "the only reply is lost, and the drone is in flight when a try is due"),
     ],
 )

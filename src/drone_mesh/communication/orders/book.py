@@ -67,6 +67,7 @@ class _Order:
     seeking: bool = False  # a search for it is running or about to start
     copies: int = 0  # that left and that no relay said to have dropped: the drone may have one
     waits: int = 0  # for a route, instead of a try
+    waiting: bool = False  # for a route: it is sent again as soon as its drone is heard
     unanswered: int = 0  # packets since the drone's last reply about it
     heard_s: float = 0.0  # when the drone last reported about it, or when it was ordered
     settled: bool = False  # the drone itself has reported the outcome
@@ -125,20 +126,21 @@ class OrderBook:
         """A relay has no route to this drone; `told`: it tells this gateway, and drops an order.
 
         One that tells all its neighbours has lost the drone, which may have left for this order.
+        On a shared channel a relay also drops what arrived, if the acknowledgements were lost.
         """
         for order in self._open_for(drone):
-            order.copies -= told and order.copies > 0
+            order.copies -= told and order.copies > 0 and not self._medium.shared
             waits = order.state is not OrderState.SENT or order.seeking
             if not waits and not self._seek(order):
                 self._move(order, OrderState.NO_ROUTE)
 
     def on_found(self, drone: int) -> None:
-        """A drone answered the search, along a working path."""
+        """A drone was heard, along a working path."""
         for order in self._open_for(drone):
-            if order.seeking:
-                order.seeking = False
+            if order.seeking or order.waiting:
+                order.seeking = order.waiting = False
                 self._send(order)
-                self._wait(order, REPEAT_AFTER_S[0])
+                self._wait(order, REPEAT_AFTER_S[order.unanswered])
 
     def _seek(self, order: _Order) -> bool:
         """Search for the drone. False: the order is lost.
@@ -210,7 +212,8 @@ class OrderBook:
             return
         # Without one nothing is repeated: the drone may be in flight, out of reach.
         has_route = self._control.routes.may_reach(order.drone)
-        if order.state is OrderState.SENT and not has_route and order.waits < MOST_WAITS:
+        order.waiting = order.state is OrderState.SENT and not has_route
+        if order.waiting and order.waits < MOST_WAITS:
             order.waits += 1
             self._wait(order, REPEAT_AFTER_S[order.unanswered])
             return

@@ -36,6 +36,8 @@ LAST_COUNT = 2**32 - 1  # the last counter of an epoch: an answer carries 4 byte
 WAITING_CHALLENGES = 16  # most unanswered challenges
 CHALLENGE_AGAIN_S = 2.0  # least time between two challenges to one node
 CHALLENGE_OUT_S = 0.5  # after this time another challenge may replace it
+LATE_ANSWER_S = 10.0  # on a busy channel an answer waits for seconds in the queue of its sender
+LATE_CHALLENGES = 64  # that are no longer pending and may have such an answer
 MOST_DOUBTED = 16  # in CHALLENGE_AGAIN_S, challenges to nodes that are known
 DOUBTS = 3  # the pause after false alarms doubles so many times, to 16 s
 ANSWERS = 4  # to one node in CHALLENGE_AGAIN_S
@@ -71,15 +73,16 @@ class _Peer:
         self.window_to_all = AgedWindow(count, now_s)  # any node with the network key can
         self.heard_s = now_s
 
-    def answered(self, count: int, now_s: float) -> None:
+    def answered(self, count: int, late: bool, now_s: float) -> None:
         """It has proved that this was its count: earlier packets are used up.
 
-        A few broadcasts may have overtaken the answer; one that was further ahead was not its own.
+        A few broadcasts may have overtaken the answer, and any number a late one; otherwise one
+        that was further ahead was not its own.
         """
         self.window.restart(max(count, self.window.highest), now_s)
         ahead = self.window_to_all.highest - count
-        highest = count + ahead if 0 < ahead <= OVERTAKING else count
-        self.window_to_all.restart(highest, now_s)
+        is_own = ahead > 0 and (late or ahead <= OVERTAKING)
+        self.window_to_all.restart(count + ahead if is_own else count, now_s)
         self.heard_s = now_s
 
 
@@ -120,6 +123,7 @@ class HopSeal:
     def __post_init__(self) -> None:
         self._peers: dict[int, _Peer] = {}
         self._challenges: OrderedDict[int, _Challenge] = OrderedDict()  # oldest first
+        self._late: deque[tuple[int, _Challenge]] = deque(maxlen=LATE_CHALLENGES)
         self._asked: dict[int, _Asked] = {}
         self._doubted = RateLimit(MOST_DOUBTED, CHALLENGE_AGAIN_S)  # all nodes together: 0
         self._answers = RateLimit(ANSWERS, CHALLENGE_AGAIN_S)
@@ -184,7 +188,7 @@ class HopSeal:
         The number of pending challenges is bounded; an answered one no longer counts.
         """
         while self._challenges and now_s - self._oldest_s() >= CHALLENGE_AGAIN_S:
-            self._challenges.popitem(last=False)
+            self._late.append(self._challenges.popitem(last=False))
         asked = self._asked.setdefault(node, _Asked())
         if node in self._challenges or now_s < asked.next_s:
             return None
@@ -194,7 +198,7 @@ class HopSeal:
         if len(self._challenges) >= WAITING_CHALLENGES:
             if now_s - self._oldest_s() < CHALLENGE_OUT_S:
                 return None
-            self._challenges.popitem(last=False)
+            self._late.append(self._challenges.popitem(last=False))
         nonce = self._rng.getrandbits(_NONCE_BITS)
         self._challenges[node] = _Challenge(nonce, now_s, doubted)
         asked.next_s = now_s + CHALLENGE_AGAIN_S * (2**asked.doubts if doubted else 1)
@@ -225,22 +229,31 @@ class HopSeal:
         None: it is not an answer to a challenge of this node.
         """
         node = messages.sender(answer)
-        waiting = self._challenges.get(node)
+        nonce, epoch, count = _ANSWER.unpack_from(answer, messages.HEADER_BYTES)
+        waiting = self._challenge_with(node, nonce, now_s)
         if waiting is None or not self.is_proven(answer):
             return None
-        nonce, epoch, count = _ANSWER.unpack_from(answer, messages.HEADER_BYTES)
-        if nonce != waiting.nonce or epoch == self._epoch:  # its own, thrown back at it
+        if epoch == self._epoch:  # its own, thrown back at it
             return None
-        del self._challenges[node]
+        self._challenges.pop(node, None)
+        self._late = deque((one for one in self._late if one[0] != node), LATE_CHALLENGES)
         known = self._peers.get(node)
         if known is not None and known.epoch == epoch:
-            known.answered(count, now_s)
+            known.answered(count, now_s - waiting.sent_s >= CHALLENGE_AGAIN_S, now_s)
             doubts = self._asked[node].doubts
             self._asked[node].doubts = min(doubts + 1, DOUBTS) if waiting.doubted else 0
             return False
         self._asked[node] = _Asked(now_s + CHALLENGE_AGAIN_S)
         self._peers[node] = _Peer(self._keys.network, self._pair_key(node), epoch, count, now_s)
         return True
+
+    def _challenge_with(self, node: int, nonce: int, now_s: float) -> _Challenge | None:
+        """The challenge of this node that an answer belongs to."""
+        pending = self._challenges.get(node)
+        if pending is not None and pending.nonce == nonce:
+            return pending
+        late = (one for to, one in self._late if to == node and one.nonce == nonce)
+        return next((one for one in late if now_s - one.sent_s < LATE_ANSWER_S), None)
 
     def _oldest_s(self) -> float:
         return next(iter(self._challenges.values())).sent_s

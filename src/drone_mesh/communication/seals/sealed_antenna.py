@@ -28,7 +28,13 @@ from drone_mesh.communication.seals.end_to_end import (
 )
 from drone_mesh.communication.seals.keys import Keys
 from drone_mesh.communication.seals.message_seal import MessageSeal
-from drone_mesh.communication.seals.seal import SEAL_AT, SEAL_BYTES, HopSeal, NotOpened
+from drone_mesh.communication.seals.seal import (
+    LATE_ANSWER_S,
+    SEAL_AT,
+    SEAL_BYTES,
+    HopSeal,
+    NotOpened,
+)
 from drone_mesh.communication.timing import ChannelUse, Medium, MeshTiming
 from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.messages import CREATOR_AT, FORWARD_AT, TO_AT, TYPE_AT
@@ -38,6 +44,7 @@ FRESH_PERIODS = 3.0  # a neighbour sends something once per check period
 FOREIGN_AFTER_S = 20.0  # two check periods; a restarted neighbour answers by then
 FORGOTTEN_S = 60.0  # then the counts start again
 LEAST_PACKETS = 3  # damage that a checksum does not show is rarer
+LEAST_CHALLENGES = 2  # without an answer: one may be lost
 
 _CHALLENGE, _ANSWER = int(MessageType.SEAL_CHALLENGE), int(MessageType.SEAL_ANSWER)
 _INTRODUCTIONS = (int(MessageType.PRESENT), int(MessageType.BEACON))
@@ -75,8 +82,8 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
         self._message_seal = MessageSeal(keys)
         self._mesh: IMeshNetwork | None = None
         self._present = b""  # the last one, for neighbours that could not open it
-        # By node, since when and how many: packets of unknown ones, and packets of somebody else
-        self._unopened: dict[int, tuple[float, int]] = {}
+        self._unopened: dict[int, list[float]] = {}  # by node: the first challenges, not answered
+        # By node, since when and how many: packets of somebody else
         self._forged: dict[int, tuple[float, int]] = {}
         self._doubtful: dict[int, bytes] = {}  # by node: a packet that its next answer decides
         self._clock = clock
@@ -291,12 +298,14 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
         challenge = self._seal.challenge(node, now_s)
         if challenge is None:
             return
-        if not self._seal.knows(node, now_s):
-            self._unopened.setdefault(node, (now_s, 1))
         if self._antenna.medium.shared and self._seal.crowded:  # some of these ids may not exist
-            self._antenna.broadcast_message(challenge)
-        else:
-            self._send(challenge)
+            self._antenna.broadcast_message(challenge)  # which it may not hear
+            return
+        if not self._seal.knows(node, now_s):
+            challenged_s = self._unopened.setdefault(node, [])
+            if len(challenged_s) < LEAST_CHALLENGES:
+                challenged_s.append(now_s)
+        self._send(challenge)
 
     def _send(self, packet: bytes) -> None:
         """Send to the node in byte 3; to another radio with this node's id as to all."""
@@ -324,14 +333,14 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
 
     def _not_answered(self, node: int, payload: bytes, now_s: float) -> None:
         """A restarted neighbour is normal; one that never answers a challenge is not."""
-        if node not in self._unopened:
-            return  # it has not been challenged yet
-        since_s, count = self._unopened[node]
-        if now_s - since_s > FORGOTTEN_S:
+        challenged_s = self._unopened.get(node, [])
+        if len(challenged_s) < LEAST_CHALLENGES:
+            return
+        first_s, last_s = challenged_s[0], challenged_s[-1]
+        if now_s - first_s > FORGOTTEN_S:
             del self._unopened[node]
             return
-        self._unopened[node] = since_s, count + 1
-        if count + 1 < LEAST_PACKETS or now_s - since_s < FOREIGN_AFTER_S:
+        if now_s - first_s < FOREIGN_AFTER_S or now_s - last_s < LATE_ANSWER_S:
             return
         if payload[SEAL_AT:] == _NO_SEAL:
             reason = f"a neighbour, node {node}, sends packets without a seal: it has no key"

@@ -138,6 +138,26 @@ def test_a_node_is_not_challenged_again_at_once():
     assert receiver.challenge(5, 2.0) is not None
 
 
+@pytest.mark.parametrize(("late_s", "is_believed"), [(9.9, True), (10.1, False)])
+def test_on_a_busy_channel_an_answer_may_come_after_the_next_challenge(late_s, is_believed):
+    receiver, sender = node(1), node(5)
+    first = receiver.challenge(5, 0.0)
+    for second in range(2, 10, 2):
+        assert receiver.challenge(5, float(second)) is not None
+    assert (receiver.answered(sender.answer(first, 1.0), late_s) is True) is is_believed
+    assert receiver.knows(5, late_s) is is_believed
+
+
+def test_a_late_answer_lets_no_packet_pass_twice(link):
+    receiver, sender = link
+    answer = sender.answer(receiver.challenge(5, 5.0), 5.0)
+    assert receiver.challenge(5, 7.0) is not None
+    old = [sender.seal(packet) for packet in [PRESENT, HEARTBEAT] * 100]
+    assert all(receiver.open(sealed, 8.0) for sealed in old)
+    assert receiver.answered(answer, 8.0) is False
+    assert not any(receiver.open(sealed, 8.0) for sealed in old)
+
+
 def test_invented_ids_get_a_limited_number_of_challenges():
     receiver = node(1)
     sent = [receiver.challenge(n % 250 + 2, n * 0.001) for n in range(10_000)]  # 1,000 a second
