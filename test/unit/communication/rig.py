@@ -7,7 +7,11 @@ from __future__ import annotations
 
 import random
 
-from drone_mesh.communication.interfaces import IInternetConnection, IWirelessCommunication
+from drone_mesh.communication.interfaces import (
+    NO_SEALS,
+    IInternetConnection,
+    IWirelessCommunication,
+)
 from drone_mesh.communication.node.component import NodeSettings
 from drone_mesh.communication.node.gateway import MeshnetworkGateway
 from drone_mesh.communication.node.router import MeshnetworkRouter
@@ -153,6 +157,7 @@ class Rig:
         repair=None,
         options=None,
         medium=UNDISTURBED,
+        seals=NO_SEALS,
     ):
         self.now_s = 0.0
         self.antenna = RecordingAntenna(medium)
@@ -166,6 +171,7 @@ class Rig:
             options=options or RepairOptions(),
             observer=self.events.append,
             debug=debug,
+            seals=seals,
         )
         if gateway:
             more = (self.internet, AlwaysHalf(), settings)

@@ -174,9 +174,9 @@ class PlaceRequests:
     _deadlines: Deadlines
     _told: Location | None = field(default=None, init=False)  # to all
 
-    def ask(self, node: int) -> None:
-        """Ask `node` for its place, along the route to it."""
-        self._delivery.send_own(self._request(node))
+    def ask(self, node: int) -> bool:
+        """Ask `node` for its place, along the route to it; returns whether that has left."""
+        return self._delivery.send_own(self._request(node))
 
     def ask_all(self, may_fly_on: bool = False) -> None:
         """Ask every node in range for its place; `may_fly_on`: and of others near, as in flight."""

@@ -302,7 +302,8 @@ class GatewayConnection:
         shows_way_back = self._relay_check.swallowing.wants_heartbeat(self.hops)
         if shows_way_back:
             self.send_heartbeat()
-        asked = self._relay_check.run(self.gateway, self.next_hop(), self.hops, self._answered_s)
+        to, answered_s = self.next_hop(), self._answered_itself_s
+        asked = self._relay_check.run(self.gateway, to, self.hops, answered_s)
         if shows_way_back or self.proven(patience):
             return
         fresh_periods = self._medium.place_periods
@@ -312,6 +313,10 @@ class GatewayConnection:
     def gateway_sent_place(self) -> None:
         """The preferred gateway itself reported its place."""
         self._relay_check.swallowing.answered()
+
+    def question_lost(self) -> None:
+        """No neighbour took this router's question for the place of its gateway."""
+        self._relay_check.swallowing.not_taken()
 
     def _ask_for_places(self, fresh_s: float = 0.0, gateway_asked: bool = False) -> None:
         """Ask the next hop where it is, and the gateway if that is unknown or may have moved.

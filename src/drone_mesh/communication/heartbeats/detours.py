@@ -75,6 +75,13 @@ class Swallowing:
         self._answers = False  # whether this gateway knows its place and answers at all
         self._unanswered = 0
         self._asked_s = -math.inf
+        self._through = NO_ROUTE
+
+    def through(self, next_hop: int, hops: int) -> None:
+        """The next hop now: what was asked through another one says little about it."""
+        if next_hop != self._through:
+            self._through = next_hop
+            self.another_next_hop(hops)
 
     def must_ask(self, now_s: float) -> bool:
         """Whether to ask the gateway in this check: sooner after a question without answer.
@@ -92,13 +99,20 @@ class Swallowing:
         return self._unanswered > 0 and not self.noticed(hops)
 
     def is_over(self, now_s: float, heartbeat_s: float) -> bool:
-        """Whether the time for an answer is over and the gateway has answered a heartbeat since."""
+        """Whether the time for an answer is over and it has answered this node's heartbeat since.
+
+        Its answers to nodes behind this one may come another way.
+        """
         return now_s - self._asked_s >= self._wait_s and heartbeat_s >= self._asked_s
 
     def asked(self, now_s: float) -> None:
         """The gateway was asked for its place."""
         self._asked_s = now_s
         self._unanswered += 1
+
+    def not_taken(self) -> None:
+        """The next hop did not take the latest question: it cannot have swallowed it."""
+        self._unanswered = max(0, self._unanswered - 1)
 
     def answered(self) -> None:
         """The gateway answered a request for its place."""
@@ -115,7 +129,7 @@ class Swallowing:
 
     def another_next_hop(self, hops: int) -> None:
         """The next hop has changed: suspect it after fewer unanswered requests than usual."""
-        self._unanswered = max(0, hops - LEAST_UNANSWERED)
+        self._unanswered = min(self._unanswered, max(0, hops - LEAST_UNANSWERED))
 
     def give_up(self) -> None:
         """Stop suspecting: there is another gateway, or it is silent through every next hop."""
@@ -141,19 +155,20 @@ class RelayCheck:
     def run(self, gateway: int, next_hop: int, hops: int, heartbeat_s: float) -> bool:
         """Check the route to `gateway`; returns whether the gateway was asked for its place.
 
-        `heartbeat_s`: when it last answered a heartbeat. If it answers only those, later ones go
-        through another neighbour.
+        `heartbeat_s`: when it last answered a heartbeat of this node. If it answers only those,
+        later ones go through another neighbour.
         """
         now_s = self._deadlines.now_s
         if not self._is_needed or next_hop in (gateway, NO_ROUTE):
             return False
+        self.swallowing.through(next_hop, hops)
         if self.swallowing.noticed(hops) and self.swallowing.is_over(now_s, heartbeat_s):
             self._detours.avoid(next_hop, now_s + SWALLOWER_AVOIDED_S)
             _log.warning(
-                "node %d: node %d carries heartbeats to gateway %d, but no other packets",
+                "node %d: gateway %d answers heartbeats through node %d, but no other packets",
                 self._node_id,
-                next_hop,
                 gateway,
+                next_hop,
             )
         if self._detours.avoids(next_hop, now_s):  # just now, or the route has returned to it
             self._detour = self._detours.nearest(next_hop, hops, now_s)
@@ -166,7 +181,8 @@ class RelayCheck:
         if not self.swallowing.must_ask(now_s):
             return False
         self.swallowing.asked(now_s)
-        self._requests.ask(gateway)
+        if not self._requests.ask(gateway):
+            self.swallowing.not_taken()
         return True
 
     def take_detour(self) -> int:

@@ -271,6 +271,9 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         self._delivery.delivered(neighbour, tries)
 
     def on_undelivered(self, payload: bytes, tries: int) -> None:
+        creator, _from, _kind, _to, forward = messages.header(payload)
+        if (creator, forward) == (self._node_id, self.gateway) and messages.asks_for_place(payload):
+            self._connection.question_lost()
         if not self._delivery.undelivered(payload, tries):
             self._forwarding.stranded(payload, self._deadlines.now_s)
 

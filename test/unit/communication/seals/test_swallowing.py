@@ -6,12 +6,13 @@ from types import SimpleNamespace
 
 import pytest
 from proofs.stranger import Hole
+from rig import Rig
 from seal_rig import KEY, packet
 
 from drone_mesh.communication.data.outgoing import TO_GATEWAY, TicketState
 from drone_mesh.communication.heartbeats.detours import Detours, RelayCheck, Swallowing
-from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.timing import Deadlines, MeshTiming
+from drone_mesh.communication.interfaces import NO_ROUTE, IMeshSeals
+from drone_mesh.communication.timing import Deadlines, Medium, MeshTiming
 from drone_mesh.inprocess import Network
 
 NOTICED_WITHIN_S = 120.0
@@ -83,9 +84,10 @@ def check_of_node_8(now_s=100.0):
     detours = Detours(neighbours)
     clock = Deadlines()
     clock.now_s = now_s
-    requests = SimpleNamespace(ask=lambda _gateway: None)
+    requests = SimpleNamespace(ask=lambda _gateway: True)
     check = RelayCheck(8, True, MeshTiming().check_period_s, clock, requests, detours)
     check.swallowing.answered()
+    check.swallowing.through(1, hops=2)
     for at_s in (80.0, 90.0):
         check.swallowing.asked(at_s)
     return check, detours
@@ -100,6 +102,36 @@ def test_a_relay_is_not_suspected_while(now_s, heartbeat_s):
     check, _detours = check_of_node_8(now_s)
     check.run(gateway=0, next_hop=1, hops=2, heartbeat_s=heartbeat_s)
     assert check.take_detour() == NO_ROUTE
+
+
+def test_a_relay_is_not_suspected_for_questions_that_went_through_another_one(caplog):
+    check, _detours = check_of_node_8()
+    check.run(gateway=0, next_hop=2, hops=2, heartbeat_s=91.0)
+    assert (check.take_detour(), caplog.messages) == (NO_ROUTE, [])
+
+
+class WithKey(IMeshSeals):
+    has_key = True
+
+
+def ask_on_a_shared_channel(is_taken):
+    """Router 1 behind relay 2, in a mesh with a key; gateway 0 answers heartbeats only."""
+    rig = Rig(medium=Medium(shared=True, answer_s=1.0), seals=WithKey())
+    rig.hear("02 02 03 01 fe 01 01", "00 02 04 01 01 01 00 01", "00 02 01 01 01")
+    for _half_second in range(120):
+        rig.wait(0.5)
+        for sent in rig.sent():
+            if sent[2] == 4 and sent[4] == 0:
+                rig.hear("00 02 04 01 01 01 00 01")
+            elif sent[2] == 2 and sent[4] == 0 and not is_taken:
+                rig.mesh.on_undelivered(sent, 18, rig.now_s)
+
+
+@pytest.mark.parametrize("is_taken", [True, False])
+def test_a_question_that_the_relay_did_not_take_says_nothing_about_it(caplog, is_taken):
+    ask_on_a_shared_channel(is_taken)
+    told = [line for line in caplog.messages if "through node 2, but no other packets" in line]
+    assert bool(told) is is_taken
 
 
 def test_a_relay_that_swallowed_is_tried_again_after_ten_minutes():
