@@ -439,8 +439,18 @@ class BeaconPlane(IControlPlane):
         """When a relay last brought a packet of `node` or named it."""
         return max(self._routes.led_s(node), self._below.known_s(node))
 
+    def leave(self) -> None:
+        """Lead nobody to the gateway until the flight is over."""
+        self._set_time()
+        self._routes.leaves = True
+        self._show()
+        self._trickle.hurry(self._routes.now_s)
+        self._plan()
+
     def end(self, event: RouterEvent) -> None:
         """A flight or an election begins or ends: the connection is what the beacons say."""
+        if event is RouterEvent.LANDED:
+            self._routes.leaves = False
         if self._connection is not None:
             self._connection.end(event)
 

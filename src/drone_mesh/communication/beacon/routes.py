@@ -45,6 +45,7 @@ MOST_DOUBTS = 7  # times UNPROVEN, which is less than OFFLINE
 OFFLINE = 256.0  # hops: any gateway with internet is nearer than one without
 SEEN_S = 10.0  # an older place of a node does not tell the way to it
 NEAR = 2.0  # intervals: an older report that a neighbour hears a node shows no way to it
+SHOWN_S = 20.0  # beacons with little room show all neighbours of their sender within this time
 HINT_S = 3.0  # a packet that came from a node shows the way to it for this long
 
 Rank = Tuple[float, bool, float, int]
@@ -80,6 +81,7 @@ class BeaconRoutes(IRoutes):
         self.ancestors = NO_ANCESTORS
         self.number = 0
         self.offline = False  # the preferred gateway has no internet
+        self.leaves = False  # this node gave up its connection, and flies
         self._own_number = 0  # of the latest beacon as a gateway
         self.proved_s = -math.inf  # when the parent, at that time, last proved that it hears
         self.motion: Motion | None = None  # this node's own
@@ -185,7 +187,8 @@ class BeaconRoutes(IRoutes):
     @property
     def is_proved(self) -> bool:
         """Whether the way up works in both directions, or ends here."""
-        return self.is_root or self.clock.now_s - self.proved_s <= PROVEN_S
+        is_fresh = self.clock.now_s - self.proved_s <= PROVEN_S and not self.leaves
+        return self.is_root or is_fresh
 
     @property
     def shown(self) -> tuple[int, int, bool]:
@@ -467,6 +470,24 @@ class BeaconRoutes(IRoutes):
     def get_set_of_children(self) -> frozenset[int]:
         """Ids of the nodes in direct reach, in both directions."""
         return frozenset(n.node for n in self._all() if not n.deaf)
+
+    def heard_by(self, node: int) -> frozenset[int]:
+        """Its parent and children, and the neighbours that its latest beacons showed."""
+        known = self.neighbours.get(node)
+        if known is None:
+            return frozenset()
+        since_s = self.clock.now_s - SHOWN_S
+        near = {other for other, at_s in known.near_s.items() if at_s > since_s}
+        near.update(n.node for n in self._all() if n.beacon.parent == node)
+        return frozenset(near | {known.beacon.parent}) - {NO_ROUTE}
+
+    def has_own_way(self, node: int) -> bool:
+        """What its beacons say, or, of a node two hops away, those of the children here."""
+        me, known = self._node_id, self.neighbours.get(node)
+        if known is None:
+            return not any(n.beacon.parent == me and node in n.announced_s for n in self._all())
+        beacon = known.beacon
+        return beacon.gateway != NO_ROUTE and me not in (beacon.parent, *beacon.ancestors)
 
     def node_moved_location(self) -> None:
         """The next beacons show where everybody is; who is deaf there must show anew."""

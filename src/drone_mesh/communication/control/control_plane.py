@@ -184,6 +184,9 @@ class IControlPlane(abc.ABC):
     def give_up_routes(self) -> None:
         """Forget every route to the preferred gateway."""
 
+    def leave(self) -> None:
+        """Give up the connection and tell the neighbours: this node flies away by itself."""
+
     # Questions -------------------------------------------------------------------------------
 
     def search(self, node: int) -> bool:

@@ -53,3 +53,14 @@ class IRoutes(abc.ABC):
     @abc.abstractmethod
     def node_moved_location(self) -> None:
         """This node is at another place, with other neighbours."""
+
+    def heard_by(self, node: int) -> frozenset[int]:
+        """The nodes that a neighbour has shown to hear; empty without such news."""
+        return frozenset()
+
+    def has_own_way(self, node: int) -> bool | None:
+        """Whether a node in at most two hops has a way up that does not lead through this one.
+
+        None: the technique cannot tell; the hops that it reported can.
+        """
+        return None

@@ -187,6 +187,10 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         if self.gateway != NO_ROUTE:
             self._delivery.gateway_lost(self.gateway)
 
+    def leave(self) -> None:
+        self.give_up_routes()
+        self.end(RouterEvent.ROUTE_LOST)
+
     def gateway_sent_place(self) -> None:
         self._connection.gateway_sent_place()
 

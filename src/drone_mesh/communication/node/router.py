@@ -93,6 +93,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
         super()._check(due_s)
         if self._states.connected:
             self.places.connected_here(self._pilot.place(), self.control.hops)
+            self._repair.on_connected_check()
 
     def _antenna_is_off(self) -> None:
         self._repair.on_antenna_off()

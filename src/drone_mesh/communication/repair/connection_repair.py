@@ -84,6 +84,11 @@ class ConnectionRepair(RepairActions):
         elif self._checked_s is None:
             self._checked_s = due_s
 
+    def on_connected_check(self) -> None:
+        """A check finds the router connected."""
+        if self.state is RepairState.AT_REST:
+            self._strategy.on_connected_check()
+
     def on_connected(self) -> None:
         """A gateway answers again."""
         self._clear()
@@ -332,7 +337,7 @@ class ConnectionRepair(RepairActions):
         near_m = 2 * PITCH * self.clearance_m
         tried = [spot for spot in self._tried_spots if spot.distance_m(step.place) < near_m]
         neighbours = self._neighbours
-        heard = [neighbours.place_of(node) for node in sorted(neighbours.ids())]
+        heard = [neighbours.place_of(node) for node in sorted(neighbours.ids() - {step.owner})]
         origin = self.own_place() or step.place
         places = [origin, *(known.place for known in heard if known is not None)]
         links = [place for place in places if place.distance_m(step.place) < self.range_m]

@@ -17,6 +17,7 @@ NO_BID = -1.0  # the score of a node that does not fly
 MAX_SCORE_M = 1e9  # beyond every possible place, and it fits a float32
 TOOK_OFF = 2e9  # sent in place of a score: the winner takes off
 TOOK_OFF_HOME = 3e9  # the same, and it flies to the gateway's place
+BACKUP = 5e9  # sent in place of a score: who receives it is the backup of its creator
 HOME_FAILED = 4e9  # sent in place of NO_BID: no gateway answered at the gateway's place
 WINNERS_WITHOUT_FLIGHT = 3  # a winner may also fail to fly for honest reasons
 

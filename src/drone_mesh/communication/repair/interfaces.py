@@ -117,6 +117,21 @@ class RepairActions(abc.ABC):
         """The nodes in direct reach."""
         return {node: self._view(node) for node in self._control.routes.get_set_of_children()}
 
+    def heard_by(self, node: int) -> frozenset[int]:
+        """The nodes that a neighbour has shown to hear; empty if the technique has no such news."""
+        return self._control.routes.heard_by(node)
+
+    def has_own_way(self, node: int) -> bool:
+        """Whether a node in at most two hops reaches the gateway, and not through this node."""
+        has_way = self._control.routes.has_own_way(node)
+        return self._neighbours.hops_of(node) <= self._control.hops if has_way is None else has_way
+
+    @property
+    def in_motion(self) -> bool:
+        """Whether drones move by themselves: a link that was lost may come back."""
+        motion = self._neighbours.motion
+        return motion.moved_since(self.now_s - motion.within_s)
+
     def is_unheard(self) -> bool:
         """Whether this node hears others but none of them hears it."""
         return bool(self._neighbours.deaf()) and not self.neighbours()
@@ -197,14 +212,22 @@ class RepairActions(abc.ABC):
         `until_connected`: land as soon as a gateway answers. The routes are forgotten.
         """
 
+    def leave(self) -> None:
+        """Give up the connection and tell the neighbours, before a flight from where it is needed.
+
+        The connection may come back when the flight is over.
+        """
+        self._control.leave()
+
     def bid(
         self,
         score: float,
         node: int | None = None,
         but_not_to: int = NO_ROUTE,
         about: Location | None = None,
+        only_to: int = NO_ROUTE,
     ) -> None:
-        """Send a bid to all neighbours; `node` is its creator if it is relayed.
+        """Send a bid to all neighbours, or one; `node` is its creator if it is relayed.
 
         `about`: the goal of a flight that it announces, or the gateway's place where one failed.
         """
@@ -214,7 +237,8 @@ class RepairActions(abc.ABC):
         if about is not None:
             packet = GatewayPlace(self._control.gateway, about, 0.0).appended_to(packet)
         for neighbour in sorted(self._control.routes.get_set_of_children() - {creator, but_not_to}):
-            self._control.delivery.send_own(addressed(packet, neighbour))
+            if only_to in (neighbour, NO_ROUTE):
+                self._control.delivery.send_own(addressed(packet, neighbour))
 
     def ask_places(self) -> None:
         """Request the places of all nodes in range; the answers arrive in `on_place`."""
@@ -285,6 +309,9 @@ class IRepairStrategy(abc.ABC):
         RepairActions.silent.
         """
         return SILENCE_PATIENCE if silent else 1.0
+
+    def on_connected_check(self) -> None:
+        """The periodic check of a connected drone at rest: it may prepare, or `leave`."""
 
     def on_gateway_lost(self) -> None:
         """A check found that no gateway answers."""

@@ -12,6 +12,7 @@ import math
 
 from drone_mesh.communication.control.router_states import RepairState
 from drone_mesh.communication.events.observer import MeshEventKind
+from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.repair.interfaces import (
     JAMMED,
     SILENCE_PATIENCE,
@@ -31,12 +32,14 @@ JAMMED_SHARE = 0.5  # a jammer may pulse; frames of strangers take less of the t
 class LoneRepair(IRepairStrategy):
     """What an electing strategy does when the drone is alone."""
 
+    samples_wanted = SAMPLES
     _stood_at: Location | None = None  # during a look around: its start
     _looked = False  # since the connection was lost
     _was_everywhere = False  # alone, it has no further step
     _in_silence = False  # several neighbours fell silent together before it
     _landed_s = -math.inf  # from its latest look around
     _jammed_s = -math.inf  # when its channel was last found to be jammed
+    _dead = NO_ROUTE  # a neighbour that the mesh still lists, and that is known to be silent
 
     def start(self, mesh: RepairActions) -> None:
         """Called once, before any other call."""
@@ -92,7 +95,7 @@ class LoneRepair(IRepairStrategy):
         """The timer has expired. Returns whether it was that of a drone alone."""
         if self.mesh.state is not RepairState.LOST:
             self._samples = None  # an election has begun meanwhile
-        if self.mesh.neighbours() and self._stood_at is None:
+        if self._hears_others() and self._stood_at is None:
             self._samples = None
             return False
         if self._samples is not None:
@@ -118,16 +121,19 @@ class LoneRepair(IRepairStrategy):
     def fly_alone(self) -> None:
         """Take the next step, after the channel was found not to be jammed."""
 
+    def _hears_others(self) -> bool:
+        return bool(self.mesh.neighbours().keys() - {self._dead})
+
     def _measure(self) -> None:
         mesh, samples = self.mesh, self._samples
         assert samples is not None
-        power = mesh.hears_power() if len(samples) < SAMPLES else None
+        power = mesh.hears_power() if len(samples) < self.samples_wanted else None
         if power is not None:
             samples.append(power)
             mesh.wait_until(mesh.now_s + SAMPLE_S)
             return
         self._samples = None
-        if mesh.neighbours():
+        if self._hears_others():
             return
         if samples and sum(samples) >= JAMMED_SHARE * len(samples):
             if self._jammed_s == -math.inf:

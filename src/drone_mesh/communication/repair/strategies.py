@@ -7,9 +7,12 @@ from typing import Callable
 
 from drone_mesh.by_name import create_by_name
 from drone_mesh.communication.control.router_states import RepairState
+from drone_mesh.communication.repair.c3r import C3R
 from drone_mesh.communication.repair.election import MAX_SCORE_M, NO_BID
 from drone_mesh.communication.repair.group_repair import GroupRepair
 from drone_mesh.communication.repair.interfaces import IRepairStrategy, Step
+from drone_mesh.communication.repair.named_backup import NamedBackup
+from drone_mesh.communication.repair.nearest import Nearest
 from drone_mesh.communication.repair.options import DEFAULT_REPAIR
 from drone_mesh.communication.repair.spots import WITHIN_REACH
 from drone_mesh.drone.location import Location
@@ -154,25 +157,6 @@ class Field(IRepairStrategy):
             mesh.fly(Step(here.towards(goal, leg_m)), until_connected=True)
 
 
-class Nearest(GroupRepair):
-    """The drone of a group that is nearest to the place of its lost next hop takes it.
-
-    After DARA: Abbasi, Younis, Akkaya, "Movement-Assisted Connectivity Restoration in Wireless
-    Sensor and Actor Networks", IEEE TPDS 20(9), 2009; only the parts without a gateway act. The
-    children that the drone leaves behind lose their gateway, and repeat the same: the cascade of
-    DARA.
-    """
-
-    def _score(self, step: Step) -> float:
-        """Above 1 for a first choice, otherwise up to 1; the shorter the flight, the higher."""
-        here = self.mesh.own_place()
-        if here is None:
-            self.reason = "does not know where it is"
-            return NO_BID
-        score = 1.0 / (1.0 + here.distance_m(step.place))
-        return score if self._is_second_choice(step) else 1.0 + score
-
-
 class Follow(Nearest):
     """A leader, the nearest, takes the place of its lost next hop; its tree moves up behind it.
 
@@ -222,10 +206,12 @@ class Thesis(GroupRepair):
 
 REPAIR_STRATEGIES: dict[str, Callable[[], IRepairStrategy]] = {
     DEFAULT_REPAIR: Thesis,
+    "c3r": C3R,
     "field": Field,
     "follow": Follow,
     "home": Home,
     "inward": Inward,
+    "named_backup": NamedBackup,
     "nearest": Nearest,
     "stay": Stay,
 }
