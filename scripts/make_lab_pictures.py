@@ -5,6 +5,7 @@ They become pictures in docs/pictures.
 
 from __future__ import annotations
 
+import math
 import shutil
 import tempfile
 from pathlib import Path
@@ -31,7 +32,9 @@ REPORTED = (
     "title=Healing of fifty drones", "seeds=8", "base.layout.drones=50",
     "sweep.repair=[thesis,nearest,home]", "sweep.faults.kill=[{share: 0.3}]",
 )  # fmt: skip
-STRATEGIES = ("thesis", "nearest", "follow", "inward", "field", "home", "oracle")
+STRATEGIES = (
+    "thesis", "nearest", "named_backup", "c3r", "follow", "inward", "field", "home", "oracle",
+)  # fmt: skip
 TECHNIQUES = (
     "child_table_tree", "steady_tree", "etx_tree", "babel", "batman", "dsdv", "flooding",
     "shortest_path",
@@ -124,15 +127,16 @@ def draw_repair(axes: Axes, repair: str) -> str:
     took_s = network.now_s() - died_s
     network.run_for(20.0)
     draw_links(axes, network)
+    flown_m = 0.0
     for place, (node, path) in enumerate(legs):
         later = [after.start for other, after in legs[place + 1 :] if other == node]
         end = [*later, network.location(node).to_vector()][0]
+        flown_m += math.dist(path.start[:2], end[:2])
         axes.plot(*path.start[:2], "o", ms=9, mfc="none", mec=LIGHT.muted, ls="none")
         arrow = {"arrowstyle": "->", "color": LIGHT.flying, "lw": 1.6}
         axes.annotate("", end[:2], path.start[:2], arrowprops=arrow)
     axes.plot(*PLACES[DEAD], "x", ms=9, mew=2, color=LIGHT.disconnected)
     draw_nodes(axes, network)
-    flown_m = sum(member.drone.flown_m for member in network.nodes.values())
     flew = len({node for node, _path in legs})
     lost = "" if network.all_connected() else ", then lost again"
     return f"{flew} of 5 fly, {flown_m:.0f} m in all;\nhealed after {took_s:.0f} s{lost}"
