@@ -20,11 +20,9 @@ class Location(NamedTuple):
 
     def distance_m(self, other: Location) -> float:
         """Straight 3D distance to `other`."""
-        return math.sqrt(
-            (self.latitude - other.latitude) ** 2
-            + (self.longitude - other.longitude) ** 2
-            + (self.height - other.height) ** 2
-        )
+        (a, b, c), (d, e, f) = self, other  # each beacon asks: by place, not by name
+        north, east, up = a - d, b - e, c - f
+        return math.sqrt(north * north + east * east + up * up)
 
     def towards(self, end: Location, distance_m: float) -> Location:
         """The point `distance_m` away on the straight line to `end`, at most `end` itself."""

@@ -122,7 +122,7 @@ class Neighbour:
         _after, listed, new = below = beacon.below
         announced_s = self.announced_s
         if announced_s:
-            for node in [n for n in announced_s if n not in listed and below.covers(n)]:
+            for node in below.left_out(announced_s):
                 del announced_s[node]
         if listed:
             for node in listed:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import math
 import struct
-from typing import NamedTuple, Sequence, Tuple
+from typing import Iterable, NamedTuple, Sequence, Tuple
 
 from drone_mesh.communication.interfaces import MAX_NODE_ID, NO_ROUTE
 from drone_mesh.communication.wire.messages import HEADER_BYTES
@@ -67,11 +67,13 @@ class Below(NamedTuple):
     listed: tuple[int, ...]
     new: tuple[int, ...] = ()  # since the last beacon, wherever their turn is
 
-    def covers(self, node: int) -> bool:
-        """Whether `node` would be listed if it were below."""
+    def left_out(self, nodes: Iterable[int]) -> list[int]:
+        """Those of `nodes` that would be listed if they were below, and are not."""
         if not self.listed:
-            return self.after != NO_LIST
-        return (node - self.after - 1) % 256 <= (self.listed[-1] - self.after - 1) % 256
+            return [] if self.after == NO_LIST else list(nodes)
+        listed, first = self.listed, self.after + 1
+        span = (listed[-1] - first) % 256
+        return [node for node in nodes if (node - first) % 256 <= span and node not in listed]
 
     def list_bytes(self) -> bytes:
         """`listed` as ids, or as the first id and a bit for each one from there on, if shorter."""

@@ -267,10 +267,11 @@ class BeaconRoutes(IRoutes):
         if present is not None and self._leads_up(present):
             best = self._rank(present)
         for neighbour in self.neighbours.values():
-            if neighbour is present or (best is not None and neighbour.beacon.hops > best[0]):
+            if neighbour is present or (best and (neighbour.beacon.hops, True) >= best):
                 continue  # most are not better, whatever the risk of their links
-            least = self._hops_through(neighbour), True
-            if (best is None or least < best) and self._leads_up(neighbour):
+            if (best is None or (self._hops_through(neighbour), True) < best) and (
+                self._leads_up(neighbour)
+            ):
                 rank = self._rank(neighbour)
                 best = rank if best is None else min(best, rank)
         if self._is_gateway and (best is None or best[0] >= OFFLINE):

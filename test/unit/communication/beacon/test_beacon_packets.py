@@ -84,20 +84,17 @@ def test_sequence_numbers_go_round(number, than, by):
     assert newer(number, than) == by
 
 
-def test_a_part_of_the_list_covers_all_ids_since_the_part_before():
-    part = Below(200, (250, 3))
-    assert [node for node in (200, 201, 250, 255, 0, 3, 4) if part.covers(node)] == [
-        201, 250, 255, 0, 3,
-    ]  # fmt: skip
+def test_a_part_of_the_list_leaves_out_the_other_ids_since_the_part_before():
+    assert Below(200, (250, 3)).left_out((200, 201, 250, 255, 0, 3, 4)) == [201, 255, 0]
 
 
-def test_a_complete_list_covers_every_id():
-    assert all(Below(8, (2, 8)).covers(node) for node in range(256))
+def test_a_complete_list_leaves_out_every_other_id():
+    assert Below(8, (2, 8)).left_out(range(256)) == [n for n in range(256) if n not in (2, 8)]
 
 
-def test_an_empty_list_covers_every_id_unless_there_was_no_room_for_any():
-    assert NONE_BELOW.covers(0)
-    assert not NOT_LISTED.covers(0)
+def test_an_empty_list_leaves_out_every_id_unless_there_was_no_room_for_any():
+    assert NONE_BELOW.left_out((0, 7)) == [0, 7]
+    assert NOT_LISTED.left_out((0, 7)) == []
 
 
 def test_many_nodes_below_stand_as_the_first_id_and_a_bit_for_each():
