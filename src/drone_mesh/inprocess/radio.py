@@ -13,6 +13,7 @@ from drone_mesh.communication.repair.options import RANGE_M
 from drone_mesh.communication.wire.messages import copies_for, hop
 from drone_mesh.drone.location import Location
 from drone_mesh.inprocess.clock import VirtualClock
+from drone_mesh.inprocess.close_pairs import ClosePairs
 from drone_mesh.inprocess.interfaces import Host, IInProcessAir, IInProcessAntenna
 
 HOP_DELAY_S = 0.002  # an acknowledged packet takes 1.9 ms on the air (nRF24L01+, 250 kbit/s)
@@ -23,6 +24,10 @@ Deliver = Callable[[bytes], None]
 
 def _ignore(_payload: bytes) -> None:
     """A packet reached an antenna without power, or one that was stopped."""
+
+
+def _as_rows(places: Iterable[Location]) -> np.ndarray:
+    return np.array(list(places)).reshape(-1, 3)
 
 
 class InProcessAir(IInProcessAir):
@@ -62,8 +67,8 @@ class InProcessAir(IInProcessAir):
         self._links: dict[int, dict[int, InProcessAntenna]] = {}
         self._standing: dict[int, Location] = {}  # their positions
         self._flying: set[int] = set()
-        # Which nodes at rest are near each other, in the order of `_standing`; None: to be found.
-        self._near: np.ndarray | None = None
+        # Of nodes at rest, in the order of `_standing`; None: to be found.
+        self._pairs: ClosePairs | None = None
         # Packets that leave at one time also arrive at one time: one event of the clock for all.
         self._under_way: list[tuple[InProcessAntenna, bytes]] = []
         self._left_s = -math.inf  # when those left
@@ -98,27 +103,21 @@ class InProcessAir(IInProcessAir):
 
     def moved(self, nodes: Iterable[int]) -> None:
         """Pilots have flown these drones to other places; their links follow."""
-        moved = [node for node in nodes if node in self._standing]
-        if self._near is None or self.sees is not None:  # obstacles: each line of sight may differ
+        moved, standing = [node for node in nodes if node in self._standing], self._standing
+        pairs = self._pairs
+        if pairs is None or self.sees is not None:  # obstacles: each line of sight may differ
             for node in moved:
                 self._unlink(node)
             for node in moved:
                 self._link(node)
-            self._near = self._near_each_other()
+            if self.sees is None:
+                self._pairs = ClosePairs(self.max_distance_m, _as_rows(standing.values()))
             return
         for node in moved:
-            self._standing[node] = self._antennas[node].drone.get_location()
-        before, self._near = self._near, self._near_each_other()
-        ids = list(self._standing)
-        for one, other in np.argwhere(np.triu(before != self._near)):
-            self._set_link(ids[one], ids[other], bool(self._near[one, other]))
-
-    def _near_each_other(self) -> np.ndarray:
-        """Booleans, n x n."""
-        places = np.array(list(self._standing.values())).reshape(-1, 3)
-        away = places[:, None] - places[None]
-        near: np.ndarray = np.einsum("ijk,ijk->ij", away, away) < self.max_distance_m**2
-        return near
+            standing[node] = self._antennas[node].drone.get_location()
+        ids = list(standing)
+        for one, other, near in pairs.moved_to(_as_rows(standing.values())):
+            self._set_link(ids[one], ids[other], near)
 
     def _set_link(self, one: int, other: int, near: bool) -> None:
         if not near:
@@ -174,7 +173,7 @@ class InProcessAir(IInProcessAir):
 
     def _link(self, node: int) -> None:
         """Find the links of a node at rest; nothing for a node in flight or without an antenna."""
-        self._near = None
+        self._pairs = None
         if node in self._antennas and node not in self._flying:
             links = self._heard_by(node, self._standing)
             self._links[node] = links
@@ -183,7 +182,7 @@ class InProcessAir(IInProcessAir):
                 self._links[other][node] = self._antennas[node]
 
     def _unlink(self, node: int) -> None:
-        self._near = None
+        self._pairs = None
         self._standing.pop(node, None)
         for other in self._links.pop(node, ()):
             del self._links[other][node]

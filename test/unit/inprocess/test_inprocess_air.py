@@ -1,5 +1,6 @@
 """The in-process air: what it remembers about links is what the places say."""
 
+import math
 import random
 from types import SimpleNamespace
 
@@ -151,3 +152,25 @@ def test_a_sender_knows_which_of_its_packets_were_lost():
     taken = sum(field.send(1, 2) for _ in range(200))
     assert 60 < taken < 140
     assert len(field.run()) == taken
+
+
+@pytest.mark.parametrize("step_m", [0.03, 0.5, 5.0])  # of a margin of 1.8 m
+def test_links_follow_many_drones_that_move_slowly_or_fast(step_m):
+    rng, field = random.Random(5), Field(max_distance_m=9.0)
+    places = [[rng.uniform(0, 40), rng.uniform(0, 40), 0.0] for _ in range(40)]
+    courses = [(rng.uniform(-step_m, step_m), rng.uniform(-step_m, step_m)) for _ in places]
+    for node, (x, y, _z) in enumerate(places):
+        field.put(node, x, y)
+    changed = 0
+    links = {}
+    for _ in range(200):
+        for node, (place, course) in enumerate(zip(places, courses)):
+            place[0], place[1] = ((a + b) % 40 for a, b in zip(place, course))
+            field.antennas[node].drone.set_goal(place[1], place[0], 0.0)
+        field.air.moved(range(40))
+        for node, here in enumerate(places):
+            near = {n for n, there in enumerate(places) if math.dist(here, there) < 9.0} - {node}
+            assert set(field.air.in_range(node)) == near
+            changed += links.get(node) != near
+            links[node] = near
+    assert changed > 80
