@@ -16,6 +16,7 @@ from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.node.assembly import Security, assemble_node
 from drone_mesh.communication.node.gateway import MeshnetworkGateway
 from drone_mesh.communication.node.node_configuration import DEFAULT_ROUTING, NodeConfiguration
+from drone_mesh.communication.repair.fiedler import Fiedler
 from drone_mesh.communication.repair.interfaces import IRepairStrategy
 from drone_mesh.communication.repair.options import DEFAULT_REPAIR, RANGE_M, RepairOptions
 from drone_mesh.communication.seals.keys import Keys
@@ -42,6 +43,7 @@ from drone_mesh.nrf24.settings import DEFAULT_RATE
 from drone_mesh.state.model import EventRecord, MeshStatus
 
 ORACLE = "oracle"  # the repair strategy with global knowledge
+IDEAL_FIEDLER = "ideal_fiedler"  # the strategy `fiedler` with it
 STEP_S = 0.1  # period at which run_until checks its condition
 
 
@@ -76,8 +78,8 @@ class Network:
         """`loss`, `delay_s` and `jitter_s` as for InProcessAir; `routing` as in a launch file, or
         "shortest_path", which knows all links: the bound for every other technique; or a class.
 
-        `repair` is the name of a repair strategy, as in a launch file, or "oracle"; or a class, or
-        a function that creates one.
+        `repair` is the name of a repair strategy, as in a launch file, or "oracle" or
+        "ideal_fiedler", which know everything; or a class, or a function that creates one.
 
         `radio`: "disc", on which packets never meet; "shared", a fast model of nRF24L01+ radios on
         one channel; "chips", the driver on emulated chips; or an air of your own. For "shared" and
@@ -95,7 +97,7 @@ class Network:
         self._repair = repair
         self._configuration = NodeConfiguration(
             DEFAULT_ROUTING if routing == SHORTEST_PATH else routing,
-            DEFAULT_REPAIR if repair == ORACLE else repair,
+            DEFAULT_REPAIR if repair in (ORACLE, IDEAL_FIEDLER) else repair,
             timing or MeshTiming(),
             repair_options or RepairOptions(),
         )
@@ -181,6 +183,9 @@ class Network:
         if self._repair == ORACLE:
             oracle = functools.partial(Oracle, self._places_of_connected)
             configuration = replace(configuration, repair=oracle)
+        elif self._repair == IDEAL_FIEDLER:
+            everybody = functools.partial(Fiedler, self._places_of_powered)
+            configuration = replace(configuration, repair=everybody)
         return configuration
 
     def _engine(self, node: InProcessNode, node_id: int) -> IDroneEngine:
@@ -352,10 +357,13 @@ class Network:
             path.append(step)
         return path
 
-    def _places_of_connected(self) -> dict[int, Location]:
+    def _places_of_powered(self) -> dict[int, Location]:
         nodes = self.nodes.items()
-        powered = [node_id for node_id, node in nodes if node.antenna.powered]
-        return {node_id: self.location(node_id) for node_id in filter(self.connected, powered)}
+        return {node_id: self.location(node_id) for node_id, node in nodes if node.antenna.powered}
+
+    def _places_of_connected(self) -> dict[int, Location]:
+        places = self._places_of_powered().items()
+        return {node_id: place for node_id, place in places if self.connected(node_id)}
 
     def _receive(self, node_id: int, message: ReceivedMessage) -> None:
         self.received.setdefault(node_id, []).append(message)

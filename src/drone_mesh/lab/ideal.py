@@ -6,14 +6,17 @@ our runs comparable with published tables; detection, decisions and routes take 
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import math
 from typing import Any, Callable, NamedTuple
 
 import numpy as np
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse.csgraph import connected_components, minimum_spanning_tree
 
 from drone_mesh.air.graph import Graph, within
+from drone_mesh.communication.repair.algebraic_connectivity import steepness
+from drone_mesh.communication.repair.virtual_spring import REST
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.lab.ideal_plans import IDEAL_PLANS, ROUNDING_M
@@ -37,6 +40,7 @@ class Swarm(NamedTuple):
     near: np.ndarray  # (n, n), which drones are in range of each other
     middle: np.ndarray  # (2,), m, of the area
     step_m: float  # flown in one step
+    range_m: float
 
 
 Rule = Callable[[Swarm], np.ndarray]
@@ -50,9 +54,7 @@ def centering(swarm: Swarm) -> np.ndarray:
 
 def home(swarm: Swarm) -> np.ndarray:
     """Drones without a path to the gateway fly to it; a part stops once it has one."""
-    moves = _towards(swarm, swarm.places[swarm.home])
-    moves[swarm.parts == swarm.parts[swarm.home]] = 0.0
-    return moves
+    return _of_those_that_act(swarm, _towards(swarm, swarm.places[swarm.home]), all_act=False)
 
 
 def oracle(swarm: Swarm) -> np.ndarray:
@@ -105,6 +107,36 @@ def sidr_as_coded(swarm: Swarm) -> np.ndarray:
     return _blocks(swarm, lambda mean: swarm.middle - mean.mean())
 
 
+def virtual_spring(swarm: Swarm, all_act: bool = False) -> np.ndarray:
+    """As the strategy of this name, without its legs; `all_act`: as published, all but the gateway.
+
+    The drones that are cut off and their neighbours push under REST and pull over it.
+    """
+    gaps = swarm.places[None] - swarm.places[:, None]
+    lengths = np.linalg.norm(gaps, axis=2)
+    stretch = np.where(swarm.near & (lengths > 0), 1 - REST * swarm.range_m / (lengths + 1e-300), 0)
+    counts = np.maximum(swarm.near.sum(axis=1, keepdims=True), 1)
+    springs = (gaps * stretch[:, :, None]).sum(axis=1) / counts
+    goals = swarm.places[swarm.home] + springs
+    return _of_those_that_act(swarm, _towards(swarm, goals), all_act)
+
+
+def fiedler(swarm: Swarm, all_act: bool = False) -> np.ndarray:
+    """Along the gradient of the second eigenvalue of all, the one with the steepest at full speed.
+
+    As the strategy of this name; `all_act`: as published, all but the gateway.
+    """
+    gaps = swarm.places[None] - swarm.places[:, None]
+    lengths = np.linalg.norm(gaps, axis=2)
+    reach_m = max(swarm.range_m, float(minimum_spanning_tree(lengths).max()))
+    links = np.exp(-steepness(reach_m) * lengths**2)
+    vector = np.linalg.eigh(np.diag(links.sum(axis=1)) - links)[1][:, 1]
+    pulls = links * (vector[None] - vector[:, None]) ** 2
+    uphill = _of_those_that_act(swarm, (gaps * pulls[:, :, None]).sum(axis=1), all_act)
+    steepest = float(np.linalg.norm(uphill, axis=1).max())
+    return uphill * (swarm.step_m / steepest) if steepest else uphill
+
+
 IDEAL_RULES: dict[str, Rule] = {
     "centering": centering,
     "home": home,
@@ -112,7 +144,19 @@ IDEAL_RULES: dict[str, Rule] = {
     "hero": hero,
     "sidr": sidr,
     "sidr_as_coded": sidr_as_coded,
+    "virtual_spring": virtual_spring,
+    "virtual_spring_of_all": functools.partial(virtual_spring, all_act=True),
+    "fiedler": fiedler,
+    "fiedler_of_all": functools.partial(fiedler, all_act=True),
 }
+
+
+def _of_those_that_act(swarm: Swarm, moves: np.ndarray, all_act: bool) -> np.ndarray:
+    """These moves of the drones that are cut off, or of all but the gateway."""
+    parts = swarm.parts
+    stays = np.arange(len(parts)) == swarm.home if all_act else parts == parts[swarm.home]
+    moves[stays] = 0.0
+    return moves
 
 
 def _towards(swarm: Swarm, goal: np.ndarray, stop_m: float = ARRIVED_M) -> np.ndarray:
@@ -210,7 +254,7 @@ def _stepped(draw: Draw) -> Flown:
     steps, most = 0, round(scenario.duration_s / STEP_S) - 1
     pairs: set[tuple[int, int]] = set()
     while parts.max() > 0 and steps < most:
-        swarm = Swarm(places, before, parts, draw.home, lost_near, near, middle, step_m)
+        swarm = Swarm(places, before, parts, draw.home, lost_near, near, middle, step_m, range_m)
         moves = IDEAL_RULES[scenario.repair](swarm)
         before, places = places, places + moves
         flown += np.linalg.norm(moves, axis=1)

@@ -66,7 +66,7 @@ def swarm(places: list[tuple[float, float]], **changes: Any) -> Swarm:
     known: dict[str, Any] = {
         "places": array, "before": array.copy(), "parts": np.zeros(len(array), int), "home": 0,
         "near_lost": np.full_like(array, math.nan), "near": near,
-        "middle": np.array([0.0, 0.0]), "step_m": 0.5,
+        "middle": np.array([0.0, 0.0]), "step_m": 0.5, "range_m": 9.0,
     }  # fmt: skip
     return Swarm(**{**known, **changes})
 
@@ -102,7 +102,20 @@ def test_sidr_as_coded_flies_along_a_diagonal_and_as_described_to_the_middle() -
     assert coded[0, 0] == coded[0, 1] == pytest.approx(0.5 / math.sqrt(2))
 
 
-@pytest.mark.parametrize("rule", ["centering", "home", "oracle"])
+def test_springs_and_the_fiedler_gradient_move_those_that_are_cut_off_or_as_published_all() -> None:
+    split = swarm([(0, 0), (4, 0), (20, 0), (23, 0)], parts=np.array([0, 0, 1, 1]))
+    for rule in ("virtual_spring", "fiedler"):
+        moves = IDEAL_RULES[rule](split)
+        assert (moves[:2] == 0).all()
+        assert (moves[2:, 0] < 0).all()
+        assert np.linalg.norm(moves, axis=1).max() == pytest.approx(0.5)
+    assert IDEAL_RULES["virtual_spring_of_all"](split)[1, 0] < 0  # to the gateway, as all are
+    assert IDEAL_RULES["fiedler_of_all"](split)[1, 0] > 0  # to the others
+    for rule in ("virtual_spring_of_all", "fiedler_of_all"):
+        assert (IDEAL_RULES[rule](split)[0] == 0).all()
+
+
+@pytest.mark.parametrize("rule", ["centering", "home", "oracle", "virtual_spring", "fiedler"])
 def test_rules_that_know_everything_heal_what_was_split(rule: str) -> None:
     content = {
         "model": "ideal", "layout": {"drones": 60, "width_m": 41}, "repair": rule,

@@ -186,7 +186,10 @@ def test_emulated_nodes_need_no_id():
             "--id 3 --routing gossip",
             "technique 'gossip': use one of babel, batman, beacon, child_table_tree",
         ),
-        ("--id 3 --repair hope", "unknown repair strategy 'hope': use one of field, follow, home"),
+        (
+            "--id 3 --repair hope",
+            "unknown repair strategy 'hope': use one of fiedler, field, follow, home",
+        ),
         ("--id 3 --clearance 0", "invalid clearance 0.0: expected metres, above 0, at most 100"),
         ("--id 3 --range nan", "invalid range nan: expected metres, above 0, at most 10000"),
         ("--id 3 --latitude 5", "--latitude and --longitude: give both, or neither"),

@@ -9,17 +9,18 @@ from drone_mesh.by_name import create_by_name
 from drone_mesh.communication.control.router_states import RepairState
 from drone_mesh.communication.repair.c3r import C3R
 from drone_mesh.communication.repair.election import MAX_SCORE_M, NO_BID
+from drone_mesh.communication.repair.fiedler import Fiedler
 from drone_mesh.communication.repair.group_repair import GroupRepair
 from drone_mesh.communication.repair.interfaces import IRepairStrategy, Step
+from drone_mesh.communication.repair.legs import LEG, LegByLeg
 from drone_mesh.communication.repair.named_backup import NamedBackup
 from drone_mesh.communication.repair.nearest import Nearest
 from drone_mesh.communication.repair.options import DEFAULT_REPAIR
 from drone_mesh.communication.repair.spots import WITHIN_REACH
+from drone_mesh.communication.repair.virtual_spring import VirtualSpring
 from drone_mesh.drone.location import Location
 
 TO_NEIGHBOURS = 0.1  # weight of the neighbours against the gateway, as in MDSG-APF
-LEG = 0.5  # of the range: distance between two requests for places
-PAUSE_S = 2.0  # time to hear a gateway between two legs
 MOVES = 2  # towards one lost next hop
 WAITS = 6  # checks; the drones beside the dead node have moved twice by then
 
@@ -107,7 +108,7 @@ class Inward(Home):
         self.mesh.fly(step)
 
 
-class Field(IRepairStrategy):
+class Field(LegByLeg):
     """Each drone moves a little towards its neighbours, and a lot towards the gateway.
 
     Leg by leg, until a gateway answers or the gateway's place is reached. After MDSG-APF (Mou et
@@ -116,45 +117,23 @@ class Field(IRepairStrategy):
     """
 
     _nearest_m = math.inf  # to the gateway's place, since the connection was lost
-    _asked_s = -math.inf  # for the places of the neighbours
 
     def on_gateway_found(self) -> None:
         """Forget the distance reached: the next loss starts over."""
         self._nearest_m = math.inf
 
-    def on_emergency(self) -> None:
-        """Request the places of the neighbours, then move."""
-        if self.mesh.now_s > self._asked_s + PAUSE_S:  # checks may follow each other faster
-            self._ask()
-
-    def on_landed(self) -> None:
-        """Request places again, then move on."""
-        self._ask()
-
-    def _ask(self) -> None:
-        self._asked_s = self.mesh.now_s
-        self.mesh.ask_places()
-        self.mesh.wait_until(self._asked_s + PAUSE_S)
-
-    def on_time(self) -> None:
-        """Fly one leg."""
-        mesh, here, gateway = self.mesh, self.mesh.own_place(), self.mesh.gateway_place
-        self.reason = mesh.why_not_fly()
-        if gateway is None or here is None:
-            self.reason = self.reason or "does not know where it is, or where the gateway is"
-        if mesh.connected or self.reason or gateway is None or here is None:
-            return
+    def _goal(self, here: Location, gateway: Location) -> Location | None:
+        mesh = self.mesh
         views = mesh.neighbours().values()
         places = [view.place for view in views if view.place is not None] or [here]
         middle = Location(*(sum(axis) / len(places) for axis in zip(*places)))
         goal = gateway.towards(middle, TO_NEIGHBOURS * gateway.distance_m(middle))
-        leg_m = min(LEG * mesh.range_m, here.distance_m(goal))
         away_m = here.distance_m(gateway)
         if away_m > self._nearest_m - mesh.clearance_m:
             self.reason = "came no nearer to the gateway"
-        else:
-            self._nearest_m = away_m
-            mesh.fly(Step(here.towards(goal, leg_m)), until_connected=True)
+            return None
+        self._nearest_m = away_m
+        return here.towards(goal, min(LEG * mesh.range_m, here.distance_m(goal)))
 
 
 class Follow(Nearest):
@@ -207,6 +186,7 @@ class Thesis(GroupRepair):
 REPAIR_STRATEGIES: dict[str, Callable[[], IRepairStrategy]] = {
     DEFAULT_REPAIR: Thesis,
     "c3r": C3R,
+    "fiedler": Fiedler,
     "field": Field,
     "follow": Follow,
     "home": Home,
@@ -214,6 +194,7 @@ REPAIR_STRATEGIES: dict[str, Callable[[], IRepairStrategy]] = {
     "named_backup": NamedBackup,
     "nearest": Nearest,
     "stay": Stay,
+    "virtual_spring": VirtualSpring,
 }
 
 
