@@ -33,7 +33,8 @@ REPORTED = (
     "sweep.repair=[thesis,nearest,home]", "sweep.faults.kill=[{share: 0.3}]",
 )  # fmt: skip
 STRATEGIES = (
-    "thesis", "nearest", "named_backup", "c3r", "follow", "inward", "field", "home", "oracle",
+    "thesis", "nearest", "named_backup", "c3r", "follow", "inward", "field", "virtual_spring",
+    "fiedler", "home", "oracle",
 )  # fmt: skip
 TECHNIQUES = (
     "child_table_tree", "steady_tree", "etx_tree", "babel", "batman", "dsdv", "flooding",

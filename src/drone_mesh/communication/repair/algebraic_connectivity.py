@@ -96,10 +96,10 @@ def _cholesky(rows: list[list[float]]) -> list[list[float]]:
 
 def _solved(lower: list[list[float]], right: list[float]) -> list[float]:
     """x, where lower times its transpose times x is `right`."""
-    size, half = len(right), []
+    half: list[float] = []
     for row, value in zip(lower, right):
         half.append((value - sum(a * b for a, b in zip(row, half))) / row[len(half)])
-    for at in reversed(range(size)):
+    for at in reversed(range(len(half))):
         half[at] = half[at] / lower[at][at]
         for before in range(at):
             half[before] -= lower[at][before] * half[at]
