@@ -188,7 +188,7 @@ def test_emulated_nodes_need_no_id():
         ),
         (
             "--id 3 --repair hope",
-            "unknown repair strategy 'hope': use one of fiedler, field, follow, home",
+            "unknown repair strategy 'hope': use one of c3r, fiedler, field, follow",
         ),
         ("--id 3 --clearance 0", "invalid clearance 0.0: expected metres, above 0, at most 100"),
         ("--id 3 --range nan", "invalid range nan: expected metres, above 0, at most 10000"),
