@@ -70,7 +70,8 @@ class Airspace:
         places = self._places[others]
         starts_m, ends_m = (_away_m(places, point) for point in (path.start, path.goal))
         allowed_m = np.minimum(self._apart_m, np.minimum(starts_m, ends_m)) - _TOUCH_M
-        near_m = nearest_m(ways_of(path), np.stack([places, places], axis=1))
+        ways = ways_of(path)[:, None]
+        near_m = _point_m(places, ways[..., 0, :], ways[..., 1, :]).min(axis=0)
         found = others[(near_m < allowed_m) | (ends_m < self._clearance_m)]
         return [int(other) for other in found]
 

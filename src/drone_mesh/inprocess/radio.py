@@ -27,7 +27,8 @@ def _ignore(_payload: bytes) -> None:
 
 
 def _as_rows(places: Iterable[Location]) -> np.ndarray:
-    return np.array(list(places)).reshape(-1, 3)
+    rows: np.ndarray = np.array(list(places)).reshape(-1, 3)
+    return rows
 
 
 class InProcessAir(IInProcessAir):

@@ -61,6 +61,7 @@ class BulletWorld(PhysicalWorld):
         super().__init__()
         self.client = connect()
         self._shapes: dict[Vector, int] = {}  # by size
+        self._moved: set[int] = set()  # bodies that physics moves; without any it has nothing to do
         pybullet.setTimeStep(self.tick_s, physicsClientId=self.client)
         pybullet.setGravity(0.0, 0.0, -GRAVITY_M_S2, physicsClientId=self.client)
         plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=self.client)
@@ -68,7 +69,8 @@ class BulletWorld(PhysicalWorld):
 
     def step(self) -> float:
         now_s = super().step()
-        pybullet.stepSimulation(physicsClientId=self.client)
+        if self._moved:
+            pybullet.stepSimulation(physicsClientId=self.client)
         return now_s
 
     def add_box(self, size: Vector, centre: Vector) -> int:
@@ -81,10 +83,12 @@ class BulletWorld(PhysicalWorld):
         pybullet.resetBasePositionAndOrientation(box, centre, UPRIGHT, physicsClientId=self.client)
 
     def remove_box(self, box: int) -> None:
+        self._moved.discard(box)
         pybullet.removeBody(box, physicsClientId=self.client)
 
     def add_body(self, size: Vector, centre: Vector, mass_kg: float) -> int:
         body = _add(self.client, mass_kg, self._shape(size), centre)
+        self._moved.add(body)
         pybullet.changeDynamics(
             body,
             -1,

@@ -98,3 +98,21 @@ def test_two_worlds_are_independent_of_each_other(world):
 def test_closing_twice_changes_nothing(world):
     world.close()
     world.close()
+
+
+def test_physics_computes_only_while_there_is_a_body_that_it_moves(world, monkeypatch):
+    computed, step = [], pybullet.stepSimulation
+    monkeypatch.setattr(
+        pybullet, "stepSimulation", lambda **how: (computed.append(world.now_s), step(**how))
+    )
+    box = world.add_box((0.2, 0.2, 0.1), (0.0, 0.0, 0.05))
+    world.step()
+    body = world.add_body((0.2, 0.2, 0.1), (5.0, 0.0, 5.0), 1.0)
+    world.step()
+    world.step()
+    world.move_box(box, (0.0, 0.0, 1.0))
+    assert place_of(world, box) == (0.0, 0.0, 1.0)
+    assert place_of(world, body)[2] < 5.0
+    world.remove_box(body)
+    world.step()
+    assert computed == [0.02, 0.03]
