@@ -156,13 +156,15 @@ class NodesBelow:
 
     def to_show(self, most: int) -> tuple[int, ...]:
         """The next part of the neighbours with whom the link will last, at most so many."""
-        routes = self._routes
-        lasting = [n for n, one in routes.neighbours.items() if one.usable and not routes.risk(one)]
-        lasting.sort(key=lambda node: (node - self._shown_last - 1) % 256)
-        if most < 1 or not lasting:
-            return ()
-        self._shown_last = lasting[:most][-1]
-        return tuple(lasting[:most])
+        neighbours, risk, after = self._routes.neighbours, self._routes.risk, self._shown_last + 1
+        shown: list[int] = []
+        for node in sorted(neighbours, key=lambda node: (node - after) % 256):
+            if len(shown) >= most:
+                break
+            if neighbours[node].usable and not risk(neighbours[node]):
+                shown.append(node)
+                self._shown_last = node
+        return tuple(shown)
 
 
 GATEWAY_PLACE_EVERY = 4  # beacons: one of so many carries the gateway's place

@@ -263,17 +263,21 @@ class BeaconRoutes(IRoutes):
             return False
         before = self.gateway, self.parent, self.hops, self.offline
         best: Rank | None = None
+        most, equal = math.inf, math.nan  # hops of another one that may be better
         present = self.neighbours.get(self.parent)
         if present is not None and self._leads_up(present):
             best = self._rank(present)
+            most = equal = best[0]
         for neighbour in self.neighbours.values():
-            if neighbour is present or (best and (neighbour.beacon.hops, True) >= best):
+            hops = neighbour.beacon.hops
+            if hops > most or hops == equal or neighbour is present:
                 continue  # most are not better, whatever the risk of their links
             if (best is None or (self._hops_through(neighbour), True) < best) and (
                 self._leads_up(neighbour)
             ):
                 rank = self._rank(neighbour)
-                best = rank if best is None else min(best, rank)
+                if best is None or rank < best:
+                    best, most, equal = rank, rank[0], math.nan
         if self._is_gateway and (best is None or best[0] >= OFFLINE):
             self._be_root()
         elif best is None:
