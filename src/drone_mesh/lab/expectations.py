@@ -52,6 +52,12 @@ class Expectation(NamedTuple):
     def cells(self, cells: Sequence[Values]) -> list[tuple[int, int | None]]:
         """The cells to judge, each with the one to compare with. Raises ConfigurationError."""
         chosen = matching(cells, self.cell)
+        last = self.text.rpartition(" ")[2]
+        for axis in _named(cells, self.cell):
+            if not self.other and any(cell[axis] == last for cell in cells):
+                raise ConfigurationError(
+                    f"{self.text}: write {axis}={last} for a cell, {float(last):.3f} for a number"
+                )
         pairs: list[tuple[int, int | None]] = [(index, None) for index in chosen]
         if self.other:
             other = _named(cells, self.other)

@@ -96,6 +96,7 @@ def test_cells_are_named_by_axis_and_value_or_by_a_value_that_one_axis_has_alone
         ("healed > stay", "expected METRIC >= NUMBER"),  # of which cells?
         ("heeled >= 1", "unknown metric heeled; did you mean healed"),
         ("t_total_s <= 60", "t_total_s leaves out runs that did not heal: use healed, or t_capped"),
+        ("healed of 0.3 > 0", "write radio.loss=0 for a cell, 0.000 for a number"),
         ("healed of home > stay", "cell home: expected axis=value with one of radio.loss, repair"),
     ],
 )
@@ -115,7 +116,7 @@ def test_a_statement_that_cannot_be_judged_is_refused_with_its_line(
     ("expected", "status", "words"),
     [
         ("packets of 0 >= 1", 0, "met          packets of 0 >= 1 [radio.loss=0 repair=thesis]"),
-        ("packets of radio.loss=0.3 > 0", 0, "2 met, 0 not met, 0 not decided"),
+        ("packets of radio.loss=0.3 > 5", 0, "2 met, 0 not met, 0 not decided"),
         ("packets of 0.3 > radio.loss=0", 0, "8 seeds"),
         ("packets of stay > thesis", 1, "not met      packets of stay > thesis"),
         ("healed of stay,0 >= 0.99", 1, "seeds would decide it ("),
