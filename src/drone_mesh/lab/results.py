@@ -80,8 +80,8 @@ class Results(NamedTuple):
 
     def control(self, baseline: int, metric: str) -> tuple[list[float], list[float]]:
         """A metric of a baseline, and of as many runs of it on other seeds: an A/A comparison."""
-        rows = self.of_cell(baseline), self._counted(self.controls.get(baseline, {}))
-        return paired(*(by_repetition.values() for by_repetition in rows), metric)
+        others = self._counted(self.controls.get(baseline, {}))
+        return paired(self.of_cell(baseline).values(), others.values(), metric)
 
     def _counted(self, rows: Mapping[int, Row]) -> dict[int, Row]:
         draws = self.loaded.experiment.draws

@@ -187,7 +187,7 @@ def hints() -> Iterator[tuple[Path, str]]:
 
 
 def test_every_hint_names_a_command_and_options_that_exist() -> None:
-    commands = _parser()._subparsers._group_actions[0].choices  # type: ignore[union-attr]
+    (commands,) = (one.choices for one in _parser()._actions if isinstance(one.choices, dict))
     options = {name for one in commands.values() for name in one._option_string_actions}
     found = 0
     for path, text in hints():
