@@ -6,6 +6,7 @@ docs/protocol.md, "Connection"; docs/repair.md, "Places to step back to".
 from __future__ import annotations
 
 import math
+import random
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -57,6 +58,7 @@ class GatewayConnection:
     _places: KnownPlaces
     _report: Reporter
     _has_key: bool
+    _rng: random.Random
 
     def __post_init__(self) -> None:
         self.gateway = NO_ROUTE  # the preferred one
@@ -321,14 +323,17 @@ class GatewayConnection:
     def _ask_for_places(self, fresh_s: float = 0.0, gateway_asked: bool = False) -> None:
         """Ask the next hop where it is, and the gateway if that is unknown or may have moved.
 
-        `fresh_s`: a place that was reported within that time is known well enough;
+        `fresh_s`: a place that was reported within that time is known well enough, and that of a
+        gateway farther away within 2 to 4 times as long: routers that connect together would
+        otherwise ask together, all through the relays around it.
         `gateway_asked`: the gateway was asked a moment ago.
         """
         next_hop, places, now_s = self.next_hop(), self._places, self._deadlines.now_s
         enough_s = fresh_s
         if next_hop != self.gateway:  # relays report its place, too
             period_s = self._check_period_s
-            enough_s = max((MAX_AGE_PERIODS - 1) * period_s, 2.0 * fresh_s)
+            spread = 1.0 + self._rng.random() if fresh_s else 1.0
+            enough_s = max((MAX_AGE_PERIODS - 1) * period_s, 2.0 * spread * fresh_s)
         unsure = places.gateway is None or now_s - places.gateway_seen_s >= enough_s
         unsure = unsure or places.gateway_disputed
         if (unsure and not gateway_asked) or self._moved:  # the request tells where this node is

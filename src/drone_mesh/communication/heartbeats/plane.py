@@ -105,6 +105,7 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
             node.places,
             node.report,
             node.seals.has_key,
+            node.rng,
         )
 
     @property

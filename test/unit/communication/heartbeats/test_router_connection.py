@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from rig import FROM_0, Rig, packet
+from rig import FROM_0, AlwaysHalf, Rig, packet
 
 from drone_mesh.communication.routing.techniques.etx_tree import EtxTree
 from drone_mesh.communication.timing import Medium, MeshTiming
@@ -611,6 +611,23 @@ def test_a_router_asks_for_a_place_that_it_knows_only_from_time_to_time(place_pe
             rig.hear("02 02 01 01 01 00 00 80 3f")
         rig.hear("00 02 04 01 01 01 00 01")  # the gateway answers
     assert asked == asked_s
+
+
+@pytest.mark.parametrize(("drawn", "asked_s"), [(0.0, 55), (0.5, 75), (0.9, 95)])
+def test_routers_that_connected_together_do_not_ask_a_far_gateway_together(
+    drawn, asked_s, monkeypatch
+):
+    rig = shared_rig(place_periods=2.5)
+    rig.connect_through(2)
+    rig.hear("00 02 01 01 01 00 00 80 3f")
+    rig.sent()
+    monkeypatch.setattr(AlwaysHalf, "random", lambda _self: drawn)
+    for check_s in range(5, 105, 10):
+        rig.wait_until(check_s)
+        if any(request[4] == 0 for request in rig.sent(REQUEST)):
+            break
+        rig.hear("00 02 04 01 01 01 00 01")  # the gateway answers
+    assert check_s == asked_s
 
 
 def test_another_next_hop_is_asked_for_its_place_at_the_next_check():
