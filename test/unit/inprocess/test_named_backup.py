@@ -58,6 +58,14 @@ def test_no_backup_flies_when_the_gateway_is_off_for_a_moment(places):
     assert network.all_connected()
 
 
+def test_a_node_whose_beacons_show_that_it_flies_away_is_not_dead():
+    network = named(GROUP)
+    network.order(1, 8.0, -40.0)
+    network.run_for(9.0)  # without a backup nobody waits any shorter
+    assert not network.connected(2)
+    assert flown(network) == set()
+
+
 @pytest.mark.parametrize(("places", "leaves"), [(GROUP, {5, 6}), (LEAF, {2})])
 def test_in_a_short_failure_of_the_medium_only_leaves_fly_and_they_come_back(places, leaves):
     network = named(places)

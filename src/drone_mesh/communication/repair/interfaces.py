@@ -115,7 +115,14 @@ class RepairActions(abc.ABC):
 
     def neighbours(self) -> Mapping[int, NeighbourView]:
         """The nodes in direct reach."""
-        return {node: self._view(node) for node in self._control.routes.get_set_of_children()}
+        return {node: self.view(node) for node in self._control.routes.get_set_of_children()}
+
+    def view(self, node: int) -> NeighbourView:
+        """What is known about a node, a neighbour or not."""
+        heard, hops = self._neighbours.place_of(node), self._neighbours.hops_of(node)
+        if heard is None:
+            return NeighbourView(None, math.inf, hops)
+        return NeighbourView(heard.place, self.now_s - heard.heard_s, hops)
 
     def heard_by(self, node: int) -> frozenset[int]:
         """The nodes that a neighbour has shown to hear; empty if the technique has no such news."""
@@ -139,7 +146,7 @@ class RepairActions(abc.ABC):
     def reachable(self) -> Mapping[int, NeighbourView]:
         """All nodes with a route to them and a reported place."""
         places = self._neighbours.places()
-        return {node: self._view(node) for node in places if self.reaches(node)}
+        return {node: self.view(node) for node in places if self.reaches(node)}
 
     def reaches(self, node: int) -> bool:
         """Whether there is a route to `node`."""
@@ -271,12 +278,6 @@ class RepairActions(abc.ABC):
     def report(self, kind: MeshEventKind, peer: int = NO_ROUTE, detail: str = "") -> None:
         """Report an event to the node's observer."""
         self._report(kind, peer, detail)
-
-    def _view(self, node: int) -> NeighbourView:
-        heard, hops = self._neighbours.place_of(node), self._neighbours.hops_of(node)
-        if heard is None:
-            return NeighbourView(None, math.inf, hops)
-        return NeighbourView(heard.place, self.now_s - heard.heard_s, hops)
 
 
 SILENCE_PATIENCE = 5.0  # the factor on a node's patience if its medium may be down

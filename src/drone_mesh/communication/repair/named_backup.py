@@ -6,7 +6,7 @@ docs/strategies.md, "A backup that is named beforehand".
 from __future__ import annotations
 
 import math
-from typing import Mapping, NamedTuple
+from typing import Mapping
 
 from drone_mesh.communication.control.router_states import RepairState
 from drone_mesh.communication.interfaces import NO_ROUTE
@@ -20,17 +20,6 @@ NAMED_FOR = 2.5  # check periods: a name that is not repeated ends
 ANSWERS_S = 0.5  # others answer within milliseconds, and pass on a way that is left
 ALONE_S = 10.0  # where the usual wait is longer, a failure of the medium would send it in vain
 LATER = 2.0  # patience after a look in vain: the next one comes no earlier than without a backup
-
-
-class Rank(NamedTuple):
-    """Why one neighbour rather than another is the backup: the lowest rank is."""
-
-    is_cut_vertex: bool  # as far as two hops show
-    is_lone: bool  # nobody can tell it whether the medium is down
-    is_another: bool  # than the present backup
-    degree: int
-    distance_m: float
-    node: int
 
 
 def backup_for(mesh: RepairActions, present: int) -> int:
@@ -58,8 +47,10 @@ def backup_for(mesh: RepairActions, present: int) -> int:
             behind = heard[node] - views.keys()
             behind.difference_update(*(heard[n] for n in views if n != node))
             degree, away_m = len(heard[node]) - 1, here.distance_m(place)
-            ranks.append(Rank(bool(behind), not degree, node != present, degree, away_m, node))
-    return min(ranks).node if ranks else NO_ROUTE
+            # A lone one could not tell the death of this node from a failure of the medium.
+            rank = bool(behind), not degree, node != present, degree, away_m, node
+            ranks.append(rank)
+    return min(ranks)[-1] if ranks else NO_ROUTE
 
 
 def _parts(heard: Mapping[int, set[int]]) -> list[set[int]]:
@@ -117,7 +108,7 @@ class NamedBackup(Nearest):
         """If it is the backup of the node that has fallen silent, ask who else is there."""
         mesh = self.mesh
         silent = [n for n in self._named if n not in mesh.neighbours()]
-        steps = [self._step_to(node) for node in (mesh.lost_next_hop, *silent)]
+        steps = [self._step_to(n) for n in (mesh.lost_next_hop, *silent) if self._stood(n)]
         is_usual = mesh.in_motion or mesh.silent or mesh.why_not_fly()
         self._step = None if is_usual else next(filter(None, steps), None)
         if self._step is None:
@@ -170,9 +161,7 @@ class NamedBackup(Nearest):
             super().on_time()
             return
         self._step = None
-        if mesh.connected or step.owner in self._answered:
-            return
-        if self._answered:  # the medium works
+        if self._answered and step.owner not in self._answered and not mesh.connected:
             self._take(step)
 
     def on_bid(self, node: int, score: float, from_: int, about: Location | None) -> None:
@@ -183,12 +172,19 @@ class NamedBackup(Nearest):
                 self._named[node] = about, mesh.now_s
             return
         super().on_bid(node, score, from_, about)
-        may_follow = score in (TOOK_OFF, TOOK_OFF_HOME) and node == from_ and about is not None
+        leaves = score in (TOOK_OFF, TOOK_OFF_HOME) and node == from_
         is_free = not mesh.connected and mesh.state in (RepairState.LOST, RepairState.AT_REST)
-        if may_follow and is_free and about is not None and not self._in_reach_of(about, node):
+        if leaves and is_free and about is not None and not self._in_reach_of(about, node):
             step = self._step_to(node)
             if step is not None:
                 self._take(step)
+
+    def _stood(self, node: int) -> bool:
+        """Whether a node that named this one was there until the end: else it has flown away."""
+        place, seen = self._named.get(node, (None,))[0], self.mesh.view(node).place
+        return place is not None and (
+            seen is None or seen.distance_m(place) < self.mesh.clearance_m
+        )
 
     def _step_to(self, node: int) -> Step | None:
         """To the place of a node that has named this one lately, and is or was in reach."""
