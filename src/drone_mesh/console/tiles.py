@@ -171,7 +171,8 @@ def _open_mbtiles(path: Path) -> Tiles:
         ((high,),) = find("SELECT max(zoom_level) FROM tiles")
         some = find(f"SELECT tile_data FROM tiles WHERE {_IS_TILE} LIMIT 1")
     except sqlite3.Error as error:
-        raise ConfigurationError(f"not an MBTiles file: {error}") from error
+        reason = str(error) or "damaged"  # Python 3.8 has no words for what it cannot decode
+        raise ConfigurationError(f"not an MBTiles file: {reason}") from error
     if not some:
         raise ConfigurationError("has no tiles")
     if _picture_type(some[0][0]) is None:

@@ -112,8 +112,8 @@ def test_far_drones_set_out_before_relays():
 
 
 def test_a_far_drone_does_not_wait_for_a_relay_that_cannot_go():
-    places = {n: at(0.9 * n - 7, 2.0) for n in range(5, 16)} | {9: at(-8, 2)}
-    state = mesh(places | {n: at(-16, n) for n in range(1, 5)})
+    places = {**{n: at(0.9 * n - 7, 2.0) for n in range(5, 16)}, 9: at(-8, 2)}
+    state = mesh({**places, **{n: at(-16, n) for n in range(1, 5)}})
     (flying,) = [node for node in state.nodes if node.id == 7]
     flying.path = (*flying.position, -8.0, 8.0, 0.0)
     assert list(choose(state, {8: at(40, 40), 9: at(6, 0)}).set_out) == [8]
@@ -141,7 +141,7 @@ def test_drones_of_the_latest_formation_set_out_first_and_others_leave_them_room
 
 
 def test_who_stands_in_the_way_of_the_latest_formation_sets_out_before_the_others():
-    places = {n: at(0.9 * n - 5, 2.0) for n in range(1, 11)} | {1: at(6, 6)}
+    places = {**{n: at(0.9 * n - 5, 2.0) for n in range(1, 11)}, 1: at(6, 6)}
     goals = {1: at(8, 0), 2: at(-6, 6), 3: at(6, 6)}
     state = mesh(places)
     state.nodes[9].path = (*places[9].to_vector(), 8.0, -8.0, 0.0)
@@ -149,7 +149,7 @@ def test_who_stands_in_the_way_of_the_latest_formation_sets_out_before_the_other
 
 
 def test_a_far_drone_does_not_wait_for_one_whose_place_a_waiting_relay_holds():
-    places = {n: at(0.9 * n - 9, -2.0) for n in range(1, 17)} | {17: at(6, 3), 18: at(14, 3)}
+    places = {**{n: at(0.9 * n - 9, -2.0) for n in range(1, 17)}, 17: at(6, 3), 18: at(14, 3)}
     goals = {16: at(6, 3), 17: at(30, 30), 18: at(40, 40), 15: at(-40, 0)}
     flying = mesh(places)
     flying.nodes[14].path = (*places[14].to_vector(), 3.0, -8.0, 0.0)

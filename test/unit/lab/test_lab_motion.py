@@ -217,7 +217,8 @@ def test_many_drones_at_once_are_switched_off_and_on_again_each_minute() -> None
 def test_lapses_are_the_times_in_which_a_router_has_a_path_and_is_not_served_or_connected() -> None:
     watch = LinkWatch(0.0)
     line = Graph({0: [1], 1: [0, 2], 2: [1]})
-    both, nobody, first = frozenset({1, 2}), frozenset[int](), frozenset({1})
+    nobody: frozenset[int] = frozenset()
+    both, first = frozenset({1, 2}), frozenset({1})
     served = (both, first, first, both, nobody, both)
     connected = (both, both, first, both, nobody, first)
     for now_s, (states, served_now) in enumerate(zip(connected, served)):
