@@ -26,7 +26,7 @@ def requirements(name: str) -> list[str]:
 
 
 EXTRAS = (
-    "console", "http", "lab", "mqtt", "parquet", "physics", "raspberry", "report", "simulation",
+    "console", "http", "lab", "mqtt", "parquet", "physics", "raspberry", "report", "rl", "simulation",
 )  # fmt: skip
 
 setup(

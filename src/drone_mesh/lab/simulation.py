@@ -109,9 +109,15 @@ class Simulation:
 
     def record(self) -> RunRecord:
         """The record, once all samples are taken. The network stops."""
+        record = self.record_so_far()
+        self.network.stop()
+        return record
+
+    def record_so_far(self) -> RunRecord:
+        """The record up to the latest sample, of which there must be one; to be read at once."""
         network, scenario, nodes = self.network, self.scenario, self.network.nodes
         assert self._start is not None  # a run has at least one sample
-        record = RunRecord(
+        return RunRecord(
             scenario=scenario,
             gateways=frozenset(gateways_of(network)),
             start=self._start,
@@ -158,8 +164,6 @@ class Simulation:
                 if "too many hops" in reason
             ),
         )
-        network.stop()
-        return record
 
     def _move(self, flown: dict[int, Track]) -> None:
         if self.scenario.mobility.told:
