@@ -18,7 +18,7 @@ autosummary_generate = True
 autodoc_default_options = {"members": True, "show-inheritance": True, "ignore-module-all": True}
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
-# ROS and hardware are not needed to read the reference.
+# ROS, hardware and the extras that are rarely installed are not needed to read the reference.
 autodoc_mock_imports = [
     "actionlib",
     "diagnostic_msgs",
@@ -27,6 +27,9 @@ autodoc_mock_imports = [
     "genpy",
     "geometry_msgs",
     "gpiod",
+    "gymnasium",
+    "pettingzoo",
+    "pyarrow",
     "rosbag",
     "rosgraph",
     "rosgraph_msgs",

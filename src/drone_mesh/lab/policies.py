@@ -69,7 +69,6 @@ class PlacementPolicy(Policy, IRepairStrategy):
     OBSERVED = 4 + 6 + 7 * SLOTS
     ACTIONS = 0
     STEP_S = 1.0
-    bids_for = NO_ROUTE
 
     def start(self, mesh: RepairActions) -> None:
         super().start(mesh)
