@@ -26,7 +26,8 @@ def requirements(name: str) -> list[str]:
 
 
 EXTRAS = (
-    "console", "http", "lab", "mqtt", "parquet", "physics", "raspberry", "report", "rl", "simulation",
+    "console", "http", "lab", "mqtt", "parquet", "physics", "raspberry", "report", "rl",
+    "simulation",
 )  # fmt: skip
 
 setup(
