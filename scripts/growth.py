@@ -7,7 +7,7 @@ import math
 import statistics
 import time
 from pathlib import Path
-from typing import Sequence
+from typing import Mapping, Sequence
 
 import numpy as np
 from bench import SPACING_M, head, row, say
@@ -21,6 +21,8 @@ LARGE = 50  # exponents are of the meshes from this size on
 SETTLE_S, SLICE_S, SLICES = 20.0, 5.0, 3  # simulated; the table has the median slice
 SPEED_M_S = 0.3
 MOTIONS = ("at rest", f"{SPEED_M_S:g} m/s")
+ARMS = [*itertools.product(MOTIONS, ("disc", "shared"), ("beacon", "child_table_tree"))]
+TICKS_US = (10, 20, 50, 100, 200)
 
 
 def fleet(nodes: int, radio: str, routing: str, moving: bool) -> Network:
@@ -54,32 +56,41 @@ def cost(network: Network) -> float:
 
 
 def growth(sizes: Sequence[int]) -> None:
-    """Measure all radios, techniques and sizes; print the table and draw the picture."""
-    from drone_mesh.lab.figures import COLOURS, MARKERS  # only this needs matplotlib
-    from drone_mesh.lab.run_report.drawing import figure_with, svg_of_its_own
-
+    """Measure all motions, radios, techniques and sizes; print the table and draw the picture."""
     head(
         f"µs of processor time per delivered packet, and k in n^k from {LARGE} nodes on",
         *("radio", "routing", "drones", *(f"{nodes} nodes" for nodes in sizes), "k"),
     )
-    figure, panels = figure_with(4.2, columns=2)
     large = [index for index, nodes in enumerate(sizes) if nodes >= LARGE]
-    for panel, motion in zip(panels, MOTIONS):
-        arms = itertools.product(("disc", "shared"), ("beacon", "child_table_tree"))
-        for (radio, routing), colour, marker in zip(arms, COLOURS, MARKERS):
-            costs = []
-            for nodes in sizes:
-                say(f"growth: {radio}, {routing}, {motion}, {nodes} nodes")
-                costs.append(cost(fleet(nodes, radio, routing, motion != MOTIONS[0])))
-            k, _ = np.polyfit(np.log(np.take(sizes, large)), np.log(np.take(costs, large)), 1)
-            row(radio, f"`{routing}`", motion, *(f"{us:.0f}" for us in costs), f"{k:.2f}")
-            style = "-" if routing == "beacon" else "--"
-            name = f"{routing}, {radio}"
-            panel.plot(sizes, costs, color=colour, marker=marker, linestyle=style, label=name)
+    found = {}
+    for motion, radio, routing in ARMS:
+        costs = []
+        for nodes in sizes:
+            say(f"growth: {radio}, {routing}, {motion}, {nodes} nodes")
+            costs.append(cost(fleet(nodes, radio, routing, motion != MOTIONS[0])))
+        k, _ = np.polyfit(np.log(np.take(sizes, large)), np.log(np.take(costs, large)), 1)
+        row(radio, f"`{routing}`", motion, *(f"{us:.0f}" for us in costs), f"{k:.2f}")
+        found[motion, radio, routing] = costs
+    draw(sizes, found)
+    say(f"growth: {PICTURE}")
+
+
+def draw(sizes: Sequence[int], found: Mapping[tuple[str, str, str], Sequence[float]]) -> None:
+    """A panel for each motion; `found` has the arms in their order."""
+    from drone_mesh.lab.figures import COLOURS, MARKERS  # only this needs matplotlib
+    from drone_mesh.lab.run_report.drawing import figure_with, svg_of_its_own
+
+    figure, panels = figure_with(4.2, columns=2)
+    styles = [*zip(COLOURS, MARKERS, ("-", "--", "-", "--"))] * len(MOTIONS)
+    for ((motion, radio, routing), costs), (colour, marker, line) in zip(found.items(), styles):
+        panel = panels[MOTIONS.index(motion)]
+        name = f"{routing}, {radio}"
+        panel.plot(sizes, costs, color=colour, marker=marker, linestyle=line, label=name)
         panel.set(xscale="log", yscale="log", xlabel="nodes", title=f"drones: {motion}")
         panel.set_xticks(sizes, [str(nodes) for nodes in sizes])
+        panel.set_yticks(TICKS_US, [str(tick) for tick in TICKS_US])
         panel.minorticks_off()
     panels[0].set_ylabel("µs of processor time per delivered packet")
-    panels[0].legend(frameon=False)
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=4, frameon=False)
     PICTURE.write_text(svg_of_its_own(figure), encoding="utf-8")
-    say(f"growth: {PICTURE}")
