@@ -12,6 +12,7 @@ from drone_mesh.communication.control.router_states import RepairState
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.repair.election import BACKUP, TOOK_OFF, TOOK_OFF_HOME
 from drone_mesh.communication.repair.interfaces import RepairActions, Step
+from drone_mesh.communication.repair.lone_repair import SAMPLES
 from drone_mesh.communication.repair.nearest import Nearest
 from drone_mesh.communication.repair.spots import WITHIN_REACH, may_be_flown_to
 from drone_mesh.drone.location import Location
@@ -19,6 +20,7 @@ from drone_mesh.drone.location import Location
 NAMED_FOR = 2.5  # check periods: a name that is not repeated ends
 ANSWERS_S = 0.5  # others answer within milliseconds, and pass on a way that is left
 ALONE_S = 10.0  # where the usual wait is longer, a failure of the medium would send it in vain
+FEW_SAMPLES = 6  # of the power in the channel, before an early look: less than a second
 LATER = 2.0  # patience after a look in vain: the next one comes no earlier than without a backup
 
 
@@ -81,7 +83,6 @@ class NamedBackup(Nearest):
     did not help, the group elects as with `nearest`.
     """
 
-    samples_wanted = 6  # of the power in the channel: less than a second
     _backup = NO_ROUTE  # of this node
     _step: Step | None = None  # to the place of the node that named this one, while it asks
     _was_early = False  # alone, it has looked around before the usual time
@@ -119,11 +120,12 @@ class NamedBackup(Nearest):
             mesh.wait_until(mesh.now_s + mesh.medium.stretched(ANSWERS_S))
         elif mesh.connection_lost_after_s <= ALONE_S:  # as one alone, if its channel is not jammed
             self._dead, self._step, self._was_early = self._step.owner, None, True
+            self.samples_wanted = FEW_SAMPLES
             self.on_emergency_alone()
 
     def on_emergency(self) -> None:
         """The usual course."""
-        self._step, self._was_early = None, False
+        self._step, self._was_early, self.samples_wanted = None, False, SAMPLES
         super().on_emergency()
 
     def on_gateway_found(self) -> None:
