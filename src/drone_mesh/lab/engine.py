@@ -55,8 +55,14 @@ def run_all(specs: Iterable[RunSpec], workers: int, cluster: str | None) -> Iter
         for spec in specs:
             yield execute(spec)
         return
-    with _client(workers, cluster) as client:
-        yield from _run_on(client, deque(specs))
+    try:
+        with _client(workers, cluster) as client:
+            yield from _run_on(client, deque(specs))
+    except ImportError as error:
+        raise EngineError(
+            f"the dask scheduler or a worker says: {error}. Install this version there (pip install "
+            f"'drone_mesh[lab]'), or start it with PYTHONPATH={_SOURCE} if it has that folder"
+        ) from error
 
 
 @contextlib.contextmanager
@@ -106,18 +112,8 @@ def _introduce_package(client: Client) -> None:
 
     dask pickles a built-in function without this package, so that it runs where ours cannot.
     """
-    try:
-        client.run_on_scheduler(exec, _IMPORT)
-        client.register_worker_callbacks(functools.partial(exec, _IMPORT))  # and those to come
-    except ImportError as error:
-        raise _without_package(error) from error
-
-
-def _without_package(error: ImportError) -> EngineError:
-    return EngineError(
-        f"the dask scheduler or a worker says: {error}. Install the same version there (pip "
-        f"install 'drone_mesh[lab]'), or start it with PYTHONPATH={_SOURCE} if it has that folder"
-    )
+    client.run_on_scheduler(exec, _IMPORT)
+    client.register_worker_callbacks(functools.partial(exec, _IMPORT))  # also of those to come
 
 
 def _slurm(workers: int) -> contextlib.AbstractContextManager[object]:
@@ -183,8 +179,6 @@ def _run_on(client: Client, waiting: deque[RunSpec]) -> Iterator[Outcome]:
             lengths_s.extend(outcome.wall_s for outcome in outcomes)
             yield from outcomes
             submit()
-    except ImportError as error:
-        raise _without_package(error) from error
     except (OSError, TimeoutError) as error:
         raise EngineError(f"the dask scheduler is gone: {error}") from error
     except RuntimeError as error:

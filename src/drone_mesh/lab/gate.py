@@ -37,14 +37,10 @@ class Verdict(NamedTuple):
 
 def judge(results: Results) -> list[Verdict]:
     """Judge all expectations. Raises ConfigurationError if there are none."""
-    experiment = results.loaded.experiment
-    if not experiment.expect:
+    expected = results.loaded.experiment.expect
+    if not expected:
         raise ConfigurationError(f"{results.folder}: the experiment has no `expect:`")
-    return [
-        verdict
-        for text in experiment.expect
-        for verdict in _judge(results, Expectation.parse(text))
-    ]
+    return [one for text in expected for one in _judge(results, Expectation.parse(text))]
 
 
 def _judge(results: Results, expectation: Expectation) -> Iterator[Verdict]:
@@ -55,17 +51,16 @@ def _judge(results: Results, expectation: Expectation) -> Iterator[Verdict]:
         yield Verdict(expectation, "", UNDECIDED, "the experiment has no such cells now")
         return
     for index, other in pairs:
-        compared = [index] if other is None else [index, other]
-        wall_s = sum(
-            float(row["wall_s"]) for one in compared for row in results.drawn(one).values()
-        )
-        outcome, reason = UNDECIDED, _unfit(results, compared)
+        both = [index] if other is None else [index, other]
+        wall_s = sum(float(row["wall_s"]) for cell in both for row in results.drawn(cell).values())
+        outcome, reason = UNDECIDED, _unfit(results, both)
         if not reason:
-            interval, n = _interval(results, expectation, compared)
+            interval = _interval(results, expectation.metric, both)
             outcome = outcome_of(interval, expectation)
-            reason = f"{interval}, {n} {'runs' if other is None else 'seeds'}"
+            reason = f"{interval}, {interval.n} {'runs' if other is None else 'seeds'}"
             if outcome == UNDECIDED:
-                reason += f"; {_remedy(results, expectation, compared, interval, wall_s)}"
+                drawn = max(len(results.drawn(cell)) for cell in both)
+                reason += f"; {_remedy(expectation, interval, drawn, wall_s)}"
         yield Verdict(expectation, cells[index].label, outcome, reason, wall_s)
 
 
@@ -75,67 +70,50 @@ def _unfit(results: Results, cells: Sequence[int]) -> str:
     if missing:
         return f"{missing} runs are missing or failed"
     codes = {code.partition(" ")[0] for cell in cells for code in results.codes(cell)}
-    if len(codes) > 1 or any(len(results.codes(cell)) > 1 for cell in cells):
-        return "the runs are of different code"
-    return ""
+    mixed = len(codes) > 1 or any(len(results.codes(cell)) > 1 for cell in cells)
+    return "the runs are of different code" if mixed else ""
 
 
-def _interval(
-    results: Results, expectation: Expectation, cells: Sequence[int]
-) -> tuple[Interval, int]:
-    """Of the metric, or of the difference to the other cell; and the number of values behind it."""
-    metric = expectation.metric
+def _interval(results: Results, metric: str, cells: Sequence[int]) -> Interval:
+    """Of the metric, or of the difference to the other cell."""
     if len(cells) == 1:
-        interval = summary_of(results.of_cell(cells[0]), metric)
-        return interval, interval.n
+        return summary_of(results.of_cell(cells[0]), metric)
     ours, others = paired(*results.pairs(*cells), metric)
-    interval = paired_difference(others, ours).difference
-    if is_share(metric) and interval.low == interval.high:  # resampling finds no other value
-        rare = share_interval(0, interval.n).high
-        low, high = max(-1.0, interval.low - rare), min(1.0, interval.high + rare)
-        interval = interval._replace(low=low, high=high)
-    return interval, interval.n
+    found = paired_difference(others, ours).difference
+    if is_share(metric) and found.low == found.high:  # resampling finds no other value
+        rare = share_interval(0, found.n).high
+        low, high = max(-1.0, found.low - rare), min(1.0, found.high + rare)
+        found = found._replace(low=low, high=high)
+    return found
 
 
 def outcome_of(interval: Interval, expectation: Expectation) -> str:
     """MET if the whole interval is on the wanted side of the bound, NOT_MET if none of it is."""
     low, high, bound = interval.low, interval.high, expectation.bound
-    if math.isnan(low):
-        return UNDECIDED
     if expectation.relation[0] == "<":
         low, high, bound = -high, -low, -bound
-    strictly = "=" not in expectation.relation
-    if low > bound or (low == bound and not strictly):
-        return MET
-    return NOT_MET if high < bound or (high == bound and strictly) else UNDECIDED
+    if "=" in expectation.relation:
+        return MET if low >= bound else NOT_MET if high < bound else UNDECIDED
+    return MET if low > bound else NOT_MET if high <= bound else UNDECIDED
 
 
-def _remedy(
-    results: Results,
-    expectation: Expectation,
-    cells: Sequence[int],
-    interval: Interval,
-    wall_s: float,
-) -> str:
-    """How many seeds would decide it, if the mean stays where it is."""
-    n, by_wilson = interval.n, is_share(expectation.metric) and len(cells) == 1
-    while n and n < MOST_RUNS and not math.isnan(interval.low):
+def _remedy(expectation: Expectation, now: Interval, drawn: int, wall_s: float) -> str:
+    """How many seeds would decide it, if the mean stays where it is; of those drawn, few count."""
+    if math.isnan(now.low):
+        return "too few runs count"
+    n = now.n
+    while n < MOST_RUNS:
         n = math.ceil(n * _STEP)
-        if by_wilson:
-            guess = share_interval(round(interval.value * n), n)
+        if is_share(expectation.metric) and not expectation.other:
+            guess = share_interval(round(now.value * n), n)
         else:
-            shrunk = math.sqrt(interval.n / n)
-            low, high = (
-                interval.value + (end - interval.value) * shrunk
-                for end in (interval.low, interval.high)
-            )
-            guess = Interval(interval.value, low, high, n)
+            ends = (now.value + (end - now.value) * math.sqrt(now.n / n) for end in now[1:3])
+            guess = Interval(now.value, *ends, n)
         if outcome_of(guess, expectation) != UNDECIDED:
-            seeds = max(map(len, map(results.drawn, cells)))
-            needed = math.ceil(seeds * n / interval.n)  # of some draws nothing counts
-            more_s = wall_s * (needed - seeds) / seeds
-            return f"about {needed} seeds would decide it ({as_duration(more_s)} of one core more)"
-    return "too few runs count" if math.isnan(interval.low) else f"not even {MOST_RUNS} runs would"
+            seeds = math.ceil(drawn * n / now.n)
+            more = as_duration(wall_s * (seeds / drawn - 1))
+            return f"about {seeds} seeds would decide it ({more} of one core more)"
+    return f"not even {MOST_RUNS} runs would"
 
 
 def write_junit(results: Results, verdicts: Sequence[Verdict], path: Path) -> None:
@@ -143,27 +121,19 @@ def write_junit(results: Results, verdicts: Sequence[Verdict], path: Path) -> No
 
     What is not met is a failure; what is not decided is an error.
     """
-    counts = {
-        "tests": len(verdicts),
-        "failures": sum(one.outcome == NOT_MET for one in verdicts),
-        "errors": sum(one.outcome == UNDECIDED for one in verdicts),
-        "skipped": 0,
-        "time": f"{sum(one.wall_s for one in verdicts):.3f}",
-    }
-    attributes = {key: str(value) for key, value in counts.items()}
-    name = results.loaded.experiment.name
-    root = ElementTree.Element("testsuites", {"name": "drone-mesh-lab", **attributes})
-    started = str(results.sessions[-1]["started"])
-    suite = ElementTree.SubElement(
-        root, "testsuite", {"name": name, **attributes, "timestamp": started}
-    )
+    name, found = results.loaded.experiment.name, [one.outcome for one in verdicts]
+    root = ElementTree.Element("testsuites")
+    about: dict[str, object] = {"name": name, "tests": len(found), "skipped": 0}
+    about.update(failures=found.count(NOT_MET), errors=found.count(UNDECIDED))
+    about.update(time=f"{sum(one.wall_s for one in verdicts):.3f}")
+    about.update(timestamp=results.sessions[-1]["started"])
+    suite = ElementTree.SubElement(root, "testsuite", {k: str(v) for k, v in about.items()})
     for one in verdicts:
-        about = {"classname": name, "name": one.name, "time": f"{one.wall_s:.3f}"}
-        case = ElementTree.SubElement(suite, "testcase", about)
+        words = {"classname": name, "name": one.name, "time": f"{one.wall_s:.3f}"}
+        case = ElementTree.SubElement(suite, "testcase", words)
         if one.outcome != MET:
-            kind = "failure" if one.outcome == NOT_MET else "error"
             what = {"message": f"{one.outcome}: {one.reason}", "type": one.outcome}
-            ElementTree.SubElement(case, kind, what).text = f"{one.name}\n{one.reason}"
+            ElementTree.SubElement(case, "failure" if one.outcome == NOT_MET else "error", what)
     try:
         ElementTree.ElementTree(root).write(str(path), encoding="utf-8", xml_declaration=True)
     except OSError as error:

@@ -54,13 +54,11 @@ class Plan:
             for cell in self.cells
         ]
         compare = loaded.experiment.compare if loaded.experiment.control else None
-        self.controls = [
-            index
-            for index, cell in enumerate(self.cells)
-            if compare is not None and cell.values[compare.over] == compare.baseline
+        baselines = [
+            compare and cell.values[compare.over] == compare.baseline for cell in self.cells
         ]
-        self._folder = str(loaded.folder.resolve())
-        self._has_own_modules = bool(loaded.own_modules)
+        self.controls = [index for index, is_baseline in enumerate(baselines) if is_baseline]
+        self._folder = str(loaded.folder.resolve()) if loaded.own_modules else ""
         self._own_code = [self._code_of(cell.scenario) for cell in self.cells]
         # The values that differ from the defaults. Therefore a parameter added in a later version
         # does not change old run ids; a changed default requires a new SCHEMA.
@@ -91,8 +89,7 @@ class Plan:
         spec = RunSpec(
             run_id(self._identities[cell], experiment.seed, repetition, self.own_metrics),
             self._texts[cell], experiment.seed, repetition, self.own_metrics,
-            self._folder if self._has_own_modules else "",
-            self._own_code[cell], experiment.timeout_s,
+            self._folder, self._own_code[cell], experiment.timeout_s,
         )  # fmt: skip
         return PlannedRun(spec, cell)
 

@@ -197,14 +197,12 @@ def paired_table(results: Results) -> Table | None:
             continue
         for metric in results.metrics:
             if base == index:
-                xs, ys = results.control(base, metric)
+                compared = paired_difference(*results.control(base, metric))
                 texts = {**texts, compare.over: f"{baseline}, other seeds"}
-            else:
-                xs, ys = paired(*results.pairs(base, index), metric)
-            compared = paired_difference(xs, ys)
-            if base == index:
                 spread[base, metric] = max(map(abs, compared.difference[1:3]))
-            seeds = max(results.marked(one, len(xs)) for one in (base, index))
+            else:
+                compared = paired_difference(*paired(*results.pairs(base, index), metric))
+            seeds = max(results.marked(one, compared.difference.n) for one in (base, index))
             found.append((base if base != index else None, texts, metric, seeds, compared))
     adjusted = holm([compared.p for *_, compared in found])
     rows = [
