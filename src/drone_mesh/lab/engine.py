@@ -60,8 +60,8 @@ def run_all(specs: Iterable[RunSpec], workers: int, cluster: str | None) -> Iter
             yield from _run_on(client, deque(specs))
     except ImportError as error:
         raise EngineError(
-            f"the dask scheduler or a worker says: {error}. Install this version there (pip install "
-            f"'drone_mesh[lab]'), or start it with PYTHONPATH={_SOURCE} if it has that folder"
+            f"the dask scheduler or a worker says: {error}. Install this version there "
+            f"(pip install 'drone_mesh[lab]'), or start it with PYTHONPATH={_SOURCE} if it has that"
         ) from error
 
 

@@ -107,8 +107,9 @@ def _remedy(expectation: Expectation, now: Interval, drawn: int, wall_s: float) 
         if is_share(expectation.metric) and not expectation.other:
             guess = share_interval(round(now.value * n), n)
         else:
-            ends = (now.value + (end - now.value) * math.sqrt(now.n / n) for end in now[1:3])
-            guess = Interval(now.value, *ends, n)
+            shrunk = math.sqrt(now.n / n)
+            low, high = (now.value + (end - now.value) * shrunk for end in now[1:3])
+            guess = Interval(now.value, low, high, n)
         if outcome_of(guess, expectation) != UNDECIDED:
             seeds = math.ceil(drawn * n / now.n)
             more = as_duration(wall_s * (seeds / drawn - 1))
