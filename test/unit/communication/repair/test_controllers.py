@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from drone_mesh.air.graph import Graph, within
+from drone_mesh.communication.control.router_states import RepairState
 from drone_mesh.communication.repair.algebraic_connectivity import (
     AT_REACH,
     fiedler,
@@ -30,19 +31,26 @@ def at(x, y):
     return Location.from_vector((x, y, 0.0))
 
 
+def stub(here, gateway, views, legs):
+    """What a router tells a strategy that wants to fly a leg; `legs` are where it sends it."""
+    return SimpleNamespace(
+        now_s=100.0, node_id=1, connected=False, state=RepairState.LOST, bids_within_s=10.0,
+        medium=SimpleNamespace(stretched=lambda seconds: seconds), range_m=RANGE_M,
+        clearance_m=1.0, gateway_place=gateway, own_place=lambda: here, why_not_fly=lambda: "",
+        neighbours=lambda: views, reachable=lambda: views,
+        ask_places=lambda: None, wait_until=lambda at_s: None,
+        fly=lambda step, until_connected: legs.append(step.place),
+    )  # fmt: skip
+
+
 def decides(strategy, here, gateway, *others):
     """(where its first leg ends, or None; why it stays) of a drone that knows these places."""
     views = {node: NeighbourView(place, 1.0, 255) for node, place in enumerate(others, start=2)}
     legs = []
-    strategy.start(
-        SimpleNamespace(
-            now_s=100.0, node_id=1, connected=False, range_m=RANGE_M, clearance_m=1.0,
-            gateway_place=gateway, own_place=lambda: here, why_not_fly=lambda: "",
-            neighbours=lambda: views, reachable=lambda: views,
-            fly=lambda step, until_connected: legs.append(step.place),
-        )
-    )  # fmt: skip
+    strategy.start(stub(here, gateway, views, legs))
     strategy.on_time()
+    if not legs and not strategy.reason:
+        strategy.on_time()  # it lets another one on its way fly first
     return (legs[0] if legs else None), strategy.reason
 
 
@@ -171,3 +179,15 @@ def test_a_drone_that_flies_to_and_fro_stops_after_three_times_the_legs_of_the_w
     assert (legs, tried.reason) == (15, "flew to and fro without success")
     tried.on_gateway_found()
     assert decides(tried, at(18, 0), at(0, 0))[0] is not None
+
+
+@pytest.mark.parametrize("strategy", [VirtualSpring, Fiedler])
+def test_a_drone_lets_another_one_on_its_way_fly_first_and_then_passes_it(strategy):
+    behind = strategy()
+    legs = []
+    views = {2: NeighbourView(at(17, 0.5), 1.0, 255)}
+    behind.start(stub(at(20, 0), at(0, 0), views, legs))
+    behind.on_time()
+    assert legs == []
+    behind.on_time()
+    assert len(legs) == 1
