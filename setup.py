@@ -5,7 +5,9 @@ The version is defined in package.xml only: catkin refuses to build if the two d
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 from setuptools import find_packages, setup
@@ -23,6 +25,48 @@ def requirements(name: str) -> list[str]:
         elif requirement:
             found.append(requirement)
     return found
+
+
+# The mesh's hot path, which mypyc can compile (docs/decisions.md, "The core may be compiled").
+# Not in it: what users derive from, and classes with two bases.
+HOT = {
+    "channel": "medium_access packet_queue statistics",
+    "communication": "neighbours timing",
+    "communication/beacon": "connection courier neighbour own_beacons packets plane routes times"
+    " verdicts",
+    "communication/control": "delivery node_part pilot places",
+    "communication/events": "complaints",
+    "communication/heartbeats": "connection delivery forwarding gateway_plane introduction plane"
+    " queued_delivery",
+    "communication/node": "component gateway router",
+    "drone": "location",
+    "inprocess": "clock node radio shared_air shared_antenna",
+}
+
+
+def compiled_core() -> dict[str, Any]:
+    """Extension modules, if DRONE_MESH_COMPILE is set, as by scripts/compile."""
+    if not os.environ.get("DRONE_MESH_COMPILE"):
+        return {}
+    from mypyc.build import mypycify
+
+    modules = [f"src/drone_mesh/{room}/{name}.py" for room in HOT for name in HOT[room].split()]
+    # Types of libraries would take time. No configuration: ours is for checks under Python 3.8.
+    options = ["--config-file=", "--no-site-packages", "--ignore-missing-imports"]
+    options.append("--cache-dir=build/compiled/cache")
+    extensions = mypycify(
+        [*options, *modules],
+        opt_level="1",
+        debug_level="0",
+        multi_file=True,
+        target_dir="build/compiled/c",
+        group_name="drone_mesh",
+    )
+    # A fused multiplication rounds otherwise than Python does; warnings are for who writes C.
+    flags = [*extensions[-1].extra_compile_args, "-ffp-contract=off", "-Wno-error"]
+    for extension in extensions:
+        extension.extra_compile_args = flags
+    return {"ext_modules": extensions}
 
 
 EXTRAS = (
@@ -50,4 +94,5 @@ setup(
     },
     install_requires=requirements("base"),
     extras_require={extra: requirements(extra) for extra in EXTRAS},
+    **compiled_core(),
 )

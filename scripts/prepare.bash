@@ -168,6 +168,25 @@ prepare_physics() {
   pip_install requirements/physics.txt
 }
 
+# prepare_compiler: mypyc, in a folder of its own, because the checks need an older mypy.
+prepare_compiler() {
+  local at="$root/build/compiled/mypyc"
+  make_venv
+  pip_install requirements/base.txt
+  "$venv/bin/python" -c 'import sys; exit(sys.version_info < (3, 10))' || fail "mypyc needs Python 3.10"
+  local headers
+  headers=$("$venv/bin/python" -c 'import sysconfig; print(sysconfig.get_paths()["include"])') || exit
+  if [ ! -e "$headers/Python.h" ] || ! command -v cc >/dev/null; then apt_install g++ python3-dev; fi
+  cmp -s "$root/requirements/compile.txt" "$at/.installed" && return
+  say "installing mypyc into build/compiled"
+  "$venv/bin/python" -m pip install --disable-pip-version-check --no-input --progress-bar off --upgrade \
+    --target "$at" -r "$root/requirements/compile.txt" </dev/null || fail "pip could not install mypyc"
+  cp "$root/requirements/compile.txt" "$at/.installed"
+}
+
+# compiler ARGUMENTS...: Python with mypyc, so that setup.py compiles.
+compiler() { DRONE_MESH_COMPILE=yes PYTHONPATH="$root/build/compiled/mypyc" "$venv/bin/python" "$@"; }
+
 prepare_simulation() {
   apt_install "${ros_packages[@]}"
   make_venv

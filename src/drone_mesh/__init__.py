@@ -4,6 +4,11 @@ The names of `__all__` here, in `drone_mesh.inprocess` and in `drone_mesh.lab` a
 package (docs/architecture.md, "What users may import").
 """
 
+# ruff: noqa: E402, I001 - a compiled core must be found before its sources
+from drone_mesh.compiled import use_build
+
+use_build()
+
 from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE
 from drone_mesh.communication.repair.interfaces import IRepairStrategy, Step
 from drone_mesh.communication.repair.strategies import Thesis

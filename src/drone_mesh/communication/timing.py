@@ -11,6 +11,7 @@ import math
 from collections import Counter
 from dataclasses import dataclass, replace
 
+from drone_mesh.compiled import mypyc_attr
 from drone_mesh.settings import setting, settings_of
 
 HEARTBEAT_ANSWER_S = 0.5  # at most one heartbeat to the gateway within this time
@@ -20,6 +21,7 @@ MIN_REPORT_PERIOD_S = 30.0  # docs/protocol.md, "Node reports"
 LANDED_WITHIN_M = 0.1  # docs/repair.md, "Flight"
 
 
+@mypyc_attr(native_class=False)  # whose fields pydantic reads
 @dataclass(frozen=True)
 class MeshTiming:
     """Adjustable numbers of one node; the defaults are those of docs/protocol.md."""

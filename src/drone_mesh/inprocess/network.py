@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Callable, Iterable, Mapping
 
 from drone_mesh.air.graph import hops_from
-from drone_mesh.communication.control.delivery import ITechnique
+from drone_mesh.communication.control.control_plane import ITechnique
 from drone_mesh.communication.data.outgoing import Ticket
 from drone_mesh.communication.data.transport import OnEchoAnswer, ReceivedMessage
 from drone_mesh.communication.events.observer import MeshEvent

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Callable, Sequence
 
 from drone_mesh.arguments import MOST, is_up_to, whole
+from drone_mesh.compiled import core
 from drone_mesh.errors import MeshError
 from drone_mesh.lab.campaign import Campaign, OlderCodeError, merge
 from drone_mesh.lab.estimate import estimate
@@ -189,6 +190,7 @@ def _plan(options: argparse.Namespace) -> int:
     cells = len(plan.cells)
     control = f" + {plan.seeds} others for each baseline" if plan.controls else ""
     print(f"{cells} cell{'s' * (cells != 1)} x {plan.seeds} seeds{control} = {len(plan)} runs")
+    print(f"core: {core()}")
     stop = loaded.experiment.stop
     if stop is not None:
         print(f"more seeds, up to {stop.max_seeds}, until {stop.metric} is precise enough")

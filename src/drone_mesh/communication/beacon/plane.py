@@ -59,7 +59,7 @@ class BeaconPlane(IControlPlane):
         self._motion = OwnMotion(node.pilot.place, self._step_m)
         self._below = NodesBelow(self._me, self._routes)
         self._own = OwnBeacons(node.seals, node.frame, self._routes, self._below, self._step_m)
-        self._body = slice(messages.HEADER_BYTES, messages.HEADER_BYTES + self._own.room)
+        self._body_end = messages.HEADER_BYTES + self._own.room
         self._trickle = Trickle(medium, node.rng)
         self._searches = Searches(self._me, self._routes, self._broadcast, medium.hop_s)
         self._verdicts = Verdicts(self._routes, self._searches, self._deadlines)
@@ -159,7 +159,7 @@ class BeaconPlane(IControlPlane):
         for node in routes.expired():
             self._trickle.reset(now_s)
             self._gone(node, heard.lost(node, now_s))
-        for node in heard.deaf() & routes.neighbours.keys():
+        for node in heard.deaf().intersection(routes.neighbours):
             neighbour = routes.neighbours[node]
             if now_s - neighbour.doubted_s >= DEAF_AGAIN_S:
                 neighbour.doubted_s = now_s
@@ -255,7 +255,8 @@ class BeaconPlane(IControlPlane):
         if self._complaints.is_foreign(creator, now_s):  # readable, but it takes no packets
             self._complaints.dropped("a beacon of another mesh", payload, now_s)
             return
-        beacon = Beacon.from_body(payload[self._body], self._motion.region)
+        body = payload[messages.HEADER_BYTES : self._body_end]
+        beacon = Beacon.from_body(body, self._motion.region)
         if beacon is None:
             self._complaints.dropped("a damaged beacon", payload, now_s)
             return

@@ -492,7 +492,8 @@ class BeaconRoutes(IRoutes):
         if known is None:
             return not any(n.beacon.parent == me and node in n.announced_s for n in self._all())
         beacon = known.beacon
-        return beacon.gateway != NO_ROUTE and me not in (beacon.parent, *beacon.ancestors)
+        is_below = beacon.parent == me or me in beacon.ancestors
+        return beacon.gateway != NO_ROUTE and not is_below
 
     def node_moved_location(self) -> None:
         """The next beacons show where everybody is; who is deaf there must show anew."""

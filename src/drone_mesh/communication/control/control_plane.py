@@ -16,7 +16,7 @@ import random
 from dataclasses import dataclass
 from typing import Callable, Sequence
 
-from drone_mesh.communication.control.delivery import IDelivery, IRoutes, ITechnique
+from drone_mesh.communication.control.delivery import IDelivery, IRoutes
 from drone_mesh.communication.control.pilot import Pilot
 from drone_mesh.communication.control.places import Claims, CommonFrame, KnownPlaces
 from drone_mesh.communication.control.router_states import RouterEvent, RouterStates
@@ -200,6 +200,12 @@ class IControlPlane(abc.ABC):
     def told_of_gateway(self, gateway: int) -> bool:
         """Another node tells of a gateway. Returns whether it is, or becomes, the preferred one."""
         return gateway == self.gateway
+
+
+class ITechnique(abc.ABC):  # noqa: B024 (what each kind must do differs)
+    """What `routing:=` names: an IRoutingTechnique or an IControlTechnique."""
+
+    connection_lost_after_s = 30.0  # where the timing of a node leaves it to the technique
 
 
 class IControlTechnique(ITechnique):

@@ -5,15 +5,13 @@ from __future__ import annotations
 import abc
 
 from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.compiled import mypyc_attr
+
+# Not abc.ABC: from that mypyc derives no dataclass.
 
 
-class ITechnique(abc.ABC):  # noqa: B024 (what each kind must do differs)
-    """What `routing:=` names: an IRoutingTechnique or an IControlTechnique."""
-
-    connection_lost_after_s = 30.0  # where the timing of a node leaves it to the technique
-
-
-class IDelivery(abc.ABC):
+@mypyc_attr(allow_interpreted_subclasses=True)
+class IDelivery(metaclass=abc.ABCMeta):
     """Sends the packets of one node."""
 
     total_sent: int  # packets delivered, or handed to the antenna; broadcasts not counted
@@ -31,7 +29,8 @@ class IDelivery(abc.ABC):
         return False
 
 
-class IRoutes(abc.ABC):
+@mypyc_attr(allow_interpreted_subclasses=True)
+class IRoutes(metaclass=abc.ABCMeta):
     """What a node knows about others. A reporting thread may call the first two at any time."""
 
     @abc.abstractmethod

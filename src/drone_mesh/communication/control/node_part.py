@@ -7,7 +7,7 @@ for a type or a timer finds who handles it.
 
 from __future__ import annotations
 
-from types import FunctionType, MethodType
+from types import MethodType
 from typing import Any, Callable, Sequence, TypeVar
 
 from drone_mesh.communication.timing import Due
@@ -60,12 +60,12 @@ def timers(parts: Sequence[object]) -> list[tuple[Due, Callable[[], None]]]:
     return sorted(found.items())
 
 
-def _methods(parts: Sequence[object]) -> list[tuple[object, FunctionType]]:
+def _methods(parts: Sequence[object]) -> list[tuple[object, Callable[..., None]]]:
     """The functions of their classes; those of a derived class before those that it overrides."""
     return [
         (part, method)
         for part in parts
         for owner in type(part).__mro__
         for method in vars(owner).values()
-        if isinstance(method, FunctionType)
+        if callable(method)
     ]

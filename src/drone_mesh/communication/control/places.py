@@ -6,7 +6,7 @@ docs/repair.md, "Places to step back to".
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from drone_mesh.communication.control.delivery import IDelivery
 from drone_mesh.communication.control.pilot import Pilot
@@ -172,7 +172,9 @@ class PlaceRequests:
     _antenna: IWirelessCommunication
     _delivery: IDelivery
     _deadlines: Deadlines
-    _told: Location | None = field(default=None, init=False)  # to all
+
+    def __post_init__(self) -> None:
+        self._told: Location | None = None  # to all
 
     def ask(self, node: int) -> bool:
         """Ask `node` for its place, along the route to it; returns whether that has left."""

@@ -17,8 +17,8 @@ from drone_mesh.communication.control.control_plane import (
     IControlHost,
     IControlPlane,
     IControlTechnique,
+    ITechnique,
 )
-from drone_mesh.communication.control.delivery import ITechnique
 from drone_mesh.communication.control.node_part import due, receivers, receives, timers
 from drone_mesh.communication.control.pilot import Pilot
 from drone_mesh.communication.control.places import Claims, CommonFrame, KnownPlaces

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import random
 
-from drone_mesh.communication.control.delivery import ITechnique
+from drone_mesh.communication.control.control_plane import ITechnique
 from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.communication.interfaces import (
     MAX_NODE_ID,

@@ -7,7 +7,7 @@ from typing import Callable
 
 from drone_mesh.by_name import create_by_name
 from drone_mesh.communication.beacon.plane import BeaconTechnique
-from drone_mesh.communication.control.delivery import ITechnique
+from drone_mesh.communication.control.control_plane import ITechnique
 from drone_mesh.communication.repair.interfaces import IRepairStrategy
 from drone_mesh.communication.repair.options import DEFAULT_REPAIR, RepairOptions
 from drone_mesh.communication.repair.strategies import create_repair_strategy

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import random
 
-from drone_mesh.communication.control.delivery import ITechnique
+from drone_mesh.communication.control.control_plane import ITechnique
 from drone_mesh.communication.control.places import PlaceRequests
 from drone_mesh.communication.control.router_states import RouterStates
 from drone_mesh.communication.interfaces import IWirelessCommunication

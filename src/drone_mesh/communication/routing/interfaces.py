@@ -9,7 +9,8 @@ from __future__ import annotations
 import abc
 from typing import ClassVar, Sequence
 
-from drone_mesh.communication.control.delivery import IRoutes, ITechnique
+from drone_mesh.communication.control.control_plane import ITechnique
+from drone_mesh.communication.control.delivery import IRoutes
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.timing import UNDISTURBED, Medium
 from drone_mesh.communication.wire.packet_types import MessageType

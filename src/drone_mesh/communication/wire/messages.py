@@ -331,8 +331,8 @@ def own_location(place: Location, is_goal: bool, now_s: float, me: int, to: int)
 
     Heights are int16, whole metres.
     """
-    latitude, longitude, height = place
-    height = max(-(2**15), min(2**15 - 1, round(height)))
+    latitude, longitude, height_m = place
+    height = max(-(2**15), min(2**15 - 1, round(height_m)))
     time_s = int(now_s) % _GOAL + is_goal * _GOAL
     return _NEW_LOCATION.pack(me, me, _LOCATION, to, to, latitude, longitude, height, time_s)
 

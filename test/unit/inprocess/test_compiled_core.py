@@ -1,0 +1,69 @@
+"""The compiled core: the same results as Python, used only for the sources that it was made of."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from drone_mesh import compiled
+
+ROOT = Path(__file__).resolve().parents[3]
+DIGEST = """
+import hashlib, itertools
+from drone_mesh.compiled import core
+from drone_mesh.inprocess import Network
+from drone_mesh.mobility import Area, Mobility, tracks_of
+
+print(core())
+for radio, routing in itertools.product(("disc", "shared"), ("beacon", "child_table_tree")):
+    network = Network(seed=7, radio=radio, routing=routing)
+    network.add_fleet(1, 24, 5, 6.0)
+    network.run_for(20.0)
+    places = {node: network.location(node).to_vector() for node in network.nodes}
+    mobility = Mobility("random_waypoint", speed_m_s=(1.0, 3.0))
+    network.fly(tracks_of(mobility, places, {0}, Area(0.0, 0.0, 40.0, 40.0), seed=7))
+    network.run_for(20.0)
+    network.power(7, False)
+    network.run_for(40.0)
+    paths = [network.path_to_gateway(node) for node in network.nodes]
+    seen = (network.events, network.air.delivered, paths, network.status())
+    print(radio, routing, hashlib.sha256(repr(seen).encode()).hexdigest())
+"""
+
+
+def start(core: str, package: Path, *command: str) -> subprocess.CompletedProcess[str]:
+    environment = {**os.environ, compiled.WISH: core, "PYTHONPATH": str(package)}
+    return subprocess.run(
+        [sys.executable, *command], env=environment, capture_output=True, text=True, check=False
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not compiled.build().is_dir(), reason="scripts/compile has not built it")
+def test_seeded_meshes_do_the_same_in_both_cores() -> None:
+    cores = ("python", "compiled")
+    python, built = (start(core, ROOT / "src", "-c", DIGEST).stdout.splitlines() for core in cores)
+    assert python[0].startswith("Python")
+    assert built == ["compiled", *python[1:]]
+    assert len(built) == 5
+
+
+@pytest.mark.slow
+def test_a_build_is_found_until_a_source_of_its_rooms_changes(tmp_path: Path) -> None:
+    source = tmp_path / "src/drone_mesh"
+    shutil.copytree(ROOT / "src/drone_mesh", source, ignore=shutil.ignore_patterns("__pycache__"))
+    where = start(
+        "python", source.parent, "-c", "import drone_mesh.compiled as c; print(c.build())"
+    )
+    Path(where.stdout.strip()).mkdir(parents=True)
+    assert start("compiled", source.parent, "-c", "import drone_mesh").returncode == 0
+    with (source / "drone/location.py").open("a") as edited:
+        edited.write("# edited\n")
+    refused = start("compiled", source.parent, "-c", "import drone_mesh")
+    assert "no build of these sources" in refused.stderr
+    assert start("", source.parent, "-c", "import drone_mesh").returncode == 0
