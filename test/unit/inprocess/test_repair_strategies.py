@@ -212,6 +212,14 @@ def test_the_part_of_a_dumbbell_without_the_gateway_flies_to_the_other_and_none_
     assert min(a.distance_m(b) for a, b in itertools.combinations(ends, 2)) >= 1.0
 
 
+@pytest.mark.parametrize("repair", ["field", "virtual_spring", "fiedler"])
+def test_leg_follows_leg_without_another_wait(repair):
+    network = line(3, spacing=8.0, repair=repair, routing="beacon")
+    network.run_for(20.0)
+    network.power(2, False)
+    assert run_until(network, lambda: len(events(network, "LANDED")) == 2, 30.0, step_s=1.0)
+
+
 @pytest.mark.parametrize("repair", ["virtual_spring", "fiedler"])
 def test_drones_whose_gateway_stays_off_come_to_rest(repair):
     network = fleet(8, 3, repair=repair)

@@ -6,7 +6,7 @@ import abc
 import math
 from typing import Iterable
 
-from drone_mesh.communication.control.router_states import RepairState
+from drone_mesh.communication.repair.group_repair import IN_A_ROUND
 from drone_mesh.communication.repair.interfaces import IRepairStrategy, NeighbourView, Step
 from drone_mesh.communication.repair.nearest import Nearest
 from drone_mesh.drone.location import Location
@@ -89,7 +89,7 @@ class BoundedLegs(LegByLeg, Nearest):
 
     def on_time(self) -> None:
         """Fly a leg, unless it rests, an election has begun, or another drone is in its way."""
-        is_leg = not self._rests and self.mesh.state is RepairState.LOST
+        is_leg = not self._rests and self.mesh.state not in IN_A_ROUND
         self._gives_way = is_leg and not self._gives_way and self._is_behind()
         if self._gives_way:
             self._ask()
