@@ -317,7 +317,7 @@ class GatewayConnection:
         self._relay_check.swallowing.answered()
 
     def question_lost(self) -> None:
-        """No neighbour took this router's question for the place of its gateway."""
+        """A neighbour did not take this router's question for the place of its gateway."""
         self._relay_check.swallowing.not_taken()
 
     def _ask_for_places(self, fresh_s: float = 0.0, gateway_asked: bool = False) -> None:

@@ -74,6 +74,7 @@ class Swallowing:
         self._wait_s = WAIT_PERIODS * check_period_s
         self._answers = False  # whether this gateway knows its place and answers at all
         self._unanswered = 0
+        self._may_be_lost = False  # the latest question, which counts as unanswered
         self._asked_s = -math.inf
         self._through = NO_ROUTE
 
@@ -109,10 +110,16 @@ class Swallowing:
         """The gateway was asked for its place."""
         self._asked_s = now_s
         self._unanswered += 1
+        self._may_be_lost = True
 
     def not_taken(self) -> None:
-        """The next hop did not take the latest question: it cannot have swallowed it."""
-        self._unanswered = max(0, self._unanswered - 1)
+        """The next hop did not take the latest question: it cannot have swallowed it.
+
+        It counts once, although another neighbour may not take it, either.
+        """
+        if self._may_be_lost:
+            self._may_be_lost = False
+            self._unanswered = max(0, self._unanswered - 1)
 
     def answered(self) -> None:
         """The gateway answered a request for its place."""

@@ -266,7 +266,7 @@ class OrderBook:
             return
         order.state, order.reason, order.changed_s = state, reason, self._deadlines.now_s
         order.due_s = math.inf
-        order.seeking = False
+        order.seeking = order.waiting = False
         self._report(order)
 
     def _report(self, order: _Order) -> None:

@@ -123,7 +123,7 @@ def highest_plausible(own: Location | None, gateway: Location | None, range_m: f
     The group is connected, so none of its nodes is farther away than a chain of all ids.
     """
     if own is None or gateway is None:
-        return float("inf")
+        return MAX_SCORE_M  # less than the codes, which not every strategy reads
     return own.distance_m(gateway) + MAX_NODE_ID * range_m
 
 

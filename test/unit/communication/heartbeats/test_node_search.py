@@ -110,6 +110,16 @@ def test_an_order_that_waits_for_a_route_is_repeated_as_soon_as_its_drone_is_hea
     assert rig.kinds()[-1] == "ORDER_ARRIVED"
 
 
+def test_an_order_that_was_accepted_while_it_waited_for_a_route_is_not_sent_again():
+    rig = gateway_rig()
+    rig.hear(TAKEN_OFF)
+    rig.wait(39.0)
+    rig.hear("05 03 40 01 01 21 00 01")
+    assert rig.kinds()[-1] == "ORDER_ACCEPTED"
+    rig.hear("05 03 04 01 01 01 01 02")
+    assert rig.sent(ORDER) == []
+
+
 def test_reports_of_a_loss_do_not_put_off_the_repeats_of_an_order():
     rig = gateway_rig()
     for _second in range(44):

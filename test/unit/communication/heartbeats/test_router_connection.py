@@ -622,7 +622,7 @@ def test_routers_that_connected_together_do_not_ask_a_far_gateway_together(
     rig.hear("00 02 01 01 01 00 00 80 3f")
     rig.sent()
     monkeypatch.setattr(AlwaysHalf, "random", lambda _self: drawn)
-    for check_s in range(5, 105, 10):
+    for check_s in range(5, 125, 10):
         rig.wait_until(check_s)
         if any(request[4] == 0 for request in rig.sent(REQUEST)):
             break

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from drone_mesh.communication.repair.election import BidCredit, highest_plausible
+from drone_mesh.communication.repair.election import BACKUP, BidCredit, highest_plausible
 from drone_mesh.drone.location import Location
 
 MOST = 2000.0
@@ -20,8 +20,12 @@ def test_no_node_of_a_group_is_farther_than_a_chain_of_all_ids():
 
 
 @pytest.mark.parametrize(("own", "gateway"), [(None, Location(0, 0, 0)), (Location(0, 0, 0), None)])
-def test_a_node_that_knows_no_places_believes_any_bid(own, gateway):
-    assert BidCredit().believes(7, 1e9, 2, highest_plausible(own, gateway, 9.0))
+def test_a_node_that_knows_no_places_believes_any_bid_but_no_code_that_it_does_not_know(
+    own, gateway
+):
+    most = highest_plausible(own, gateway, 9.0)
+    assert BidCredit().believes(7, 1e9, 2, most)
+    assert not BidCredit().believes(7, BACKUP, 2, most)
 
 
 def test_a_neighbour_that_brings_winners_which_do_not_fly_is_no_longer_believed():

@@ -134,6 +134,14 @@ def test_a_question_that_the_relay_did_not_take_says_nothing_about_it(caplog, is
     assert bool(told) is is_taken
 
 
+def test_a_question_that_several_neighbours_did_not_take_is_left_out_once():
+    check, _detours = check_of_node_8()
+    check.swallowing.asked(95.0)
+    check.swallowing.not_taken()
+    check.swallowing.not_taken()
+    assert check.swallowing.noticed(hops=2)
+
+
 def test_a_relay_that_swallowed_is_tried_again_after_ten_minutes():
     check, detours = check_of_node_8()
     check.run(gateway=0, next_hop=1, hops=2, heartbeat_s=91.0)
