@@ -55,6 +55,8 @@ class _Finder(MetaPathFinder):
 def use_build() -> None:
     """Let imports find the build that fits; before anything else of the package is imported."""
     wish = os.environ.get(WISH)
+    if wish not in (None, "", "python", "compiled"):
+        raise ImportError(f"{WISH}={wish}: expected python or compiled")
     if wish == "python" or not (BUILDS.is_dir() or wish):
         return
     folder = build()

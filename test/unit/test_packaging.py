@@ -29,6 +29,13 @@ def ros_imports(source: Path) -> set[str]:
     return set(re.findall(line, source.read_text(encoding="utf-8"), re.MULTILINE))
 
 
+def test_the_help_of_the_wheel_names_every_extra() -> None:
+    (extras,) = re.findall(r"^EXTRAS = \((.+?)\)", (ROOT / "setup.py").read_text(), re.M | re.S)
+    text = (ROOT / "scripts" / "wheel").read_text()
+    named = set(re.findall(r"\w+", text.partition("Other extras: ")[2].partition(".")[0]))
+    assert named | {"raspberry"} == set(re.findall(r'"(\w+)"', extras))
+
+
 @pytest.mark.slow
 def test_the_console_extra_has_every_package_that_the_console_imports() -> None:
     def packages(*names: str) -> set[str]:

@@ -13,7 +13,7 @@ from drone_mesh.lab.metrics.registry import is_share
 from drone_mesh.lab.results import Results, paired
 from drone_mesh.lab.statistics import Interval, paired_difference, share_interval
 from drone_mesh.lab.tables import summary_of
-from drone_mesh.lab.terminal import as_duration
+from drone_mesh.lab.terminal import PROGRAM, as_duration
 
 MET, NOT_MET, UNDECIDED = "met", "not met", "not decided"
 MOST_RUNS = 10_000  # that are proposed to decide something
@@ -39,7 +39,9 @@ def judge(results: Results) -> list[Verdict]:
     """Judge all expectations. Raises ConfigurationError if there are none."""
     expected = results.loaded.experiment.expect
     if not expected:
-        raise ConfigurationError(f"{results.folder}: the experiment has no `expect:`")
+        raise ConfigurationError(
+            f"{results.folder}: the experiment has no `expect:`, a list such as [healed >= 0.95]"
+        )
     return [one for text in expected for one in _judge(results, Expectation.parse(text))]
 
 
@@ -66,12 +68,14 @@ def _judge(results: Results, expectation: Expectation) -> Iterator[Verdict]:
 
 def _unfit(results: Results, cells: Sequence[int]) -> str:
     """Why these cells cannot be judged; empty: they can."""
-    missing = sum(one.cell in cells and one.spec.run not in results.rows for one in results.plan)
+    ours = (one for one in results.plan if one.cell in cells and not one.is_control)
+    missing = sum(one.spec.run not in results.rows for one in ours)
     if missing:
-        return f"{missing} runs are missing or failed"
+        return f"{missing} runs are missing or failed: `{PROGRAM} run` with --retry-failed"
     codes = {code.partition(" ")[0] for cell in cells for code in results.codes(cell)}
     mixed = len(codes) > 1 or any(len(results.codes(cell)) > 1 for cell in cells)
-    return "the runs are of different code" if mixed else ""
+    again = f"the runs are of different code: `{PROGRAM} run` with --again repeats the older"
+    return again if mixed else ""
 
 
 def _interval(results: Results, metric: str, cells: Sequence[int]) -> Interval:

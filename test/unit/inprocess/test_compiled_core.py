@@ -67,3 +67,9 @@ def test_a_build_is_found_until_a_source_of_its_rooms_changes(tmp_path: Path) ->
     refused = start("compiled", source.parent, "-c", "import drone_mesh")
     assert "no build of these sources" in refused.stderr
     assert start("", source.parent, "-c", "import drone_mesh").returncode == 0
+
+
+def test_a_wish_for_another_core_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(compiled.WISH, "pyhton")
+    with pytest.raises(ImportError, match="DRONE_MESH_CORE=pyhton: expected python or compiled"):
+        compiled.use_build()

@@ -199,6 +199,13 @@ def test_every_hint_names_a_command_and_options_that_exist() -> None:
     assert found > 40
 
 
+def test_the_help_of_the_script_names_every_command() -> None:
+    (commands,) = (one.choices for one in _parser()._actions if isinstance(one.choices, dict))
+    text = (ROOT / "scripts" / "lab").read_text(encoding="utf-8")
+    named = text.partition("explain a command: ")[2].partition("\nHELP")[0]
+    assert set(re.findall(r"\w+", named)) == set(commands)
+
+
 def test_the_hash_of_a_module_is_of_what_it_imports_from_the_users_folder_alone(
     tmp_path: Path,
 ) -> None:

@@ -12,7 +12,7 @@ from drone_mesh.errors import ConfigurationError
 from drone_mesh.lab.command import main
 from drone_mesh.lab.expectations import Expectation, matching
 from drone_mesh.lab.experiment import load_experiment
-from drone_mesh.lab.gate import MET, NOT_MET, UNDECIDED, outcome_of
+from drone_mesh.lab.gate import MET, NOT_MET, UNDECIDED, judge, outcome_of
 from drone_mesh.lab.results import load_results
 from drone_mesh.lab.statistics import Interval, share_interval
 from drone_mesh.lab.tables import paired_table, warning_of
@@ -150,7 +150,27 @@ def test_runs_that_are_missing_decide_nothing(
     assert main(list(map(str, words))) == 0
     assert f"check {out}` judges what it expects" in capsys.readouterr().out
     assert check(out, "packets >= 1") == 1
-    assert " runs are missing or failed" in capsys.readouterr().out
+    assert " runs are missing or failed: `" in capsys.readouterr().out
+
+
+def test_runs_of_the_control_decide_nothing_and_mixed_code_names_the_remedy(folder: Path) -> None:
+    check(folder, "packets of 0 >= 1")
+    results = load_results(folder)
+    controls = {one.spec.run for one in results.plan if one.is_control}
+    without = {run: row for run, row in results.rows.items() if run not in controls}
+    assert [one.outcome for one in judge(results._replace(rows=without))] == [MET, MET]
+    mixed = {0: {r: {**row, "code": f"c{r % 2}"} for r, row in results.by_cell[0].items()}}
+    verdict, _ = judge(results._replace(by_cell={**results.by_cell, **mixed}))
+    assert verdict.outcome == UNDECIDED
+    assert "run` with --again repeats" in verdict.reason
+
+
+def test_an_experiment_that_expects_nothing_is_refused_with_an_example(folder: Path) -> None:
+    (folder / "experiment.yaml").write_text(EXPERIMENT.replace("expect:", ""))
+    with pytest.raises(
+        ConfigurationError, match=r"no `expect:`, a list such as \[healed >= 0.95\]"
+    ):
+        judge(load_results(folder))
 
 
 def test_a_ci_server_gets_junit_xml(folder: Path, tmp_path: Path) -> None:
