@@ -16,7 +16,7 @@ from drone_mesh.errors import ConfigurationError
 Values = Mapping[str, str]
 """A cell: its value on each axis, as text."""
 
-_NUMBER = r"-?\d+(?:\.\d+)?(?:e-?\d+)?"
+_NUMBER = r"-?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?"
 _FORM = re.compile(
     rf"(?P<metric>[\w:.]+)(?: of (?P<cell>\S+))? (?P<relation>[<>]=?) "
     rf"(?:(?P<bound>{_NUMBER})|(?P<other>\S+?)(?: (?P<sign>[+-]) (?P<margin>{_NUMBER}))?)"

@@ -118,7 +118,8 @@ class PlacementPolicy(Policy, IRepairStrategy):
         self._is_ready = False
         self.reason = mesh.why_not_fly() or ("" if here is not None else "does not know its place")
         east, north = (LEG * mesh.range_m * float(np.clip(share, -1.0, 1.0)) for share in action)
-        if not self.reason and math.hypot(east, north) < mesh.clearance_m:
+        flies = math.hypot(east, north) >= mesh.clearance_m  # not if it is no number
+        if not self.reason and not flies:
             self.reason = "its policy lets it stay"
         if self.reason or here is None:
             self._look(STAY_S)

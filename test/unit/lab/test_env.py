@@ -83,6 +83,15 @@ def test_who_flies_to_the_gap_closes_it_and_all_are_rewarded_for_it(gap: Path) -
     assert connected == {"router_1": 1, "router_2": 1, "router_3": 0, "router_4": 1}
 
 
+@pytest.mark.timeout(20)
+def test_an_action_that_is_no_number_lets_a_drone_stay(gap: Path) -> None:
+    env = MeshEnv(gap)
+    env.reset(seed=1)
+    while env.agents:  # as of a network whose training has diverged
+        env.step({agent: np.array([math.nan, 0.0]) for agent in env.agents})
+    assert env.metrics()["repair_flights"] == 0
+
+
 def test_a_router_that_dies_has_ended(gap: Path) -> None:
     gap.write_text(
         GAP.replace("kill: {ids: [3]}}", "kill: {ids: [3]}}, {at_s: 55, kill: {ids: [4]}}")

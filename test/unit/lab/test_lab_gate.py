@@ -61,6 +61,7 @@ def check(folder: Path, expected: str, *words: str) -> int:
         (0.9, 0.94, "healed >= 0.95", NOT_MET),
         (0, 0, "collisions <= 0", MET),
         (1, 3, "collisions < 4", MET),
+        (1, 3, "collisions of all < .4e+1", MET),
         (1, 3, "collisions < 1", NOT_MET),
         (1, 3, "collisions <= 2", UNDECIDED),
         (-0.02, 0.1, "pdr_up of a >= b - 0.02", MET),
