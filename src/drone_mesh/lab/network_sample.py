@@ -68,18 +68,19 @@ def _both_ways(network: Network, one: int, other: int) -> bool:
 
 
 def route_hops(network: Network, served: frozenset[int]) -> dict[int, int]:
-    """Hops of the current route of each served router."""
-    hops: dict[int, int] = {}
+    """Hops of the route of each served router, but for those that have lost theirs since."""
+    hops = {node_id: 0 for node_id, node in network.nodes.items() if node.is_gateway}
     for start in served:
         chain: list[int] = []
         node_id = start
-        while node_id not in hops and not network.nodes[node_id].is_gateway:
+        while node_id not in hops and node_id in network.nodes and node_id not in chain:
             chain.append(node_id)
             node_id = network.nodes[node_id].component.get_route_to_gateway()
-        below = hops.get(node_id, 0)
-        for distance, passed in enumerate(reversed(chain), start=1):
-            hops[passed] = below + distance
-    return {node: hops[node] for node in served}
+        if node_id in hops:
+            below = hops[node_id]
+            for distance, passed in enumerate(reversed(chain), start=1):
+                hops[passed] = below + distance
+    return {node: hops[node] for node in served if node in hops}
 
 
 def physical_graph(network: Network) -> Graph:

@@ -15,9 +15,11 @@ from pettingzoo.test import api_test, parallel_api_test, parallel_seed_test, see
 from pettingzoo.utils.conversions import parallel_to_aec
 
 from drone_mesh.errors import ConfigurationError
+from drone_mesh.inprocess import Network
 from drone_mesh.lab import PlacementPolicy, RoutingPolicy
 from drone_mesh.lab.command import main
 from drone_mesh.lab.env import MeshEnv
+from drone_mesh.lab.network_sample import route_hops
 from drone_mesh.lab.results import load_results
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -168,3 +170,28 @@ def test_a_library_trains_in_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     action = train_placement.Trained().decide(np.zeros(PlacementPolicy.OBSERVED, np.float32))
     assert action.shape == (2,)
     assert np.isfinite(action).all()
+
+
+def test_routes_that_became_a_loop_have_no_hops() -> None:
+    """Actions may have made one after the latest sample, which says who was served."""
+    policies: list[RoutingPolicy] = []
+
+    class Commanded(RoutingPolicy):
+        commanded = True
+
+        def __init__(self) -> None:
+            super().__init__()
+            policies.append(self)
+
+    network = Network(1, routing=Commanded)
+    network.add_gateway(0, 0.0, 0.0)
+    for node in (1, 2):
+        network.add_router(node, 6.0 * node, 0.0)
+    assert network.run_until(network.all_connected, within_s=60.0)
+    served = frozenset({1, 2})
+    assert route_hops(network, served) == {1: 1, 2: 2}
+    (first,) = (policy for policy in policies if policy.node_id == 1)
+    first.observe()
+    first.act(2)
+    network.run_for(0.1)
+    assert route_hops(network, served) == {}
