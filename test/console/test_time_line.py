@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 from conftest import Visit
 
@@ -17,7 +19,9 @@ def page(start_console, visit) -> Visit:
 
 
 def clock_s(page: Visit) -> float:
-    return float(page.page.inner_text("#clock").split()[0])
+    """NaN before the page has a state to show."""
+    shown = page.page.inner_text("#clock").split()[0]
+    return math.nan if shown == "–" else float(shown)
 
 
 def drag_to(page: Visit, share: float) -> None:
