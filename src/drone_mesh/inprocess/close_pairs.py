@@ -30,7 +30,7 @@ class ClosePairs:
             self._find(places)
         before, self._close = self._close, self._closest(places)
         if not np.array_equal(before, self._close):
-            for pair in np.setxor1d(before, self._close, assume_unique=True).tolist():
+            for pair in map(int, np.setxor1d(before, self._close, assume_unique=True)):
                 yield (*divmod(pair, len(places)), pair in self._close)
 
     def _find(self, places: np.ndarray) -> None:
