@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import itertools
+import math
 import random
 
 import pytest
 from scenarios import LAYOUTS, events, fleet, flown, layout, line, outage, placed, run_until
 
-from drone_mesh.communication.repair.interfaces import IRepairStrategy
+from drone_mesh.communication.repair.interfaces import IRepairStrategy, Step
 from drone_mesh.communication.repair.strategies import (
     REPAIR_STRATEGIES,
     Stay,
 )
 from drone_mesh.communication.routing.child_table_tree import ChildTableTree
 from drone_mesh.communication.wire.messages import GoToLocationMessage
+from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.network import IDEAL_FIEDLER, ORACLE
@@ -52,6 +54,20 @@ def test_a_drone_that_is_cut_off_flies_and_is_connected(repair, routing):
     network = broken_line(repair, routing)
     assert run_until(network, network.all_connected, within_s=180.0)
     assert flown(network) == {3}
+
+
+class ToNowhere(IRepairStrategy):
+    def on_emergency(self):
+        self.mesh.fly(Step(Location(math.nan, 0.0, 0.0)))
+
+
+@pytest.mark.timeout(30)
+def test_a_strategy_that_names_no_place_sends_its_drone_nowhere_and_says_so():
+    network = broken_line(ToNowhere)
+    network.run_for(60.0)
+    assert flown(network) == set()
+    status = network.nodes[3].component.get_repair_status()
+    assert status.reason == "its strategy names no place to fly to"
 
 
 @pytest.mark.parametrize("repair", FLYING)

@@ -208,6 +208,9 @@ class ConnectionRepair(RepairActions):
         """See RepairActions, which describes the functions below as well."""
         if self.why_not_fly():
             return
+        if not all(map(math.isfinite, step.place)):  # beside it no spot would be free
+            self._strategy.reason = "its strategy names no place to fly to"
+            return
         self._report(MeshEventKind.FLIGHT_DECIDED, step.owner)
         flight = self._new_flight(step, self.goal_of(step))
         flight.stops_when_connected = until_connected or step.home

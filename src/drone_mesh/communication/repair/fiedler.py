@@ -12,6 +12,7 @@ from drone_mesh.drone.location import Location
 BOUND = 0.1  # of the second eigenvalue: a line of three at two thirds of the range has 0.13
 HALVINGS = 2  # of a leg that leads too far
 ME = 0  # in the list of places
+MOST_PLACES = 60  # the nearest: the time grows with the third power, and neighbours may lie
 
 
 class Fiedler(BoundedLegs):
@@ -59,4 +60,7 @@ class Fiedler(BoundedLegs):
         mesh = self.mesh
         if self._everybody is not None:
             return [place for node, place in self._everybody().items() if node != mesh.node_id]
-        return [gateway, *self._near(here, {**mesh.reachable(), **mesh.neighbours()}.values())]
+        near = self._near(here, {**mesh.reachable(), **mesh.neighbours()}.values())
+        if len(near) > MOST_PLACES:
+            near = sorted(near, key=here.distance_m)[:MOST_PLACES]
+        return [gateway, *near]

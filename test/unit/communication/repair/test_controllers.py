@@ -18,7 +18,7 @@ from drone_mesh.communication.repair.algebraic_connectivity import (
     weights,
     widest_gap_m,
 )
-from drone_mesh.communication.repair.fiedler import BOUND, Fiedler
+from drone_mesh.communication.repair.fiedler import BOUND, MOST_PLACES, Fiedler
 from drone_mesh.communication.repair.interfaces import NeighbourView
 from drone_mesh.communication.repair.virtual_spring import REST, VirtualSpring, force_m
 from drone_mesh.drone.location import Location
@@ -191,3 +191,13 @@ def test_a_drone_lets_another_one_on_its_way_fly_first_and_then_passes_it(strate
     assert legs == []
     behind.on_time()
     assert len(legs) == 1
+
+
+def test_of_many_claimed_neighbours_only_the_nearest_count():
+    rng = random.Random(1)
+    here, gateway = at(0.0, 0.0), at(-20.0, 0.0)
+    claimed = [at(rng.uniform(-9, 9), rng.uniform(-9, 9)) for _ in range(250)]
+    nearest = sorted(claimed, key=here.distance_m)[:MOST_PLACES]
+    assert decides(Fiedler(), here, gateway, *claimed) == decides(
+        Fiedler(), here, gateway, *nearest
+    )
