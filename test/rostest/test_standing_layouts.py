@@ -111,7 +111,7 @@ class StandingLayoutsTest(unittest.TestCase):
         self.mesh.switch(17, False)
         number = self.order(100)
         wait_for("it waits for 17", FLIGHTS_S, lambda: bytes([17]) == self.waiting(number))
-        wait_for("that is stored", FLIGHTS_S, lambda: self.stored(number) == ["17"])
+        self.assertEqual(self.stored(number), ["17"])
         before = pid_of("/DroneManager")
         os.kill(before, signal.SIGKILL)
         wait_for("another manager", 60, lambda: pid_of("/DroneManager") not in (None, before))

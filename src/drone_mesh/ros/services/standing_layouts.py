@@ -167,8 +167,8 @@ class StandingLayouts:
             self._shown.pop(number, None)
             if progress is None:
                 return None
-            self._later(self._report, progress, handle, True)
             self._save()
+            self._later(self._report, progress, handle, True)
         return progress.in_words()
 
     # Threads of rospy ------------------------------------------------------------------------
@@ -213,13 +213,13 @@ class StandingLayouts:
             changed = [p for p in progresses if self._shown.get(p.number) != p]
             self._shown = {p.number: p for p in progresses if not p.is_over}
             self._orders.forget_complete()
+            if changed:
+                self._save()  # first: what is reported outlives this program
             for progress in changed:
                 handle = self._handles.get(progress.number)
                 if progress.is_over:
                     self._handles.pop(progress.number, None)
                 self._later(self._report, progress, handle)
-            if changed:
-                self._save()
 
     def _save(self) -> None:
         """Store what is left to order, for a restart. The caller holds the lock."""
