@@ -28,12 +28,7 @@ def read_geojson(text: str, origin: Origin) -> Placemarks:
     `height`: metres above the origin. Without it and a third coordinate: 0. Areas are left out.
     Raises ConfigurationError.
     """
-    try:
-        content = json.loads(text)
-    except RecursionError:
-        raise ConfigurationError("nested too deeply") from None
-    except ValueError as error:
-        raise ConfigurationError(f"not JSON: {error}") from error
+    content = read_json(text)
     found = Placemarks()
     for number, feature in enumerate(_features(content), start=1):
         try:
@@ -41,6 +36,16 @@ def read_geojson(text: str, origin: Origin) -> Placemarks:
         except ConfigurationError as error:
             raise ConfigurationError(f"feature {number}: {error}") from error
     return found
+
+
+def read_json(text: str) -> Any:
+    """What a stranger's JSON says. Raises ConfigurationError, one line."""
+    try:
+        return json.loads(text)
+    except RecursionError:
+        raise ConfigurationError("nested too deeply") from None
+    except ValueError as error:
+        raise ConfigurationError(f"not JSON: {error}") from error
 
 
 def geojson_of(found: Placemarks, origin: Origin) -> str:
