@@ -99,7 +99,7 @@ class Neighbours:
         self._stands_since_s = -math.inf  # infinity: this node flies
         self._gateways: dict[int, int] = {}
         self._hops: dict[int, int] = {}
-        self._places: dict[int, HeardPlace] = {}
+        self.places: dict[int, HeardPlace] = {}  # reported, by node; changes only here
         self._goals_s: dict[int, float] = {}  # when those in flight told their goal, their place
         self._seen: dict[int, HeardPlace] = {}  # where these were seen since, perhaps for good
         self.silent = False  # all neighbours (2 or more) fell silent together; none heard since
@@ -215,13 +215,13 @@ class Neighbours:
 
         Or, if `is_goal`, it flies there: that counts as its place from then on.
         """
-        known = self._places.get(node)
+        known = self.places.get(node)
         if known is None or heard_s >= known.heard_s:
             self._goals_s.pop(node, None)
             self._seen.pop(node, None)
             if is_goal:
                 self._goals_s[node] = heard_s
-            self._places[node] = HeardPlace(place, heard_s)
+            self.places[node] = HeardPlace(place, heard_s)
             if known is None or known.place != place:  # most nodes stand
                 self.motion.reported(node, place, heard_s)
 
@@ -237,13 +237,9 @@ class Neighbours:
 
     def place_of(self, node: int) -> HeardPlace | None:
         """The last reported place of `node`."""
-        return self._places.get(node)
+        return self.places.get(node)
 
     def taken(self) -> Iterator[tuple[int, HeardPlace]]:
         """Where each node may be: its reported place, and where it was seen on the way there."""
-        yield from self._places.items()
+        yield from self.places.items()
         yield from self._seen.items()
-
-    def places(self) -> dict[int, HeardPlace]:
-        """All reported places, by node. Do not modify."""
-        return self._places

@@ -12,6 +12,7 @@ from drone_mesh.communication.timing import (
     Due,
 )
 from drone_mesh.drone.flight_path import SPEED_M_S
+from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused, LocationUnknown
@@ -85,13 +86,17 @@ def _is_at(location: Location, place: Location | None) -> bool:
 class Pilot:
     """Flies the drone of one node and watches the flight."""
 
-    def __init__(self, engine: IDroneEngine, deadlines: Deadlines, complaints: Complaints) -> None:
+    def __init__(
+        self, node_id: int, engine: IDroneEngine, deadlines: Deadlines, complaints: Complaints
+    ) -> None:
+        self._node_id = node_id
         self._engine = engine
         self._deadlines = deadlines
         self._complaints = complaints
         self._flight: Flight | None = None
         self.goal: Location | None = None  # of the current flight
         self._origin: Location | None = None  # start of the flight, or of the first of several
+        self.distance_m = math.inf  # straight from there to the goal; infinity: not known
         self.flight_end = ""  # why the last flight ended short of its goal
 
     def location(self) -> Location | None:
@@ -109,13 +114,21 @@ class Pilot:
         except LocationUnknown:
             return None
 
-    def obey(self, goal: Location) -> None:
+    def obey(self, goal: Location) -> bool:
         """Start an ordered flight, or change the goal of the current one.
 
-        Raises GoalRefused, and changes nothing, if the engine refuses the goal.
+        Returns False if the drone already flies there. Raises GoalRefused, and changes nothing, if
+        it cannot fly, or the goal is out of bounds or refused by the engine.
         """
+        check_goal(*goal)
+        why_not = self._engine.why_not_fly()
+        if why_not:
+            raise GoalRefused(f"drone {self._node_id} cannot fly: {why_not}")
+        if self.goal == goal:
+            return False
         self._engine.set_goal(*goal)
         self._begin(goal)
+        return True
 
     def step_back_to(self, goal: Location) -> None:
         """Start a repair flight, or change the goal of the current one."""
@@ -126,16 +139,11 @@ class Pilot:
             flight.may_begin = False
             self._complaints.add("goal refused", str(error), self._deadlines.now_s)
 
-    def distance_m(self) -> float:
-        """Straight distance from the start to the goal of the flight, m; infinity if unknown."""
-        if self._flight is None or self._origin is None:
-            return math.inf
-        return self._origin.distance_m(self._flight.goal)
-
     def _begin(self, goal: Location) -> Flight:
         here = self.location()
         if self._flight is None:
             self._origin = here
+        self.distance_m = math.inf if self._origin is None else self._origin.distance_m(goal)
         self._flight = flight = Flight(goal, here, self.goal, self._deadlines.now_s)
         self.goal = goal
         self._ask_position_later()

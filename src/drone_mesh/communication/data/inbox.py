@@ -10,7 +10,6 @@ from typing import Callable, NamedTuple, Optional
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.ordering import PortOrder
 from drone_mesh.communication.data.packets import COMPLETE, Ack, Head, Poll, Whole
-from drone_mesh.communication.timing import Medium
 
 EXPIRES_S = 60.0  # an incomplete message is dropped after this time without fragments
 MOST_PARTIAL = 24  # incomplete messages of one sender, which has at most 16 under way
@@ -35,7 +34,7 @@ class _Done(NamedTuple):
     After a silence of its sender a fragment 0 or a POLL tells whether the numbers still stand.
     """
 
-    fingerprint: tuple[int, ...]
+    head: Head
     since_s: float
     is_certain: bool = True
 
@@ -44,6 +43,7 @@ class _Done(NamedTuple):
 class _Partial:
     touched_s: float
     head: Head | None = None
+    count: int = 0  # of its fragments, once the head is known
     bodies: dict[int, bytes] = field(default_factory=dict)
     has: int = 0  # the fragments that have arrived, as bits
 
@@ -60,13 +60,12 @@ class Reassembly:
         self._done: OrderedDict[int, _Done] = OrderedDict()  # the latest complete ones, by number
         self._heard_s = -math.inf
 
-    def add(self, index: int, body: bytes, now_s: float) -> Whole | None:
-        """Add a fragment; returns the message if it is complete.
+    def add(self, index: int, head: Head | None, body: bytes, now_s: float) -> Whole | None:
+        """Add a fragment, the first one with its `head`; returns the message if it is complete.
 
         Drops a message that is damaged or not authentic.
         """
         number = body[0]
-        head = packets.head_of(body) if index == 0 else None
         partial = self._partial.get(number)
         known = None if partial is None else partial.head
         is_other = head and known and known.fingerprint != head.fingerprint
@@ -76,16 +75,15 @@ class Reassembly:
                 self._partial.popitem(last=False)
             partial = self._partial[number] = _Partial(now_s)
         partial.touched_s = now_s
-        head = partial.head = head or partial.head
+        if head is not None:
+            partial.head, partial.count = head, packets.count_of(head.length, self._room)
+        head, count = partial.head, partial.count
         partial.bodies[index] = body
         partial.has |= 1 << index
-        if head is None:
-            return None
-        count = packets.count_of(head.length, self._room)
-        if partial.has & (1 << count) - 1 != (1 << count) - 1:
+        if head is None or partial.has & (1 << count) - 1 != (1 << count) - 1:
             return None
         del self._partial[number]
-        bodies = [partial.bodies[n] for n in range(count)]
+        bodies = list(map(partial.bodies.__getitem__, range(count)))
         sealed = packets.joined(bodies, head.length, self._room)
         place = head.session, head.port, head.order
         if packets.checksum(*place, sealed) != head.checksum:
@@ -94,27 +92,26 @@ class Reassembly:
         if payload is None or len(payload) > packets.MAX_MESSAGE_BYTES:
             return None
         self._done.pop(number, None)
-        self._done[number] = _Done(head.fingerprint, now_s)
+        self._done[number] = _Done(head, now_s)
         while len(self._done) > _LIVE:
             self._done.popitem(last=False)
-        return Whole(head, payload)
+        return Whole(head, payload, count)
 
     def __len__(self) -> int:
         """The number of incomplete messages."""
         return len(self._partial)
 
-    def is_done(self, index: int, body: bytes) -> bool:
+    def is_done(self, number: int, head: Head | None) -> bool:
         """Whether a fragment belongs to a complete message, so that it is a duplicate.
 
         Call `heard` before.
         """
-        number = body[0]
         done = self._done.get(number)
         if done is None:
             return False
-        if index > 0:
+        if head is None:
             return done.is_certain
-        if packets.head_of(body).fingerprint != done.fingerprint:
+        if head.fingerprint != done.head.fingerprint:
             del self._done[number]
             return False
         self._numbers_stand()
@@ -124,7 +121,7 @@ class Reassembly:
     def asked_about(self, number: int, checksum: int) -> None:
         """The sender asks for its message with this checksum. Call `heard` before."""
         done = self._done.get(number)
-        if done is not None and done.fingerprint[-1] != checksum:
+        if done is not None and done.head.checksum != checksum:
             del self._done[number]
         elif done is not None:
             self._numbers_stand()
@@ -158,9 +155,7 @@ class Reassembly:
     def lacks_only_earlier(self, number: int, index: int) -> bool:
         """Whether `index` is the last fragment of a message and others of it are missing."""
         partial = self._partial.get(number)
-        if partial is None or partial.head is None:
-            return False
-        return index == packets.count_of(partial.head.length, self._room) - 1
+        return partial is not None and index == partial.count - 1
 
     def newest_done(self) -> tuple[int, int]:
         """Number of the latest complete message, and the complete ones up to it as bits."""
@@ -185,12 +180,12 @@ class Inbox:
     # no ACK.
     _acknowledge: Callable[[Ack], None] | None
     _open: Open
-    _medium: Medium
+    _slowness: float = 1.0  # of the medium, as a factor
 
     def __post_init__(self) -> None:
-        self._ack_delay_s = self._medium.stretched(ACK_DELAY_S)
-        self._ack_within_s = self._medium.stretched(ACK_LATEST_S)
-        self._repeat_s = self._medium.stretched(REPEAT_S)
+        self._ack_delay_s = self._slowness * ACK_DELAY_S
+        self._ack_within_s = self._slowness * ACK_LATEST_S
+        self._repeat_s = self._slowness * REPEAT_S
         self._session = -1
         self._former = (-1, -math.inf)  # the session before, and when it ended
         self._reassembly = Reassembly(self._room, self._open)
@@ -204,25 +199,25 @@ class Inbox:
     def fragment(self, index: int, body: bytes, now_s: float) -> list[Whole]:
         """Process a fragment; returns deliverable messages. Raises PacketError if damaged."""
         held: list[Whole] = []
-        if index == 0:
-            session = packets.head_of(body).session
+        head = packets.head_of(body) if index == 0 else None
+        if head is not None:
             former, ended_s = self._former
-            if session == former and now_s - ended_s < FORMER_SESSION_S:
+            if head.session == former and now_s - ended_s < FORMER_SESSION_S:
                 return []  # it is late
-            if session != self._session:
-                held = self._start_over(session, now_s)
-        return held + self._accept(index, body, now_s)
+            if head.session != self._session:
+                held = self._start_over(head.session, now_s)
+        return held + self._accept(index, head, body, now_s)
 
-    def _accept(self, index: int, body: bytes, now_s: float) -> list[Whole]:
+    def _accept(self, index: int, head: Head | None, body: bytes, now_s: float) -> list[Whole]:
         """Process a fragment of the current session; returns deliverable messages."""
         if now_s < self.ack_due_s < math.inf:
             self.ack_due_s = min(now_s + self._ack_delay_s, self._ack_latest_s)
         number, reassembly = body[0], self._reassembly
         reassembly.heard(number, now_s)
-        if reassembly.is_done(index, body):
+        if reassembly.is_done(number, head):
             self._repeat_ack(number, now_s)
             return []
-        whole = reassembly.add(index, body, now_s)
+        whole = reassembly.add(index, head, body, now_s)
         if whole is None:
             if reassembly.lacks_only_earlier(number, index):
                 self._repeat_ack(number, now_s)
@@ -234,7 +229,7 @@ class Inbox:
     @property
     def unfinished(self) -> bool:
         """Whether messages are incomplete, or wait for earlier ones."""
-        return len(self._reassembly) > 0 or any(order.holds for order in self._ports.values())
+        return len(self._reassembly) > 0 or any(order.held for order in self._ports.values())
 
     def poll(self, poll: Poll, now_s: float) -> None:
         """The sender asks for an ACK: it is due now."""
@@ -262,7 +257,7 @@ class Inbox:
         self._reassembly.expire(now_s)
         overdue = []
         for order in self._ports.values():
-            if order.holds:
+            if order.held:
                 overdue += order.overdue(now_s)
         return overdue
 
@@ -282,12 +277,12 @@ class Inbox:
         self._ports[key] = order = self._ports.pop(key, None) or PortOrder()
         if len(self._ports) > MOST_PORTS:
             oldest = next(iter(self._ports))
-            idle = (one for one, its in self._ports.items() if one != key and not its.holds)
+            idle = (one for one, its in self._ports.items() if one != key and not its.held)
             del self._ports[next(idle, oldest)]  # what waits was acknowledged
         return order
 
     def _completed(self, whole: Whole, index: int, now_s: float) -> None:
-        count = packets.count_of(whole.head.length, self._room)
+        count = whole.count
         self._complete = whole.head.number
         self._unacknowledged += count
         if self._unacknowledged >= ACK_AT or index != count - 1:

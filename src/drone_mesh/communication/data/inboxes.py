@@ -72,7 +72,9 @@ class Inboxes:
     def __post_init__(self) -> None:
         self._inboxes: OrderedDict[tuple[int, bool], Inbox] = OrderedDict()  # last used last
         self._tidy_s = math.inf
-        self._turns = AckTurns(self._antenna.medium, self._antenna.patience)
+        medium = self._antenna.medium
+        self._slowness = medium.stretched(1.0)
+        self._turns = AckTurns(medium, self._antenna.patience)
 
     @property
     def due_s(self) -> float:
@@ -119,8 +121,7 @@ class Inboxes:
             acknowledge = None if to_all else functools.partial(self._acknowledge, sender)
             receiver = TO_ALL if to_all else self._node_id
             open_message = functools.partial(self._seals.open_message, sender, receiver)
-            medium = self._antenna.medium
-            self._inboxes[key] = Inbox(self._room, acknowledge, open_message, medium)
+            self._inboxes[key] = Inbox(self._room, acknowledge, open_message, self._slowness)
         self._inboxes.move_to_end(key)
         return self._inboxes[key]
 

@@ -26,7 +26,7 @@ class PortOrder:
 
     def __init__(self) -> None:
         self._next: int | None = None  # the place of the message to deliver next
-        self._held: dict[int, tuple[Whole, float]] = {}  # complete, but earlier ones are missing
+        self.held: dict[int, tuple[Whole, float]] = {}  # complete, but earlier ones are missing
         self._given_up: deque[int] = deque(maxlen=MOST_BEHIND)  # places that were not waited for
 
     def add(self, whole: Whole, now_s: float) -> list[Whole]:
@@ -45,23 +45,18 @@ class PortOrder:
             self._given_up.remove(order)
             if ahead(order, self._next) < 0:
                 return [whole]
-        if ahead(order, self._next) < 0 or order in self._held:
+        if ahead(order, self._next) < 0 or order in self.held:
             return []
-        self._held[order] = whole, now_s
+        self.held[order] = whole, now_s
         return self._ready_up_to(oldest)
 
     def overdue(self, now_s: float) -> list[Whole]:
         """Messages that have waited for so long that no earlier one can arrive."""
-        waited = [order for order, (_, since_s) in self._held.items() if now_s - since_s >= HOLD_S]
+        waited = [order for order, (_, since_s) in self.held.items() if now_s - since_s >= HOLD_S]
         if not waited or self._next is None:
             return []
         next_place = self._next
         return self._ready_up_to(max(waited, key=lambda order: ahead(order, next_place)))
-
-    @property
-    def holds(self) -> bool:
-        """Whether messages wait for earlier ones."""
-        return bool(self._held)
 
     def _ready_up_to(self, oldest: int) -> list[Whole]:
         """The held messages before `oldest`, and those from there up to the first gap.
@@ -71,13 +66,13 @@ class PortOrder:
         ready = []
         place = self._next if self._next is not None else oldest
         for back in range(min(ahead(oldest, place), MOST_BEHIND), 0, -1):
-            if (oldest - back) & 0xFFFF not in self._held:
+            if (oldest - back) & 0xFFFF not in self.held:
                 self._given_up.append((oldest - back) & 0xFFFF)
-        while ahead(oldest, place) > 0 or place in self._held:
-            held = self._held.pop(place, None)
+        while ahead(oldest, place) > 0 or place in self.held:
+            held = self.held.pop(place, None)
             if held is not None:
                 ready.append(held[0])
-            elif not self._held:
+            elif not self.held:
                 place = oldest
                 break
             place = (place + 1) & 0xFFFF

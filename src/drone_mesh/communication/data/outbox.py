@@ -27,6 +27,7 @@ from drone_mesh.communication.data.outgoing import (
 )
 from drone_mesh.communication.data.pacing import CongestionWindow, RoundTrip, Train
 from drone_mesh.communication.data.packets import COMPLETE, NO_ANSWER, Ack, Poll
+from drone_mesh.communication.interfaces import NO_ROUTE
 
 MOST_DOUBLED = 6  # with a search of half a second, to about half a minute
 
@@ -54,9 +55,6 @@ class Outbox:
         self._misses = 0  # times that a node had no route to the receiver, since its last answer
         self._search_ends_s = -math.inf  # when it may have been found
         self.not_before_s = -math.inf  # no route: time of the next attempt
-
-    def __len__(self) -> int:
-        return len(self.waiting) + len(self._open)
 
     def __iter__(self) -> Iterator[OutgoingMessage]:
         """All messages, oldest first."""
@@ -95,7 +93,8 @@ class Outbox:
         if unanswered:
             return None
         if train is None:
-            return self._fragment(self._in_flight(), self._window.size)
+            has_more = self.waiting or any(message.to_send for message in opened)
+            return self._fragment(self._in_flight(), self._window.size) if has_more else None
         if train.is_full and (self._may_open() or any(message.to_send for message in opened)):
             return self._asking(self._latest, ends_train=True)
         fragment = self._fragment(0, math.inf)
@@ -194,11 +193,11 @@ class Outbox:
             times_s += [message.asked_s + self._timeout_s(message) for message in asked]
         return min(times_s, default=math.inf)
 
-    def expire(self, now_s: float, has_route: bool) -> None:
-        """Give up messages that waited for too long."""
+    def expire(self, now_s: float, direction: Callable[[int], int]) -> None:
+        """Give up messages that waited for too long; `direction`: the next hop to a node."""
         for message in list(self):
             if now_s >= message.expires_s:
-                has_way = has_route and not self._misses
+                has_way = direction(self.to) != NO_ROUTE and not self._misses
                 what = "no acknowledgement from" if has_way else "no route to"
                 where = destination_in_words(self.to)
                 reason = f"{what} {where} for {LIFETIME_S:.0f} s{self._hint()}"

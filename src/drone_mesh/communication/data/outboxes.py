@@ -51,13 +51,10 @@ class Outboxes:
     def __post_init__(self) -> None:
         self._medium = self._antenna.medium
         self._was_lost = False
+        self._gateway = NO_ROUTE  # the one whose outbox has the messages for the gateway
         self._session: int | None = None
         self._outboxes: OrderedDict[int, Outbox] = OrderedDict()  # the next one to send is first
         self._for_gateway: list[OutgoingMessage] = []  # wait until there is one
-
-    def __len__(self) -> int:
-        """Messages waiting or under way."""
-        return len(self._for_gateway) + sum(map(len, self._outboxes.values()))
 
     def add(self, message: OutgoingMessage) -> None:
         """Add a message for the destination of its ticket."""
@@ -84,9 +81,10 @@ class Outboxes:
         now_s = self._deadlines.now_s
         if not self._for_gateway and all(box.is_idle for box in self._outboxes.values()):
             return math.inf
-        self._follow_gateway()
-        self._yield_to_repair()
+        gateway, connected = self._control.gateway, self._control.connected
         left = min(BURST, self._antenna.data_room())
+        self._follow(gateway)
+        self._yield_to_repair(lost=gateway != NO_ROUTE and not connected)
         idle = 0
         while left > 0 and idle < len(self._outboxes):
             to, outbox = next(iter(self._outboxes.items()))
@@ -97,8 +95,8 @@ class Outboxes:
                 idle += 1
         soon_s = now_s + self._medium.data_pause_s
         again_s = soon_s if left <= 0 else math.inf
-        for to, outbox in self._outboxes.items():
-            outbox.expire(now_s, self._direction(to) != NO_ROUTE)
+        for outbox in self._outboxes.values():
+            outbox.expire(now_s, self._direction)
             due_s = outbox.due_s(now_s)
             again_s = min(again_s, due_s if due_s > now_s else soon_s)  # it could not be sent
         if self._for_gateway:
@@ -142,13 +140,12 @@ class Outboxes:
         outbox.blocked(self.unreachable(outbox.to))
         return False
 
-    def _yield_to_repair(self) -> None:
+    def _yield_to_repair(self, lost: bool) -> None:
         """On a shared channel, a node that lost its gateway sends no messages that it repeats.
 
         They would keep the channel busy for the packets that mend the mesh.
         """
-        control, now_s = self._control, self._deadlines.now_s
-        lost = not control.connected and control.gateway != NO_ROUTE
+        now_s = self._deadlines.now_s
         for outbox in self._outboxes.values():
             if not lost and self._was_lost:
                 outbox.ask_anew(now_s)
@@ -161,9 +158,9 @@ class Outboxes:
         direction = to if to == TO_ALL else self._control.routes.get_direction_to_node(to)
         return self._control.delivery.default_hop() if direction == NO_ROUTE else direction
 
-    def _follow_gateway(self) -> None:
+    def _follow(self, gateway: int) -> None:
         """Move messages for the gateway to the one that this node uses now."""
-        gateway, now_s = self._control.gateway, self._deadlines.now_s
+        now_s = self._deadlines.now_s
         if gateway == NO_ROUTE:
             for message in list(self._for_gateway):
                 ticket = message.ticket
@@ -174,9 +171,9 @@ class Outboxes:
                     self._ended(TicketState.GIVEN_UP)
             return
         waiting, self._for_gateway = self._for_gateway, []
-        for to, outbox in self._outboxes.items():
-            if to not in (gateway, TO_ALL):
-                waiting += outbox.take(TO_GATEWAY)
+        before, self._gateway = self._gateway, gateway
+        if before != gateway and before in self._outboxes:
+            waiting += self._outboxes[before].take(TO_GATEWAY)
         for message in sorted(waiting, key=lambda message: message.ticket.number):
             if gateway == self._node_id:
                 self._to_self(message)

@@ -78,6 +78,7 @@ class Whole(NamedTuple):
 
     head: Head
     payload: bytes
+    count: int = 1  # of its fragments
 
 
 class Ack(NamedTuple):

@@ -135,6 +135,7 @@ class Transport:
         figures = self._figures
         self._figures = figures._replace(
             messages_sent=figures.messages_sent + 1,
+            messages_queued=figures.messages_queued + 1,
             bytes_sent=figures.bytes_sent + len(payload),
             sent_s=now_s,
         )
@@ -194,10 +195,10 @@ class Transport:
                 if not to_all or self._flood.repeat(payload):
                     self._inboxes.fragment(creator, to_all, kind - packets.FRAGMENTS.start, body)
             elif kind == packets.ACK:
-                plain = packets.untagged(body)
+                plain, ack = packets.untagged(body), packets.ack_of(body)
                 tag = self._seals.acknowledgement_tag(creator, self._node_id, plain)
                 if hmac.compare_digest(tag, body[len(plain) :][: len(tag)]):  # a relay could forge
-                    self._outboxes.answered(creator, packets.ack_of(body))
+                    self._outboxes.answered(creator, ack)
                 else:
                     self._complaints.dropped("an acknowledgement without proof", payload, now_s)
             elif kind == packets.POLL:
@@ -232,10 +233,8 @@ class Transport:
 
     def _work(self) -> None:
         """Send what may be sent now, and schedule the next time."""
-        again_s, queued = self._outboxes.send(), len(self._outboxes)
+        again_s = self._outboxes.send()
         self._deadlines.set(Due.DATA, min(again_s, self._inboxes.due_s))
-        if queued != self._figures.messages_queued:
-            self._figures = self._figures._replace(messages_queued=queued)
 
     def _send_packet(self, kind: int, to: int, body: bytes) -> bool:
         me = self._node_id
@@ -254,16 +253,17 @@ class Transport:
         if not 0 <= port <= packets.MAX_DATA_PORT:
             raise MessageRefused(f"invalid port {port}: must be 0..{packets.MAX_DATA_PORT}")
         packets.check_size(payload)
-        queued = len(self._outboxes)
+        queued = self._figures.messages_queued
         if queued >= MOST_QUEUED:
             raise QueueFull(f"the queue is full: {queued} messages wait or are on their way")
 
     def _ended(self, state: TicketState) -> None:
         figures = self._figures
-        if state is TicketState.DELIVERED:
-            self._figures = figures._replace(messages_delivered=figures.messages_delivered + 1)
-        elif state is TicketState.GIVEN_UP:
-            self._figures = figures._replace(messages_given_up=figures.messages_given_up + 1)
+        self._figures = figures._replace(
+            messages_queued=figures.messages_queued - 1,
+            messages_delivered=figures.messages_delivered + (state is TicketState.DELIVERED),
+            messages_given_up=figures.messages_given_up + (state is TicketState.GIVEN_UP),
+        )
 
     def _to_self(self, message: OutgoingMessage) -> None:
         ticket = message.ticket

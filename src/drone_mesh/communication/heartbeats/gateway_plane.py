@@ -47,11 +47,6 @@ class GatewayHeartbeats(HeartbeatPlane):
         """Hops to the gateway that it uses; 0 to itself."""
         return self._connection.hops if self.connected else NO_ROUTE
 
-    @property
-    def connected(self) -> bool:
-        """Whether it has internet, or reaches another gateway."""
-        return self._connection.connected
-
     def on_internet(self, works: bool) -> None:
         """Be a gateway, or a router that says so to all who take it for one."""
         self._to_another.end(RouterEvent.ROUTE_LOST)

@@ -173,7 +173,7 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
 
     @property
     def connected(self) -> bool:
-        return self._states.connected
+        return self._connection.connected
 
     def next_hop(self) -> int:
         return self._connection.next_hop()

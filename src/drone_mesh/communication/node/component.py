@@ -125,7 +125,7 @@ class MeshnetworkComponent(NodeSnapshots, IMeshNetwork, IControlHost):
             self._frame, self.places, complaints, deadlines, self._options.range_m
         )
         self._engine = engine
-        self._pilot = Pilot(engine, deadlines, complaints)
+        self._pilot = Pilot(node_id, engine, deadlines, complaints)
         node = ControlledNode(
             node_id=node_id,
             host=self,

@@ -76,7 +76,7 @@ class RouterFlights(Flights):
         """Whether most neighbours will remain in reach, so that the router remains a relay."""
         if not self._states.connected or self._states.repair is RepairState.FLYING:
             return False
-        return self._pilot.distance_m() <= SHORT_FLIGHT * self._repair.range_m
+        return self._pilot.distance_m <= SHORT_FLIGHT * self._repair.range_m
 
     @due(Due.GOAL)
     def announce_goal_again(self) -> None:

@@ -79,7 +79,7 @@ class FinalPlaces:
             if place is not None and (known is None or since_s >= known.since_s):
                 places[drone] = _Place(since_s, place)
 
-        here, others = self._pilot.place(), self._neighbours.places()
+        here, others = self._pilot.place(), self._neighbours.places
         note(self._node_id, self._deadlines.now_s, here)
         for node, heard in others.items():
             note(node, heard.heard_s, heard.place)

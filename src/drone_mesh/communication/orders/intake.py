@@ -23,7 +23,6 @@ from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.messages import HEADER_BYTES, GoToLocationMessage, order_number
 from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.communication.wire.text_parts import is_valid, split
-from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused
@@ -156,7 +155,7 @@ class OrderIntake:
         if number:
             self._remember(order)
         try:
-            starts = self._obey(goal)
+            starts = self._pilot.obey(goal)
         except GoalRefused as error:
             self._reply(order, OrderOutcome.REFUSED, str(error))
             raise
@@ -216,17 +215,6 @@ class OrderIntake:
         for order in self._known:
             if order.tries_left:
                 self._send(order)
-
-    def _obey(self, goal: Location) -> bool:
-        """Start the flight; returns False if the drone already flies there."""
-        check_goal(*goal)
-        why_not = self._engine.why_not_fly()
-        if why_not:
-            raise GoalRefused(f"drone {self._node_id} cannot fly: {why_not}")
-        if self._pilot.goal == goal:
-            return False
-        self._pilot.obey(goal)
-        return True
 
     def _find(self, gateway: int, number: int) -> _KnownOrder | None:
         found = (one for one in self._known if (one.gateway, one.number) == (gateway, number))

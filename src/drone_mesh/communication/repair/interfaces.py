@@ -145,7 +145,7 @@ class RepairActions(abc.ABC):
 
     def reachable(self) -> Mapping[int, NeighbourView]:
         """All nodes with a route to them and a reported place."""
-        places = self._neighbours.places()
+        places = self._neighbours.places
         return {node: self.view(node) for node in places if self.reaches(node)}
 
     def reaches(self, node: int) -> bool:

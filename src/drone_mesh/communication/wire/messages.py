@@ -274,6 +274,9 @@ type_of: Callable[[bytes], int] = operator.itemgetter(TYPE_AT)
 addressee: Callable[[bytes], int] = operator.itemgetter(FORWARD_AT)
 """The final addressee of a packet, or BROADCAST."""
 
+body: Callable[[bytes], bytes] = operator.itemgetter(slice(HEADER_BYTES, None))
+"""The 27 bytes after the header."""
+
 
 def is_jittered(payload: bytes) -> bool:
     """Whether a broadcast of this type has to wait for a random time."""
@@ -439,11 +442,6 @@ def with_order_number(order: bytes, number: int) -> bytes:
     """The same MOVE_TO_LOCATION with this number."""
     end = _ORDER_NUMBER_AT + _ORDER_NUMBER.size
     return order[:_ORDER_NUMBER_AT] + _ORDER_NUMBER.pack(number) + order[end:]
-
-
-def body(payload: bytes) -> bytes:
-    """The 27 bytes after the header."""
-    return payload[HEADER_BYTES:]
 
 
 def identity(payload: bytes) -> bytes:

@@ -10,7 +10,7 @@ from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.inbox import ACK_DELAY_S, Inbox
 from drone_mesh.communication.data.inboxes import TURN_S, AckTurns
 from drone_mesh.communication.data.packets import Head, Poll
-from drone_mesh.communication.timing import FAST_HOP_S, UNDISTURBED, Medium
+from drone_mesh.communication.timing import FAST_HOP_S, Medium
 
 ROOM = 27
 BUSY = 2.5
@@ -30,7 +30,6 @@ class Receiver:
                     (round(self.now_s, 3), sender, ack.number)
                 ),
                 lambda _place, sealed: sealed,
-                UNDISTURBED,
             )
             for sender in range(3)
         ]

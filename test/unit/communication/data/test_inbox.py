@@ -12,7 +12,7 @@ from drone_mesh.communication.data.inbox import MOST_PORTS, Inbox
 from drone_mesh.communication.data.ordering import PortOrder
 from drone_mesh.communication.data.outgoing import LIFETIME_S
 from drone_mesh.communication.data.packets import Head, Poll, Whole
-from drone_mesh.communication.timing import UNDISTURBED, Deadlines
+from drone_mesh.communication.timing import Deadlines
 
 ROOM = 27
 OLD, NEW = 7, 8  # sessions of the sender
@@ -27,7 +27,6 @@ class Receiver:
             ROOM,
             self._acknowledge,
             lambda _place, sealed: sealed,
-            UNDISTURBED,
         )
         self.now_s = 0.0
         self.latest = None

@@ -8,7 +8,6 @@ from data_rig import ROOM, outbox_to_0, submit
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.inbox import Inbox
 from drone_mesh.communication.data.outgoing import LIFETIME_S
-from drone_mesh.communication.timing import UNDISTURBED
 
 
 class Link:
@@ -17,7 +16,7 @@ class Link:
     def __init__(self, reliable):
         self.reliable, self.count = reliable, 0
         self.outbox = outbox_to_0(session=0xFFFF)
-        self.inbox = Inbox(ROOM, lambda ack: None, lambda _place, sealed: sealed, UNDISTURBED)
+        self.inbox = Inbox(ROOM, lambda ack: None, lambda _place, sealed: sealed)
 
     def send(self, heard=True):
         """Send a message with its number; the sender gives it up. Returns what is delivered."""
@@ -27,7 +26,7 @@ class Link:
         packet = self.outbox.next_packet(0.0)
         self.outbox.on_sent(packet, 0.0)
         if self.reliable:
-            self.outbox.expire(LIFETIME_S, has_route=True)
+            self.outbox.expire(LIFETIME_S, direction=lambda to: to)
         if not heard:
             return []
         wholes = self.inbox.fragment(packet.kind - packets.FRAGMENTS.start, packet.body, 0.0)
