@@ -11,7 +11,6 @@ from proofs import attacks, claims, damage
 
 from drone_mesh.communication.beacon.connection import AGAIN_S, PERIOD_S
 from drone_mesh.communication.beacon.times import JITTER
-from drone_mesh.communication.control import control_plane
 from drone_mesh.communication.data import packets as data
 from drone_mesh.communication.events import complaints
 from drone_mesh.communication.heartbeats import detours, node_search
@@ -19,7 +18,7 @@ from drone_mesh.communication.interfaces import BROADCAST, MAX_NODE_ID, PAYLOAD_
 from drone_mesh.communication.repair import election
 from drone_mesh.communication.seals import end_to_end, keys, message_seal, replay, seal
 from drone_mesh.communication.seals import sealed_antenna as antenna
-from drone_mesh.communication.timing import LIMIT_PERIOD_S, REPEATS, STRANGERS, MeshTiming
+from drone_mesh.communication.timing import LIMIT_PERIOD_S, QUEUED, REPEATS, STRANGERS, MeshTiming
 from drone_mesh.communication.wire.messages import TO_AT
 from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.internet import guarded_app
@@ -88,7 +87,7 @@ SENTENCES = [
     f"| one in {detours.AVOIDED_S:g} s |",
     f"after {node_search.FIRST_PAUSE_S:g}, {2 * node_search.FIRST_PAUSE_S:g}, "
     f"{4 * node_search.FIRST_PAUSE_S:g} s and so on up to {node_search.LONGEST_PAUSE_S:g} s; "
-    f"on a shared channel one in {control_plane.SEARCH_AGAIN_S:g} s. Each",
+    f"on a shared channel one in {QUEUED.search_pause_s:g} s. Each",
     f"bytes 0..{seal.SEAL_AT - 1}, under the key of the pair. Packets with forward {BROADCAST}",
     f"byte {TO_AT} counts as {BROADCAST}",
     f"random number of {seal._EPOCH_BITS} bits that a node draws at each start",

@@ -68,6 +68,51 @@ FAST_HOP_S = 0.0026  # of an nRF24L01+ at 250 kbit/s; the times of the mesh suit
 
 
 @dataclass(frozen=True)
+class Policy:
+    """What the mesh does because of how its packets are delivered, whatever a hop takes.
+
+    The defaults are those of immediate delivery, on links that do not disturb each other: a send
+    tells at once whether the packet arrived.
+    """
+
+    queued: bool = False  # the antenna queues packets, and reports their fate later
+    one_loss_counts: bool = True  # who does not take one packet is lost
+    losses_noticed_late: bool = False  # maybe by a later check than the others' losses
+    checks_soon: bool = False  # after the loss of a neighbour: what else has changed?
+    asks_in_turn: bool = False  # the neighbours for a gateway, instead of all at once
+    searches_from_start: bool = False  # before its first gateway, too, it presents itself again
+    answers_prove_relays: bool = False  # that forward them from the gateway
+    announces_flights: bool = False  # ordered ones: neighbours that will be lost look for a way
+    drops_are_certain: bool = True  # no copy of an order passed a relay that says so
+    search_within_s: float = 0.0  # orders: a gateway searches for who was heard within this time
+    search_pause_s: float = 0.0  # between two searches of a node, each a broadcast of all nodes
+    ask_sealed_s: float = 0.3  # a flight asks for places so often, if they are sealed
+    data_in_trains: bool = False  # over relays, which cannot receive while they send
+    data_yields: bool = False  # what is repeated, while this node looks for a gateway
+    challenges_all: bool = False  # by broadcast, if many that may not exist are to be challenged
+
+
+IMMEDIATE = Policy()
+QUEUED = Policy(
+    queued=True,
+    one_loss_counts=False,
+    losses_noticed_late=True,
+    checks_soon=True,
+    asks_in_turn=True,
+    searches_from_start=True,
+    answers_prove_relays=True,
+    announces_flights=True,
+    drops_are_certain=False,
+    search_within_s=600.0,
+    search_pause_s=0.3,
+    ask_sealed_s=1.0,  # takes a handshake, too
+    data_in_trains=True,
+    data_yields=True,
+    challenges_all=True,
+)
+
+
+@dataclass(frozen=True)
 class Medium:
     """Properties of a medium. The defaults are those of links that do not disturb each other.
 
@@ -81,17 +126,17 @@ class Medium:
     * MISSING is one broadcast, and the same node is not announced again within `missing_quiet_s`;
     * a node that looks for a gateway is answered by one PRESENT for all, after a random part of
       `answer_spread_s`, unless another node answered first (Trickle, RFC 6206: suppression);
-    * a router asks one neighbour at a time for its gateway, for `answer_s`;
+    * a router that asks its neighbours in turn for a gateway waits `answer_s` for each;
     * what is known to work is not probed in each round: a neighbour that was heard within
       `heard_periods` check periods, or longer on a busy channel (IWirelessCommunication.patience).
-      A gateway's answer that a router forwards proves its own connection, too (the data-path
-      validation of CTP: Gnawali et al., Collection Tree Protocol, 2009);
+      Nor what is proved by answers to others (the data-path validation of CTP: Gnawali et al.,
+      Collection Tree Protocol, 2009);
     * a place is asked for again after `place_periods` check periods;
     * a gateway counts as lost after `heartbeats` unanswered ones.
     """
 
     hop_s: float = 0.002  # one packet and its acknowledgement, from the decision to listening again
-    shared: bool = False
+    policy: Policy = IMMEDIATE
     answer_s: float = HEARTBEAT_ANSWER_S  # how long to wait for the answer to a heartbeat
     answer_per_hop_s: float = 0.0  # additional time for each hop to the gateway
     heartbeats: int = 1
@@ -109,7 +154,7 @@ class Medium:
         fast = cls(hop_s)
         return cls(
             hop_s,
-            shared=True,
+            QUEUED,
             answer_s=fast.stretched(1.0),
             answer_per_hop_s=100 * hop_s,
             heartbeats=3,

@@ -9,7 +9,7 @@ import pytest
 from slow_radio import HOP_S, SlowAir
 
 from drone_mesh.communication.events.observer import MeshEventKind
-from drone_mesh.communication.timing import UNDISTURBED, Medium, MeshTiming
+from drone_mesh.communication.timing import QUEUED, UNDISTURBED, Medium, MeshTiming
 from drone_mesh.inprocess import Network
 from drone_mesh.nrf24.settings import DataRate, RadioSettings
 
@@ -71,7 +71,7 @@ def test_on_an_nrf24_no_time_of_the_mesh_is_stretched(rate, hop_s):
     medium = RadioSettings(data_rate=rate).medium
     assert medium == Medium(
         hop_s,
-        shared=True,
+        QUEUED,
         answer_s=1.0,
         answer_per_hop_s=100 * hop_s,
         heartbeats=3,

@@ -51,7 +51,7 @@ class BeaconPlane(IControlPlane):
             is_gateway,
             node.range_m,
             node.neighbours.place_of,
-            medium.shared,
+            medium.policy.one_loss_counts,
             node.deadlines,
             node.seals.may_be_gateway,
         )
@@ -63,7 +63,7 @@ class BeaconPlane(IControlPlane):
         self._trickle = Trickle(medium, node.rng)
         self._searches = Searches(self._me, self._routes, self._broadcast, medium.hop_s)
         self._verdicts = Verdicts(self._routes, self._searches, self._deadlines)
-        carry = QueuedCourier if medium.shared else Courier
+        carry = QueuedCourier if medium.policy.queued else Courier
         self._courier = self.delivery = carry(
             self._me,
             self._antenna,

@@ -67,7 +67,7 @@ class BeaconRoutes(IRoutes):
     _is_gateway: bool
     _range_m: float
     _place_of: Callable[[int], HeardPlace | None]  # where a node was seen last
-    shared: bool  # whether the channel is
+    one_loss_counts: bool  # see Policy
     clock: Deadlines
     _may_be_gateway: Callable[[int], bool] = lambda _node: True  # as for IMeshSeals
 
@@ -198,7 +198,7 @@ class BeaconRoutes(IRoutes):
         return self.gateway, self.hops, self.offline
 
     def failed(self, node: int) -> bool:
-        """A neighbour did not take a packet. On a shared channel that says little, once.
+        """A neighbour did not take a packet. Where losses are usual, one says little.
 
         Returns whether it is now known to be deaf to this node.
         """
@@ -208,7 +208,7 @@ class BeaconRoutes(IRoutes):
         was_deaf = neighbour.deaf
         neighbour.refuses(now_s)
         is_due = now_s - neighbour.alive_s <= DUE * neighbour.beacon.interval_s
-        if not self.shared or not is_due or neighbour.doubted_s > neighbour.alive_s:
+        if self.one_loss_counts or not is_due or neighbour.doubted_s > neighbour.alive_s:
             neighbour.failed_s = now_s
         neighbour.doubted_s = now_s
         return neighbour.deaf and not was_deaf

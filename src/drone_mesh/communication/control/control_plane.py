@@ -29,7 +29,6 @@ from drone_mesh.communication.timing import Deadlines, MeshTiming
 Learn = Callable[[int, int, int, bytes], bool]
 Forward = Callable[[bytes, int, int, int, int, float], None]
 
-SEARCH_AGAIN_S = 0.3  # between two searches of a node; each is one broadcast by every node
 NUMBERS_PER_S = 16  # of searches and orders: a restarted gateway starts at another number
 
 
@@ -190,7 +189,7 @@ class IControlPlane(abc.ABC):
     # Questions -------------------------------------------------------------------------------
 
     def search(self, node: int) -> bool:
-        """Look for a node without a known route. False: not now; ask again after SEARCH_AGAIN_S."""
+        """Look for a node without a known route. False: not now, but after `search_pause_s`."""
         return False
 
     def heard_s(self, node: int) -> float:

@@ -115,7 +115,7 @@ class Outboxes:
             return False
         if outbox.to != TO_ALL and not self._may_reach(outbox, now_s):
             return False
-        if self._medium.shared and outbox.to != TO_ALL:
+        if self._medium.policy.data_in_trains and outbox.to != TO_ALL:
             outbox.set_relayed(self._direction(outbox.to) != outbox.to)
         packet = outbox.next_packet(now_s)
         if packet is None:
@@ -149,7 +149,7 @@ class Outboxes:
         for outbox in self._outboxes.values():
             if not lost and self._was_lost:
                 outbox.ask_anew(now_s)
-            elif lost and self._medium.shared and outbox.repeats:
+            elif lost and self._medium.policy.data_yields and outbox.repeats:
                 outbox.not_before_s = max(outbox.not_before_s, now_s + ROUTE_PERIOD_S)
                 outbox.waits_because("this node looks for a gateway")
         self._was_lost = lost

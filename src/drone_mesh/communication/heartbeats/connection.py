@@ -183,13 +183,13 @@ class GatewayConnection:
     def on_route_lost(self) -> None:
         """A route failed. If it was the only one to the gateway, look for another one at once.
 
-        On a shared channel first through the neighbour that presented itself as nearest to a
-        gateway; elsewhere all neighbours are asked. One that led nowhere is given up at once.
+        If neighbours are asked in turn, first through the one that presented itself as nearest to a
+        gateway; otherwise all are asked. One that led nowhere is given up at once.
         """
         connection = self._states.connection
         if self.next_hop() != NO_ROUTE:
             return
-        if not self._medium.shared:
+        if not self._medium.policy.asks_in_turn:
             if connection is ConnectionState.CONNECTED:
                 self.end(RouterEvent.ROUTE_LOST)
                 self.just_lost = True
@@ -362,7 +362,7 @@ class GatewayConnection:
     def _asks_a_neighbour(self) -> bool:
         """Whether a neighbour was recently asked for its gateway. If not, one is asked now."""
         medium, now_s = self._medium, self._deadlines.now_s
-        if medium.shared and now_s - self._asked_neighbour_s < medium.answer_s:
+        if medium.policy.asks_in_turn and now_s - self._asked_neighbour_s < medium.answer_s:
             return True
         self._asked_neighbour_s = now_s
         return False

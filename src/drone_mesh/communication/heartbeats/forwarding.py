@@ -138,7 +138,7 @@ class Forwarding:
         if kind != MessageType.MOVE_TO_LOCATION:
             return
         reason = f"no route to drone {forward}"
-        if self._medium.shared:
+        if self._medium.policy.search_within_s:
             self._complaints.counts[reason] += 1  # its gateway looks for the drone
         else:
             self._complaints.add(reason, "an order for it ends here", now_s)

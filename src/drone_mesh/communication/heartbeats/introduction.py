@@ -56,7 +56,8 @@ class Introduction:
             for kind in (_PRESENT, _HEARTBEAT)
         }
         self._medium = self._antenna.medium
-        self._search_again_s = self._medium.search_s if self._medium.shared else math.inf
+        from_start = self._medium.policy.searches_from_start
+        self._search_again_s = self._medium.search_s if from_start else math.inf
         self._is_answer = False  # the planned one answers a node that needs a gateway
 
     def broadcast(self) -> None:

@@ -13,7 +13,7 @@ import math
 from dataclasses import dataclass
 from typing import Callable
 
-from drone_mesh.communication.control.control_plane import NUMBERS_PER_S, SEARCH_AGAIN_S
+from drone_mesh.communication.control.control_plane import NUMBERS_PER_S
 from drone_mesh.communication.control.node_part import receives
 from drone_mesh.communication.events.complaints import Complaints
 from drone_mesh.communication.interfaces import BROADCAST, IWirelessCommunication
@@ -46,8 +46,7 @@ class NodeSearch:
     def search(self, node: int) -> bool:
         """Broadcast a search for `node`. False: too soon after another search."""
         now_s = self._deadlines.now_s
-        medium = self._medium
-        if medium.shared and now_s - self._searched_s < medium.stretched(SEARCH_AGAIN_S):
+        if now_s - self._searched_s < self._medium.stretched(self._medium.policy.search_pause_s):
             return False
         self._searched_s = now_s
         number = int(now_s * NUMBERS_PER_S) % 2**16

@@ -53,7 +53,8 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         self._pilot = node.pilot
         self._may_be_gateway = node.seals.may_be_gateway
         self._rng = node.rng
-        deliver = QueuedDelivery if self._medium.shared else ImmediateDelivery
+        policy = self._medium.policy
+        deliver = QueuedDelivery if policy.queued else ImmediateDelivery
         self._delivery: Delivery = deliver(
             node.node_id,
             technique,
@@ -85,8 +86,8 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         )
         self._connection = self._connected_by(node, GatewayConnection)
         self.learn = technique.learn
-        is_shared = self._medium.shared
-        self.forward = self._forward_and_learn if is_shared else self._forwarding.forward
+        learns = policy.answers_prove_relays
+        self.forward = self._forward_and_learn if learns else self._forwarding.forward
 
     def _connected_by(
         self, node: ControlledNode, kind: type[GatewayConnection]
@@ -288,7 +289,7 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
     # For the delivery: see IWayFinder --------------------------------------------------------
 
     def on_neighbour_lost(self, node: int) -> None:  # noqa: D102
-        if self._medium.shared and self._states.connected:  # check soon: what else has changed?
+        if self._medium.policy.checks_soon and self._states.connected:
             share = CHANGE_PERIODS * (0.5 + self._rng.random())
             soon_s = self._deadlines.now_s + share * self._check_period_s
             self._deadlines.set(Due.CHECK, min(soon_s, self._deadlines.get(Due.CHECK)))

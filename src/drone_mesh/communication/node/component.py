@@ -116,7 +116,9 @@ class MeshnetworkComponent(NodeSnapshots, IMeshNetwork, IControlHost):
         check_s, medium = self._timing.check_period_s, antenna.medium
         asked_s = check_s * max(1.0, medium.place_periods)
         motion = SeenMotion(self._options.range_m, asked_s)
-        self._neighbours = Neighbours(check_s, noticed_late=medium.shared, motion=motion)
+        self._neighbours = Neighbours(
+            check_s, noticed_late=medium.policy.losses_noticed_late, motion=motion
+        )
         self._report = Reporter(node_id, deadlines, settings.observer)
         self.complaints = complaints = Complaints(node_id)
         self.places = KnownPlaces()

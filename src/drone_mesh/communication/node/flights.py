@@ -60,7 +60,7 @@ class RouterFlights(Flights):
     def took_off(self) -> None:
         """The drone leaves its place because of an order: tell the neighbours where it flies."""
         goal = self._pilot.goal
-        if self._repair.medium.shared and goal is not None:
+        if self._repair.medium.policy.announces_flights and goal is not None:
             self._repair.announce_place(goal)
             self._deadlines.set(Due.GOAL, self._deadlines.now_s + GOAL_AGAIN_S)
             for neighbour in sorted(self._neighbours.ids()):

@@ -31,8 +31,6 @@ from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused
 
-SEARCH_WITHIN_S = 600.0  # search for nodes that were heard within this time
-
 
 class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
     """A node that answers heartbeats and sends orders from outside into the mesh."""
@@ -169,4 +167,4 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         _hops, heard_s = self._heartbeats.get(node, (NO_ROUTE, -math.inf))
         medium = self._antenna.medium
         ago_s = self._deadlines.now_s - heard_s
-        return medium.shared and ago_s < medium.stretched(SEARCH_WITHIN_S)
+        return ago_s < medium.stretched(medium.policy.search_within_s)

@@ -12,11 +12,7 @@ from collections import defaultdict
 from dataclasses import dataclass, field
 from typing import Callable, Iterable
 
-from drone_mesh.communication.control.control_plane import (
-    NUMBERS_PER_S,
-    SEARCH_AGAIN_S,
-    IControlPlane,
-)
+from drone_mesh.communication.control.control_plane import NUMBERS_PER_S, IControlPlane
 from drone_mesh.communication.control.node_part import due, receives
 from drone_mesh.communication.events.complaints import Complaints
 from drone_mesh.communication.events.observer import MeshEventKind, Reporter, explanation
@@ -129,7 +125,7 @@ class OrderBook:
         On a shared channel a relay also drops what arrived, if the acknowledgements were lost.
         """
         for order in self._open_for(drone):
-            order.copies -= told and order.copies > 0 and not self._medium.shared
+            order.copies -= told and order.copies > 0 and self._medium.policy.drops_are_certain
             waits = order.state is not OrderState.SENT or order.seeking
             if not waits and not self._seek(order):
                 self._move(order, OrderState.NO_ROUTE)
@@ -156,7 +152,7 @@ class OrderBook:
             order.searches += 1
             self._wait(order, FOUND_WITHIN_S)
         else:
-            self._wait(order, SEARCH_AGAIN_S)
+            self._wait(order, self._medium.policy.search_pause_s)
         return True
 
     @receives(MessageType.ORDER_REPLY)

@@ -21,7 +21,7 @@ from drone_mesh.communication.repair.interfaces import (
     RepairActions,
     Step,
 )
-from drone_mesh.communication.repair.repair_flight import ASK_AGAIN_S, ASK_SEALED_S, RepairFlight
+from drone_mesh.communication.repair.repair_flight import ASK_AGAIN_S, RepairFlight
 from drone_mesh.communication.repair.spots import (
     PITCH,
     Landing,
@@ -52,7 +52,7 @@ class ConnectionRepair(RepairActions):
         self._taken = TakenPlaces(
             self.node_id, self._deadlines, self._neighbours, self._places, self._options
         )
-        again_s = ASK_SEALED_S if self.medium.shared and self._has_key else ASK_AGAIN_S
+        again_s = self.medium.policy.ask_sealed_s if self._has_key else ASK_AGAIN_S
         self._ask_again_s = self.medium.stretched(again_s)
         # Valid from LOSS_NOTICED until the router is AT_REST:
         self._lost_since_s = math.inf

@@ -21,7 +21,6 @@ from drone_mesh.communication.timing import LANDED_WITHIN_M
 from drone_mesh.drone.location import Location
 
 ASK_AGAIN_S = 0.3  # an answer takes some milliseconds
-ASK_SEALED_S = 1.0  # on a shared channel with a key, where it takes a handshake, too
 ASKS_ON_GROUND = 2  # a lossy medium loses a question now and then
 LEG = 2.0 / 3.0  # of the range: at half that height it hears nodes below
 

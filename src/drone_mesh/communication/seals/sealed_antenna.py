@@ -298,7 +298,9 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
         challenge = self._seal.challenge(node, now_s)
         if challenge is None:
             return
-        if self._antenna.medium.shared and self._seal.crowded:  # some of these ids may not exist
+        if (
+            self._antenna.medium.policy.challenges_all and self._seal.crowded
+        ):  # some of these ids may not exist
             self._antenna.broadcast_message(challenge)  # which it may not hear
             return
         if not self._seal.knows(node, now_s):

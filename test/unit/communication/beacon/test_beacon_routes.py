@@ -24,12 +24,14 @@ STILL = (0.0, 0.0, 0.0)
 
 @pytest.fixture
 def routes():
-    return BeaconRoutes(9, False, 10.0, lambda _node: None, shared=False, clock=Deadlines())
+    return BeaconRoutes(9, False, 10.0, lambda _node: None, one_loss_counts=True, clock=Deadlines())
 
 
 @pytest.fixture
 def shared_routes():
-    return BeaconRoutes(9, False, 10.0, lambda _node: None, shared=True, clock=Deadlines())
+    return BeaconRoutes(
+        9, False, 10.0, lambda _node: None, one_loss_counts=False, clock=Deadlines()
+    )
 
 
 def beacon(
@@ -240,7 +242,9 @@ def test_a_node_is_looked_for_where_it_was_seen():
     class Heard:
         place, heard_s = seen[50]
 
-    routes = BeaconRoutes(9, True, 10.0, lambda _node: Heard, shared=False, clock=Deadlines())
+    routes = BeaconRoutes(
+        9, True, 10.0, lambda _node: Heard, one_loss_counts=True, clock=Deadlines()
+    )
     routes.motion = Motion(Location(0.0, 0.0, 0.0), STILL)
     routes.heard(1, beacon(hops=1, x=5.0, parent=9))
     routes.heard(2, beacon(hops=1, x=-5.0, parent=9))

@@ -17,7 +17,7 @@ class Node:
     def __init__(self, shared=False):
         self.neighbours, self.otherwise = [], HOLD
         self.taken, self.refused, self.returned = [], [], []
-        self.antenna, self.deadlines = RecordingAntenna(Medium(shared=shared)), Deadlines()
+        self.antenna, self.deadlines = RecordingAntenna(Medium()), Deadlines()
         told = self.taken.append, self.refused.append, lambda *it: self.returned.append(it)
         self.courier = (QueuedCourier if shared else Courier)(
             1, self.antenna, self.deadlines, 2, self.verdict, *told, lambda it: it[:25] + bytes(7)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 from rig import Rig, packet
 
-from drone_mesh.communication.timing import UNDISTURBED, Medium
+from drone_mesh.communication.timing import QUEUED, UNDISTURBED, Medium
 
 ORDER, HEARTBEAT, SEARCH = 6, 4, 0x44
-SHARED = Medium(shared=True, answer_s=1.0)
+SHARED = Medium(policy=QUEUED, answer_s=1.0)
 FROM_5_THROUGH_2 = "05 02 04 01 01 01 01 01"  # a heartbeat for gateway 1
 LOST_BEHIND_2 = "02 02 05 01 01 05"  # 2 cannot reach 5
 

@@ -8,7 +8,7 @@ import pytest
 from rig import FROM_0, AlwaysHalf, Rig, packet
 
 from drone_mesh.communication.routing.techniques.etx_tree import EtxTree
-from drone_mesh.communication.timing import Medium, MeshTiming
+from drone_mesh.communication.timing import QUEUED, Medium, MeshTiming
 from drone_mesh.drone.location import Location
 
 LOCATION, HEARTBEAT, PRESENT, REQUEST, MISSING = 1, 4, 3, 2, 5
@@ -520,7 +520,7 @@ def test_a_neighbour_that_led_nowhere_is_given_up_for_the_next_one_that_offers_a
 
 
 def shared_rig(**numbers):
-    shared = Medium(shared=True, answer_s=1.0, heartbeats=3, missing_quiet_s=5.0)
+    shared = Medium(policy=QUEUED, answer_s=1.0, heartbeats=3, missing_quiet_s=5.0)
     return Rig(medium=replace(shared, **numbers))
 
 
@@ -641,7 +641,7 @@ def test_another_next_hop_is_asked_for_its_place_at_the_next_check():
 
 def test_a_queued_packet_teaches_the_routes_when_the_antenna_reports_its_outcome():
     routing = EtxTree()
-    rig = Rig(routing=routing, medium=Medium(shared=True))
+    rig = Rig(routing=routing, medium=Medium(policy=QUEUED))
     rig.connect_through(2)
     rig.mesh.control.send_heartbeat(0)
     assert routing.etx(2) == 1.0

@@ -12,7 +12,7 @@ from drone_mesh.communication.data import packets
 from drone_mesh.communication.interfaces import IMeshNetwork, IWirelessCommunication
 from drone_mesh.communication.seals.seal import HopSeal, _epoch_state
 from drone_mesh.communication.seals.sealed_antenna import SealedAntenna
-from drone_mesh.communication.timing import Medium
+from drone_mesh.communication.timing import QUEUED, Medium
 from drone_mesh.inprocess import Network
 
 
@@ -374,7 +374,7 @@ def test_one_challenge_without_an_answer_says_nothing_about_a_neighbours_key():
 
 
 def test_a_challenge_by_broadcast_says_nothing_about_a_neighbours_key():
-    rig = Rig(node_id=1, medium=Medium(shared=True))
+    rig = Rig(node_id=1, medium=Medium(policy=QUEUED))
     layer = SealedAntenna(rig.antenna, 1, KEY, random.Random(1), lambda: rig.now_s)
     layer.start_antenna(rig.mesh)
     for now_s in (0.0, 10.0, 20.0, 30.0):

@@ -12,7 +12,7 @@ from seal_rig import KEY, packet
 from drone_mesh.communication.data.outgoing import TO_GATEWAY, TicketState
 from drone_mesh.communication.heartbeats.detours import Detours, RelayCheck, Swallowing
 from drone_mesh.communication.interfaces import NO_ROUTE, IMeshSeals
-from drone_mesh.communication.timing import Deadlines, Medium, MeshTiming
+from drone_mesh.communication.timing import QUEUED, Deadlines, Medium, MeshTiming
 from drone_mesh.inprocess import Network
 
 NOTICED_WITHIN_S = 120.0
@@ -116,7 +116,7 @@ class WithKey(IMeshSeals):
 
 def ask_on_a_shared_channel(is_taken):
     """Router 1 behind relay 2, in a mesh with a key; gateway 0 answers heartbeats only."""
-    rig = Rig(medium=Medium(shared=True, answer_s=1.0), seals=WithKey())
+    rig = Rig(medium=Medium(policy=QUEUED, answer_s=1.0), seals=WithKey())
     rig.hear("02 02 03 01 fe 01 01", "00 02 04 01 01 01 00 01", "00 02 01 01 01")
     for _half_second in range(120):
         rig.wait(0.5)
