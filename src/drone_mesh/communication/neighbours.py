@@ -1,6 +1,6 @@
 """What a node knows of the nodes in direct reach: when it heard them, where they are, who moves.
 
-Only the control plane and the parts of a node write here.
+The table belongs to the control plane, which makes it; the parts of a node write here, too.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ import math
 from typing import Iterable, Iterator, NamedTuple
 
 from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.timing import Medium
 from drone_mesh.drone.location import Location
 
 STEP = 0.1  # of the range: positions of satellites err by far less
@@ -79,19 +80,18 @@ class HeardPlace(NamedTuple):
 class Neighbours:
     """When each neighbour was last heard, which gateway it uses, and the places of nodes.
 
-    The only owner of this table: the other parts of a component report here what they learn. The
-    gateway and place of a node are kept when it is no longer a neighbour.
+    The gateway and place of a node are kept when it is no longer a neighbour.
     """
 
-    def __init__(self, check_period_s: float, noticed_late: bool, motion: SeenMotion) -> None:
+    def __init__(self, medium: Medium, check_period_s: float, range_m: float) -> None:
         """Neighbours that fall silent within a check period do so together.
 
-        `noticed_late`: a loss may be noticed several checks later, as on a shared channel, so that
-        the time of a neighbour's last packet says more.
+        Where a loss may be noticed several checks later, the time of a neighbour's last packet
+        says more. `range_m`: of the radio, as far as the node knows.
         """
         self._check_period_s = check_period_s
-        self._noticed_late = noticed_late
-        self.motion = motion
+        self._noticed_late = medium.policy.losses_noticed_late
+        self.motion = SeenMotion(range_m, check_period_s * max(1.0, medium.place_periods))
         self._heard_s: dict[int, float] = {}
         self._deaf: set[int] = set()  # heard, but no neighbours: they do not hear this node
         self._fell_silent_s: dict[int, float] = {}  # when each of those lost did so

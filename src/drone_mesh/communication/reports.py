@@ -20,7 +20,6 @@ from drone_mesh.communication.interfaces import (
     IMeshDebugInfo,
     IWirelessCommunication,
 )
-from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.timing import Deadlines, Due
 from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.messages import HEADER_BYTES
@@ -113,7 +112,6 @@ class NodeReporter:
     _control: IControlPlane
     _period_s: float  # between two reports; 0: none
     _deadlines: Deadlines
-    _neighbours: Neighbours
     _antenna: IWirelessCommunication
     _pilot: Pilot
     _engine: IDroneEngine
@@ -139,7 +137,7 @@ class NodeReporter:
             return
         why_not, percent = self._engine.why_not_fly(), self._engine.battery_percent()
         report = NodeReport(
-            neighbours=len(self._neighbours.ids()),
+            neighbours=len(control.neighbours.ids()),
             hops=control.hops,
             next_hop=control.routes.get_direction_to_node(gateway),
             place=self._pilot.place(),

@@ -5,13 +5,14 @@ from __future__ import annotations
 import pytest
 
 from drone_mesh.communication.neighbours import Neighbours, SeenMotion
+from drone_mesh.communication.timing import UNDISTURBED
 from drone_mesh.drone.location import Location
 
 
 @pytest.fixture
 def neighbours() -> Neighbours:
     """Of a node that has lost its neighbour 3 at 100 s and still hears 2."""
-    known = Neighbours(10.0, False, SeenMotion(1.0, 10.0))
+    known = Neighbours(UNDISTURBED, 10.0, 1.0)
     known.stands(0.0)
     for node in (2, 3):
         known.heard(node, 99.0)

@@ -21,7 +21,8 @@ from drone_mesh.communication.control.node_part import due, receives
 from drone_mesh.communication.control.places import PlaceRequests
 from drone_mesh.communication.control.router_states import RouterEvent
 from drone_mesh.communication.events.observer import MeshEventKind
-from drone_mesh.communication.interfaces import BROADCAST, MAX_NODE_ID, NO_ROUTE
+from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE
+from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.timing import Due
 from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.packet_types import MessageType
@@ -42,15 +43,16 @@ class BeaconPlane(IControlPlane):
         self._host = node.host
         self._me, self._antenna, self._deadlines = node.node_id, node.antenna, node.deadlines
         self._report, self._complaints = node.report, node.complaints
-        self._neighbours, self._places = node.neighbours, node.places
-        self._frame, self._claims, self._range_m = node.frame, node.claims, node.range_m
+        self._places, self._frame, self._claims = node.places, node.frame, node.claims
         medium, states, is_gateway = node.antenna.medium, node.states, node.states is None
+        self._range_m, check_s = node.range_m, node.timing.check_period_s
+        self.neighbours = self._neighbours = Neighbours(medium, check_s, node.range_m)
         self.bids_within_s = medium.stretched(BIDS_WITHIN_S)
         self._routes = self.routes = BeaconRoutes(
             self._me,
             is_gateway,
             node.range_m,
-            node.neighbours.place_of,
+            self._neighbours.place_of,
             medium.policy.one_loss_counts,
             node.deadlines,
             node.seals.may_be_gateway,
@@ -303,8 +305,6 @@ class BeaconPlane(IControlPlane):
     def _take_place(self, node: int, beacon: Beacon) -> None:
         neighbours = self._neighbours
         neighbours.set_hops(node, beacon.hops)
-        if beacon.gateway <= MAX_NODE_ID:
-            neighbours.set_gateway(node, beacon.gateway)
         if beacon.motion is not None:
             neighbours.passes(node, beacon.motion.place, self._routes.now_s)
 

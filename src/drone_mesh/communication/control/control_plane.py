@@ -72,7 +72,6 @@ class ControlledNode:
     deadlines: Deadlines  # the clock of the node, too
     report: Reporter
     complaints: Complaints
-    neighbours: Neighbours
     places: KnownPlaces
     frame: CommonFrame
     claims: Claims
@@ -92,6 +91,7 @@ class IControlPlane(abc.ABC):
 
     delivery: IDelivery
     routes: IRoutes
+    neighbours: Neighbours  # the one table of the node; the plane makes it
 
     @property
     def parts(self) -> Sequence[object]:

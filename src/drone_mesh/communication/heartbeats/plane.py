@@ -21,6 +21,7 @@ from drone_mesh.communication.heartbeats.introduction import Introduction
 from drone_mesh.communication.heartbeats.node_search import NodeSearch
 from drone_mesh.communication.heartbeats.queued_delivery import QueuedDelivery
 from drone_mesh.communication.interfaces import BROADCAST, MAX_NODE_ID, NO_ROUTE
+from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.routing.interfaces import IRoutingEssentials, IRoutingTechnique
 from drone_mesh.communication.timing import Due, Medium
 from drone_mesh.communication.wire import messages
@@ -48,7 +49,8 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         self._antenna, self._medium = node.antenna, node.antenna.medium
         self._check_period_s = self.bids_within_s = node.timing.check_period_s
         self._deadlines = node.deadlines
-        self._neighbours = node.neighbours
+        neighbours = Neighbours(self._medium, self._check_period_s, node.range_m)
+        self.neighbours = self._neighbours = neighbours
         self._places = node.places
         self._pilot = node.pilot
         self._may_be_gateway = node.seals.may_be_gateway
@@ -60,7 +62,7 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
             technique,
             self,
             node.antenna,
-            node.neighbours,
+            neighbours,
             node.deadlines,
             node.timing.send_attempts,
             node.report,
@@ -102,7 +104,7 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
             self._medium,
             node.deadlines,
             self._check_period_s,
-            node.neighbours,
+            self._neighbours,
             node.places,
             node.report,
             node.seals.has_key,

@@ -42,7 +42,6 @@ from drone_mesh.communication.interfaces import (
     IMeshSeals,
     IWirelessCommunication,
 )
-from drone_mesh.communication.neighbours import Neighbours, SeenMotion
 from drone_mesh.communication.node.flights import Flights
 from drone_mesh.communication.node.own_id import OwnId
 from drone_mesh.communication.node.snapshots import NodeSnapshots
@@ -114,11 +113,6 @@ class MeshnetworkComponent(NodeSnapshots, IMeshNetwork, IControlHost):
         self._debug = settings.debug
         self._deadlines = deadlines = Deadlines()
         check_s, medium = self._timing.check_period_s, antenna.medium
-        asked_s = check_s * max(1.0, medium.place_periods)
-        motion = SeenMotion(self._options.range_m, asked_s)
-        self._neighbours = Neighbours(
-            check_s, noticed_late=medium.policy.losses_noticed_late, motion=motion
-        )
         self._report = Reporter(node_id, deadlines, settings.observer)
         self.complaints = complaints = Complaints(node_id)
         self.places = KnownPlaces()
@@ -136,7 +130,6 @@ class MeshnetworkComponent(NodeSnapshots, IMeshNetwork, IControlHost):
             deadlines=deadlines,
             report=self._report,
             complaints=complaints,
-            neighbours=self._neighbours,
             places=self.places,
             frame=self._frame,
             claims=self._claims,
@@ -147,7 +140,8 @@ class MeshnetworkComponent(NodeSnapshots, IMeshNetwork, IControlHost):
             range_m=self._options.range_m,
         )
         self.control = control = _control_plane(node, routing)
-        self._learn, self._forward = control.learn, control.forward  # called for each packet
+        self._neighbours = control.neighbours  # asked for each packet, as are these:
+        self._learn, self._forward = control.learn, control.forward
         connected_s = -math.inf if states is None else math.inf  # a gateway never gives way
         self._own_id = OwnId(control, antenna, deadlines, complaints, rng, check_s, connected_s)
         self._orders = OrderIntake(
@@ -158,7 +152,6 @@ class MeshnetworkComponent(NodeSnapshots, IMeshNetwork, IControlHost):
             control,
             self._timing.report_period_s,
             deadlines,
-            self._neighbours,
             antenna,
             self._pilot,
             engine,

@@ -11,7 +11,6 @@ from drone_mesh.communication.control.pilot import Pilot
 from drone_mesh.communication.control.router_states import RepairState, RouterStates
 from drone_mesh.communication.events.observer import MeshEventKind, Reporter
 from drone_mesh.communication.interfaces import IWirelessCommunication
-from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.orders.intake import OrderIntake
 from drone_mesh.communication.repair.connection_repair import ConnectionRepair
 from drone_mesh.communication.timing import Deadlines, Due
@@ -25,7 +24,6 @@ class Flights:
     """The flights of a gateway, which is connected anywhere."""
 
     _pilot: Pilot
-    _neighbours: Neighbours
     _control: IControlPlane
     _orders: OrderIntake
     _report: Reporter
@@ -41,7 +39,7 @@ class Flights:
 
     def _landed(self) -> None:
         """The drone is at another place and has other neighbours."""
-        self._neighbours.forget_all()
+        self._control.neighbours.forget_all()
         self._control.routes.node_moved_location()
         self._report(MeshEventKind.LANDED)
         self._control.introduce()
@@ -63,12 +61,12 @@ class RouterFlights(Flights):
         if self._repair.medium.policy.announces_flights and goal is not None:
             self._repair.announce_place(goal)
             self._deadlines.set(Due.GOAL, self._deadlines.now_s + GOAL_AGAIN_S)
-            for neighbour in sorted(self._neighbours.ids()):
-                heard = self._neighbours.place_of(neighbour)
+            for neighbour in sorted(self._control.neighbours.ids()):
+                heard = self._control.neighbours.place_of(neighbour)
                 if heard is not None and heard.place.distance_m(goal) >= self._repair.range_m:
                     self._control.neighbour_leaves(neighbour)
         is_short = self._is_short()
-        self._neighbours.takes_off(by_order=True)
+        self._control.neighbours.takes_off(by_order=True)
         if not is_short:
             self._repair.on_ordered_flight()
 
@@ -100,7 +98,7 @@ class RouterFlights(Flights):
             self._landed()
 
     def _landed(self) -> None:
-        self._neighbours.stands(self._deadlines.now_s)
+        self._control.neighbours.stands(self._deadlines.now_s)
         if self._states.repair is RepairState.FLYING:
             self._repair.on_landed()
             super()._landed()

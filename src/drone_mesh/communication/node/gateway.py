@@ -57,21 +57,20 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         )
         self._orders.tell_own = self._book.on_outcome
         self._final_places = FinalPlaces(
-            node_id, control, deadlines, self._pilot, self._neighbours, self._options.clearance_m
+            node_id, control, deadlines, self._pilot, self._options.clearance_m
         )
         self._whereabouts = Whereabouts(
             node_id,
             control,
             deadlines,
             self._pilot,
-            self._neighbours,
             self.places,
             self._frame,
             self._options.clearance_m,
             self._has_key,
         )
         self._flights = self._orders.flights = Flights(
-            self._pilot, self._neighbours, control, self._orders, self._report
+            self._pilot, control, self._orders, self._report
         )
         self._parts += [self._book, self._reports, self._whereabouts, self._flights]
 

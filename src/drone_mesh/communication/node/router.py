@@ -53,7 +53,6 @@ class MeshnetworkRouter(MeshnetworkComponent):
             engine,
             pilot,
             PlaceRequests(node_id, pilot, antenna, control.delivery, deadlines),
-            self._neighbours,
             self.places,
             self._report,
             repair or Thesis(),
@@ -64,7 +63,6 @@ class MeshnetworkRouter(MeshnetworkComponent):
             control,
             deadlines,
             pilot,
-            self._neighbours,
             self.places,
             self._frame,
             self._options.clearance_m,
@@ -74,7 +72,6 @@ class MeshnetworkRouter(MeshnetworkComponent):
         )
         self._flights = RouterFlights(
             pilot,
-            self._neighbours,
             control,
             self._orders,
             self._report,

@@ -9,7 +9,6 @@ from drone_mesh.communication.interfaces import (
     IMeshDebugInfo,
     IWirelessCommunication,
 )
-from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.node.own_id import OwnId
 from drone_mesh.communication.repair.status import NOTHING_TO_REPAIR, RepairStatus
 from drone_mesh.communication.timing import ChannelUse, Deadlines
@@ -21,7 +20,6 @@ class NodeSnapshots(IMeshDebugInfo):
     _node_id: int
     control: IControlPlane
     places: KnownPlaces
-    _neighbours: Neighbours
     _own_id: OwnId
     _deadlines: Deadlines
     _antenna: IWirelessCommunication
@@ -53,7 +51,7 @@ class NodeSnapshots(IMeshDebugInfo):
 
     def get_neighbours(self) -> dict[int, float]:
         """Direct neighbours, and when each was last heard (seconds of the core's clock)."""
-        return self._neighbours.heard_s()
+        return self.control.neighbours.heard_s()
 
     def get_route_to_gateway(self) -> int:
         """The neighbour that leads to the preferred gateway; a gateway returns its own id."""

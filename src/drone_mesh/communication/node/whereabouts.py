@@ -14,7 +14,6 @@ from drone_mesh.communication.control.node_part import receives
 from drone_mesh.communication.control.pilot import Pilot
 from drone_mesh.communication.control.places import Claims, CommonFrame, KnownPlaces
 from drone_mesh.communication.interfaces import BROADCAST
-from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.repair.connection_repair import ConnectionRepair
 from drone_mesh.communication.timing import Deadlines
 from drone_mesh.communication.wire import messages
@@ -34,7 +33,6 @@ class Whereabouts:
     _control: IControlPlane
     _deadlines: Deadlines
     _pilot: Pilot
-    _neighbours: Neighbours
     _places: KnownPlaces
     _frame: CommonFrame
     _clearance_m: float
@@ -53,7 +51,7 @@ class Whereabouts:
     ) -> None:
         """`node` reports its place, or where it flies to, and perhaps the place of a gateway."""
         now_s = self._deadlines.now_s
-        self._neighbours.set_place(node, place, now_s, is_goal)
+        self._control.neighbours.set_place(node, place, now_s, is_goal)
         if node == self._control.gateway:
             self._places.update_gateway(place, now_s)
             self._control.gateway_sent_place()
@@ -74,8 +72,8 @@ class Whereabouts:
         place, flies_there = asker
         now_s = self._deadlines.now_s
         if flies_there:
-            self._neighbours.motion.flies_for_repair(creator, now_s)
-        self._neighbours.set_place(creator, place, now_s, flies_there)
+            self._control.neighbours.motion.flies_for_repair(creator, now_s)
+        self._control.neighbours.set_place(creator, place, now_s, flies_there)
         self._is_taken(place)
         self._answer(creator)
         if flies_there:
@@ -104,7 +102,7 @@ class Whereabouts:
         """Tell a drone in flight which nodes were last heard near its goal."""
         near = sorted(
             (heard.place.distance_m(goal), node, heard)
-            for node, heard in self._neighbours.taken()
+            for node, heard in self._control.neighbours.taken()
             if node not in (asker, self._node_id)
         )
         for away_m, node, heard in near[:MOST_TOLD]:
@@ -121,7 +119,7 @@ class Whereabouts:
 
     def _was_heard(self, last: LastPlace) -> None:
         heard_s = self._deadlines.now_s - last.age_s
-        self._neighbours.passes(last.node, last.place, heard_s)
+        self._control.neighbours.passes(last.node, last.place, heard_s)
 
 
 @dataclass(eq=False)
@@ -152,7 +150,7 @@ class RouterWhereabouts(Whereabouts):
         judged = is_gateway or is_next_hop
         if judged and not self._claims.may_be_at(place, is_gateway, says_so=not is_goal):
             return
-        self._neighbours.set_place(node, place, now_s, is_goal)
+        self._control.neighbours.set_place(node, place, now_s, is_goal)
         if is_gateway:
             self._places.update_gateway(place, now_s)
         if is_next_hop:
@@ -169,7 +167,7 @@ class RouterWhereabouts(Whereabouts):
 
     def _was_heard(self, last: LastPlace) -> None:
         super()._was_heard(last)
-        heard = self._neighbours.place_of(last.node)
+        heard = self._control.neighbours.place_of(last.node)
         if heard is not None:
             self._repair.on_taken(heard.place)
         self._repair.on_taken(last.place)

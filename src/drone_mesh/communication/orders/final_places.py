@@ -12,7 +12,6 @@ from typing import Iterable, NamedTuple
 from drone_mesh.communication.control.control_plane import IControlPlane
 from drone_mesh.communication.control.pilot import Pilot
 from drone_mesh.communication.interfaces import NO_ROUTE, OrderRecord, OrderState
-from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.reports import ReportedNode
 from drone_mesh.communication.timing import Deadlines
 from drone_mesh.drone.goal import ROUNDING_M
@@ -35,7 +34,6 @@ class FinalPlaces:
     _control: IControlPlane
     _deadlines: Deadlines
     _pilot: Pilot
-    _neighbours: Neighbours
     _clearance_m: float
 
     def check(
@@ -79,7 +77,7 @@ class FinalPlaces:
             if place is not None and (known is None or since_s >= known.since_s):
                 places[drone] = _Place(since_s, place)
 
-        here, others = self._pilot.place(), self._neighbours.places
+        here, others = self._pilot.place(), self._control.neighbours.places
         note(self._node_id, self._deadlines.now_s, here)
         for node, heard in others.items():
             note(node, heard.heard_s, heard.place)

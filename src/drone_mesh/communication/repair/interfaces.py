@@ -20,7 +20,6 @@ from drone_mesh.communication.control.places import KnownPlaces, PlaceRequests
 from drone_mesh.communication.control.router_states import RepairState, RouterEvent, RouterStates
 from drone_mesh.communication.events.observer import MeshEventKind, Reporter
 from drone_mesh.communication.interfaces import NO_ROUTE, IWirelessCommunication
-from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.repair.election import NO_BID
 from drone_mesh.communication.repair.options import RepairOptions
 from drone_mesh.communication.repair.spots import NEAR, PITCH, may_be_flown_to
@@ -71,12 +70,11 @@ class RepairActions(abc.ABC):
     _engine: IDroneEngine
     _pilot: Pilot
     _requests: PlaceRequests
-    _neighbours: Neighbours
     _places: KnownPlaces
     _report: Reporter
 
     def __post_init__(self) -> None:
-        self.medium = self._antenna.medium
+        self.medium, self._neighbours = self._antenna.medium, self._control.neighbours
         self.range_m = self._options.range_m  # of the radio, as far as known
         self.clearance_m = self._options.clearance_m  # least distance between drones at rest
         self.check_period_s = self._timing.check_period_s

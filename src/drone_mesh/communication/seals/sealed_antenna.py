@@ -298,10 +298,8 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
         challenge = self._seal.challenge(node, now_s)
         if challenge is None:
             return
-        if (
-            self._antenna.medium.policy.challenges_all and self._seal.crowded
-        ):  # some of these ids may not exist
-            self._antenna.broadcast_message(challenge)  # which it may not hear
+        if self._antenna.medium.policy.challenges_all and self._seal.crowded:
+            self._antenna.broadcast_message(challenge)  # some may not exist, some not hear it
             return
         if not self._seal.knows(node, now_s):
             challenged_s = self._unopened.setdefault(node, [])

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from drone_mesh.communication.control.places import KnownPlaces
-from drone_mesh.communication.neighbours import Neighbours, SeenMotion
+from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.repair.options import RepairOptions
 from drone_mesh.communication.repair.spots import TakenPlaces
-from drone_mesh.communication.timing import Deadlines
+from drone_mesh.communication.timing import UNDISTURBED, Deadlines
 from drone_mesh.drone.location import Location
 
 
 def test_a_spot_that_is_clear_of_a_rounded_place_is_clear_of_the_drone_itself():
     deadlines, places = Deadlines(), KnownPlaces()
-    neighbours = Neighbours(10.0, noticed_late=False, motion=SeenMotion(9.0, 10.0))
+    neighbours = Neighbours(UNDISTURBED, 10.0, 9.0)
     drone = Location(latitude=0.951, longitude=0.0, height=0.0)
     told = Location(latitude=round(drone.latitude, 1), longitude=0.0, height=0.0)  # in a beacon
     neighbours.set_place(7, told, 0.0)
