@@ -22,7 +22,7 @@ from drone_mesh.communication.control.places import Claims, CommonFrame, KnownPl
 from drone_mesh.communication.control.router_states import RouterEvent, RouterStates
 from drone_mesh.communication.events.complaints import Complaints
 from drone_mesh.communication.events.observer import Reporter
-from drone_mesh.communication.interfaces import IMeshSeals, IWirelessCommunication
+from drone_mesh.communication.interfaces import NO_ROUTE, IMeshSeals, IWirelessCommunication
 from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.timing import Deadlines, MeshTiming
 
@@ -190,6 +190,17 @@ class IControlPlane(abc.ABC):
 
     def search(self, node: int) -> bool:
         """Look for a node without a known route. False: not now, but after `search_pause_s`."""
+        return False
+
+    def way_up(self, but: int) -> int:
+        """The next hop of users' data for nodes without a route, not `but`; NO_ROUTE: none.
+
+        It leads to the preferred gateway, which knows more nodes than a router.
+        """
+        return NO_ROUTE
+
+    def seek(self, node: int) -> bool:
+        """Users' data for `node` has no way from here: search for it. False: this is no gateway."""
         return False
 
     def heard_s(self, node: int) -> float:

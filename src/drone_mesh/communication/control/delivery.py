@@ -20,14 +20,6 @@ class IDelivery(metaclass=abc.ABCMeta):
     def send_own(self, payload: bytes) -> bool:
         """Send this node's own packet towards its addressee. False: there is no way to it."""
 
-    def default_hop(self) -> int:
-        """The next hop of users' data for nodes to which no route is known; NO_ROUTE: none."""
-        return NO_ROUTE
-
-    def seek(self, node: int) -> bool:
-        """Users' data for `node` has no way from here: search for it. False: this is no gateway."""
-        return False
-
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class IRoutes(metaclass=abc.ABCMeta):

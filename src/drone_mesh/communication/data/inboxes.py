@@ -12,7 +12,7 @@ from typing import Callable, Iterable
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.inbox import Inbox
 from drone_mesh.communication.data.outgoing import TO_ALL
-from drone_mesh.communication.data.packets import Ack, Poll, SendPacket, Whole
+from drone_mesh.communication.data.packets import Ack, Poll, SendPacket
 from drone_mesh.communication.interfaces import MAX_NODE_ID, IMeshSeals, IWirelessCommunication
 from drone_mesh.communication.timing import FAST_HOP_S, Deadlines, Medium
 
@@ -21,8 +21,8 @@ TURN_S = 0.4
 TIDY_PERIOD_S = 5.0  # how often old fragments are dropped
 MOST_INBOXES = 2 * MAX_NODE_ID  # every other node, with its messages to this one and to all
 
-OnArrived = Callable[[int, bool, Whole], None]
-"""A message is complete: its sender, whether it was sent to all nodes, and the message."""
+Deliver = Callable[[int, bool, int, bytes, bool], None]
+"""A message is complete: sender, whether it is to all nodes, port, payload, whether reliable."""
 
 
 class AckTurns:
@@ -67,7 +67,7 @@ class Inboxes:
     _deadlines: Deadlines
     _room: int  # bytes of a body
     _send_packet: SendPacket
-    _on_arrived: OnArrived
+    _deliver: Deliver
 
     def __post_init__(self) -> None:
         self._inboxes: OrderedDict[tuple[int, bool], Inbox] = OrderedDict()  # last used last
@@ -85,8 +85,8 @@ class Inboxes:
         """Process a fragment. Raises PacketError if it is damaged."""
         now_s = self._deadlines.now_s
         inbox = self._inbox(sender, to_all)
-        for whole in inbox.fragment(index, body, now_s):
-            self._on_arrived(sender, to_all, whole)
+        for head, payload, _count in inbox.fragment(index, body, now_s):
+            self._deliver(sender, to_all, head.port, payload, head.reliable)
         if self._tidy_s == math.inf and inbox.unfinished:
             self._tidy_s = now_s + TIDY_PERIOD_S
         if inbox.ack_due_s <= now_s:
@@ -103,8 +103,8 @@ class Inboxes:
         now_s = self._deadlines.now_s
         self._acknowledge_due(now_s)
         for (sender, to_all), inbox in list(self._inboxes.items()):
-            for whole in inbox.on_time(now_s):
-                self._on_arrived(sender, to_all, whole)
+            for head, payload, _count in inbox.on_time(now_s):
+                self._deliver(sender, to_all, head.port, payload, head.reliable)
         if now_s >= self._tidy_s:
             unfinished = any(inbox.unfinished for inbox in self._inboxes.values())
             self._tidy_s = now_s + TIDY_PERIOD_S if unfinished else math.inf

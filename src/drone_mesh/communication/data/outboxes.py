@@ -132,10 +132,10 @@ class Outboxes:
     def _may_reach(self, outbox: Outbox, now_s: float) -> bool:
         """Whether there is a route. If not, retry later and give up unreliable messages."""
         to, control = outbox.to, self._control
-        has_way = control.routes.may_reach(to) or control.delivery.default_hop() != NO_ROUTE
+        has_way = control.routes.may_reach(to) or control.way_up(NO_ROUTE) != NO_ROUTE
         if has_way and self._antenna.on():
             return True
-        control.delivery.seek(to)
+        control.seek(to)
         outbox.not_before_s = now_s + ROUTE_PERIOD_S
         outbox.blocked(self.unreachable(outbox.to))
         return False
@@ -156,7 +156,7 @@ class Outboxes:
 
     def _direction(self, to: int) -> int:
         direction = to if to == TO_ALL else self._control.routes.get_direction_to_node(to)
-        return self._control.delivery.default_hop() if direction == NO_ROUTE else direction
+        return self._control.way_up(NO_ROUTE) if direction == NO_ROUTE else direction
 
     def _follow(self, gateway: int) -> None:
         """Move messages for the gateway to the one that this node uses now."""

@@ -26,7 +26,6 @@ from drone_mesh.communication.data.outgoing import (
     Ticket,
     TicketState,
 )
-from drone_mesh.communication.data.packets import Whole
 from drone_mesh.communication.events.complaints import Complaints
 from drone_mesh.communication.interfaces import MAX_NODE_ID, IMeshSeals, IWirelessCommunication
 from drone_mesh.communication.timing import Deadlines, Due
@@ -107,7 +106,7 @@ class Transport:
             node_id, self._control, antenna, seals, deadlines, self._rng, room, *own
         )
         self._inboxes = Inboxes(
-            node_id, antenna, seals, deadlines, room, self._send_packet, self._arrived
+            node_id, antenna, seals, deadlines, room, self._send_packet, self._deliver
         )
         self._flood = Flood(node_id, antenna, deadlines)
         self._room = room
@@ -267,15 +266,12 @@ class Transport:
 
     def _to_self(self, message: OutgoingMessage) -> None:
         ticket = message.ticket
-        self._deliver(self._node_id, ticket.port, message.payload, False, ticket.reliable)
+        self._deliver(self._node_id, False, ticket.port, message.payload, ticket.reliable)
         ticket.set_state(TicketState.DELIVERED)
         self._ended(TicketState.DELIVERED)
 
-    def _arrived(self, sender: int, to_all: bool, whole: Whole) -> None:
-        self._deliver(sender, whole.head.port, whole.payload, to_all, whole.head.reliable)
-
     def _deliver(
-        self, sender: int, port: int, payload: bytes, to_all: bool, reliable: bool
+        self, sender: int, to_all: bool, port: int, payload: bytes, reliable: bool
     ) -> None:
         now_s, figures = self._deadlines.now_s, self._figures
         self._figures = figures._replace(

@@ -88,10 +88,9 @@ class IWayFinder(Protocol):
         """A neighbour to try for `node`, not `but`, beside those that the routes know."""
 
     def way_up(self, but: int) -> int:
-        """A next hop to the preferred gateway, not `but`; NO_ROUTE also if that is this node."""
+        """See IControlPlane, also for the next one."""
 
-    def seek(self, node: int) -> bool:
-        """Users' data for `node` has no way from here: search for it. False: this is no gateway."""
+    def seek(self, node: int) -> bool: ...
 
 
 @dataclass(eq=False)
@@ -178,14 +177,6 @@ class Delivery(IDelivery):
             if self.send_to_each(payload, untried):
                 return True
             tried += untried
-
-    def default_hop(self) -> int:
-        """The next hop to the preferred gateway, which knows more nodes than a router."""
-        return self._ways.way_up(NO_ROUTE)
-
-    def seek(self, node: int) -> bool:
-        """Search for `node` at a gateway with no next hop to another one; returns whether."""
-        return self._ways.seek(node)
 
     def send_to_each(self, payload: bytes, next_hops: Sequence[int]) -> bool:
         """Send the same packet to each of these neighbours. True: at least one received it."""

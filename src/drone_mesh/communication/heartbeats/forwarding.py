@@ -7,7 +7,12 @@ from typing import Hashable, Sequence
 
 from drone_mesh.communication.events.complaints import Complaints
 from drone_mesh.communication.events.observer import MeshEventKind, Reporter
-from drone_mesh.communication.heartbeats.delivery import CirculationGuard, Delivery, came_round
+from drone_mesh.communication.heartbeats.delivery import (
+    CirculationGuard,
+    Delivery,
+    IWayFinder,
+    came_round,
+)
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.routing.interfaces import IRoutingTechnique
 from drone_mesh.communication.timing import CIRCULATION_S, Medium, RateLimit
@@ -24,6 +29,7 @@ class Forwarding:
 
     _node_id: int
     _routing: IRoutingTechnique
+    _ways: IWayFinder
     _delivery: Delivery
     _medium: Medium
     _complaints: Complaints
@@ -72,7 +78,7 @@ class Forwarding:
                 hop = self._hop_of_data(forward, from_, creator, is_listed=to == from_)
                 if hop != NO_ROUTE:
                     to = hop
-                elif self._delivery.seek(forward):
+                elif self._ways.seek(forward):
                     if self._told.count(creator, now_s):
                         self._send_missing(creator, forward)
                     return
@@ -104,7 +110,7 @@ class Forwarding:
             directions = self._routing.directions(forward, from_, creator)
             if directions and directions[0] != from_:
                 return directions[0]
-        up = self._delivery.default_hop()
+        up = self._ways.way_up(NO_ROUTE)
         return NO_ROUTE if up == from_ else up
 
     def _own_came_back(self, payload: bytes, now_s: float) -> None:

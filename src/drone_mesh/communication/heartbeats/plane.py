@@ -55,7 +55,7 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         self._pilot = node.pilot
         self._may_be_gateway = node.seals.may_be_gateway
         self._rng = node.rng
-        policy = self._medium.policy
+        medium, policy = self._medium, self._medium.policy
         deliver = QueuedDelivery if policy.queued else ImmediateDelivery
         self._delivery: Delivery = deliver(
             node.node_id,
@@ -70,7 +70,7 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         )
         self.delivery = self._delivery
         self._forwarding = Forwarding(
-            node.node_id, technique, self._delivery, self._medium, node.complaints, node.report
+            self._node_id, technique, self, self._delivery, medium, node.complaints, node.report
         )
         self._introduction = Introduction(
             node.node_id,
@@ -306,9 +306,6 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         if to == self._node_id:
             return NO_ROUTE
         return to if to != but else self.another_next_hop(self.gateway, but)
-
-    def seek(self, node: int) -> bool:  # noqa: D102
-        return False
 
     # For the routing technique: see IRoutingEssentials ---------------------------------------
 
