@@ -210,7 +210,7 @@ class Deadlines:
 
     def __init__(self) -> None:
         self.now_s = 0.0
-        self.at_s = [math.inf] * len(Due)  # by Due; changes only here
+        self.at_s = [math.inf] * len(Due)  # by Due, infinity: never; changes only here
         self.next_s = math.inf  # the earliest of all
 
     def set(self, due: Due, at_s: float) -> None:
@@ -221,10 +221,6 @@ class Deadlines:
             self.next_s = at_s
         elif before_s <= self.next_s:
             self.next_s = min(self.at_s)
-
-    def get(self, due: Due) -> float:
-        """When `due` is; infinity: never."""
-        return self.at_s[due]
 
     def clear(self) -> None:
         """Cancel everything."""

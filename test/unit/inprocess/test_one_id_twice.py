@@ -76,4 +76,4 @@ def test_whoever_comes_back_after_giving_way_finds_the_id_introduced_again():
     control.says_connected.return_value = True
     own_id.heard(0, b"")
     antenna.switch_power.assert_called_once_with(False)
-    assert 41.0 + 30.0 <= deadlines.get(Due.OWN_ID) <= 41.0 + 60.0
+    assert 41.0 + 30.0 <= deadlines.at_s[Due.OWN_ID] <= 41.0 + 60.0

@@ -125,7 +125,7 @@ class Verdicts:
             self._searches.search(transit.addressee, MOST_HOPS if is_own else HOPS_AROUND)
         if self.retry_s <= now_s:
             self.retries()
-        due_s = min(self.retry_s, self._deadlines.get(Due.ROUTING))
+        due_s = min(self.retry_s, self._deadlines.at_s[Due.ROUTING])
         self._deadlines.set(Due.ROUTING, due_s)
         return HOLD
 

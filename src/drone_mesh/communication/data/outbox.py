@@ -231,11 +231,6 @@ class Outbox:
         for message in self:
             message.ticket.reason = reason
 
-    @property
-    def repeats(self) -> bool:
-        """Whether it has a message that it sends until it is acknowledged."""
-        return any(message.ticket.reliable for message in self)
-
     def ask_anew(self, now_s: float) -> None:
         """After a reconnection, ask for missing ACKs with the shortest time-out again."""
         for message in self._open.values():

@@ -145,11 +145,11 @@ class Outboxes:
 
         They would keep the channel busy for the packets that mend the mesh.
         """
-        now_s = self._deadlines.now_s
+        now_s, yields = self._deadlines.now_s, self._medium.policy.data_yields
         for outbox in self._outboxes.values():
             if not lost and self._was_lost:
                 outbox.ask_anew(now_s)
-            elif lost and self._medium.policy.data_yields and outbox.repeats:
+            elif lost and yields and any(message.ticket.reliable for message in outbox):
                 outbox.not_before_s = max(outbox.not_before_s, now_s + ROUTE_PERIOD_S)
                 outbox.waits_because("this node looks for a gateway")
         self._was_lost = lost

@@ -44,27 +44,22 @@ class RoundTrip:
     """The timeout for one destination, estimated from its answers."""
 
     def __init__(self) -> None:
-        self._mean_s: float | None = None
+        self.mean_s: float | None = None  # of the answers so far
         self._deviation_s = 0.0
-
-    @property
-    def mean_s(self) -> float:
-        """The mean of the answers so far; 0 without any."""
-        return self._mean_s or 0.0
 
     def measured(self, seconds: float) -> None:
         """An answer arrived after `seconds`, to a question that was sent only once."""
-        if self._mean_s is None:
-            self._mean_s, self._deviation_s = seconds, seconds / 2
+        if self.mean_s is None:
+            self.mean_s, self._deviation_s = seconds, seconds / 2
             return
-        self._deviation_s += (abs(seconds - self._mean_s) - self._deviation_s) / 4
-        self._mean_s += (seconds - self._mean_s) / 8
+        self._deviation_s += (abs(seconds - self.mean_s) - self._deviation_s) / 4
+        self.mean_s += (seconds - self.mean_s) / 8
 
     def timeout_s(self, unanswered: int) -> float:
         """How long to wait for an answer, given the number of unanswered questions."""
         timeout_s = FIRST_TIMEOUT_S
-        if self._mean_s is not None:
-            timeout_s = max(LEAST_TIMEOUT_S, self._mean_s + 4 * self._deviation_s)
+        if self.mean_s is not None:
+            timeout_s = max(LEAST_TIMEOUT_S, self.mean_s + 4 * self._deviation_s)
         return min(MOST_TIMEOUT_S, timeout_s * 2.0 ** min(unanswered, 8))
 
 
@@ -111,7 +106,8 @@ class Train:
     @property
     def most_messages(self) -> int:
         """How many messages may be on their way at once: few if answers wait for others' turns."""
-        return MOST_IN_TURN if self._round_trip.mean_s > FIRST_TIMEOUT_S else MOST_OPEN
+        is_slow = (self._round_trip.mean_s or 0.0) > FIRST_TIMEOUT_S
+        return MOST_IN_TURN if is_slow else MOST_OPEN
 
     def fragment_left(self, kind: int) -> None:
         """A fragment was sent."""

@@ -80,6 +80,7 @@ class GatewayConnection:
             self._requests,
             self._detours,
         )
+        self.swallowing = self._relay_check.swallowing
         self._unanswered = 0  # heartbeats in a row
         self._asked_neighbour_s = -math.inf  # for its gateway
         self._moved = False  # since the gateway was last asked for its place
@@ -301,7 +302,7 @@ class GatewayConnection:
 
     def check(self, patience: float) -> None:
         """The part of the periodic check for a connected router."""
-        shows_way_back = self._relay_check.swallowing.wants_heartbeat(self.hops)
+        shows_way_back = self.swallowing.wants_heartbeat(self.hops)
         if shows_way_back:
             self.send_heartbeat()
         to, answered_s = self.next_hop(), self._answered_itself_s
@@ -311,14 +312,6 @@ class GatewayConnection:
         fresh_periods = self._medium.place_periods
         self._ask_for_places(fresh_periods * self._check_period_s, asked)
         self.send_heartbeat()
-
-    def gateway_sent_place(self) -> None:
-        """The preferred gateway itself reported its place."""
-        self._relay_check.swallowing.answered()
-
-    def question_lost(self) -> None:
-        """A neighbour did not take this router's question for the place of its gateway."""
-        self._relay_check.swallowing.not_taken()
 
     def _ask_for_places(self, fresh_s: float = 0.0, gateway_asked: bool = False) -> None:
         """Ask the next hop where it is, and the gateway if that is unknown or may have moved.
@@ -374,7 +367,7 @@ class GatewayConnection:
             self.gateway = gateway
             self._resigned_s = -math.inf
             self._places.forget_gateway()
-            self._relay_check.swallowing.give_up()  # this one may not know its own place
+            self.swallowing.give_up()  # this one may not know its own place
 
     def _show(self) -> None:
         """Report a change of the connection, and stop waiting for an answer that will not come."""

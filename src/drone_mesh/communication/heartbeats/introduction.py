@@ -113,7 +113,7 @@ class Introduction:
         spread_s = self._medium.answer_spread_s
         if not spread_s:
             self._plane.send_heartbeat(neighbour)
-        elif self._deadlines.get(Due.INTRODUCE) == math.inf:
+        elif self._deadlines.at_s[Due.INTRODUCE] == math.inf:
             self._is_answer = True
             self._plan(self._rng.random() * spread_s)
 

@@ -196,7 +196,7 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         self.end(RouterEvent.ROUTE_LOST)
 
     def gateway_sent_place(self) -> None:
-        self._connection.gateway_sent_place()
+        self._connection.swallowing.answered()
 
     # Packets ---------------------------------------------------------------------------------
 
@@ -281,7 +281,7 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
     def on_undelivered(self, payload: bytes, tries: int) -> None:
         creator, _from, _kind, _to, forward = messages.header(payload)
         if (creator, forward) == (self._node_id, self.gateway) and messages.asks_for_place(payload):
-            self._connection.question_lost()
+            self._connection.swallowing.not_taken()
         if not self._delivery.undelivered(payload, tries):
             self._forwarding.stranded(payload, self._deadlines.now_s)
 
@@ -294,7 +294,7 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         if self._medium.policy.checks_soon and self._states.connected:
             share = CHANGE_PERIODS * (0.5 + self._rng.random())
             soon_s = self._deadlines.now_s + share * self._check_period_s
-            self._deadlines.set(Due.CHECK, min(soon_s, self._deadlines.get(Due.CHECK)))
+            self._deadlines.set(Due.CHECK, min(soon_s, self._deadlines.at_s[Due.CHECK]))
         self._connection.on_route_lost()
         self._host.on_neighbour_lost(node)
 

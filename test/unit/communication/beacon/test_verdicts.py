@@ -53,10 +53,10 @@ def test_a_packet_without_a_way_waits_and_a_drone_is_searched_for(node, text, se
     node.routes.gateway = 0
     assert node.verdict(transit(text)) == HOLD
     assert node.searches == searches
-    assert node.deadlines.get(Due.ROUTING) == 0.15
+    assert node.deadlines.at_s[Due.ROUTING] == 0.15
     node.deadlines.set(Due.ROUTING, 0.1)
     node.verdict(transit(text))
-    assert node.deadlines.get(Due.ROUTING) == 0.1
+    assert node.deadlines.at_s[Due.ROUTING] == 0.1
 
 
 def test_it_waits_for_two_and_a_half_seconds_and_a_bid_does_not(node):
