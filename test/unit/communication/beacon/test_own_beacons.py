@@ -93,7 +93,7 @@ class Node:
 
     def __init__(self) -> None:
         self.routes = BeaconRoutes(
-            9, False, 10.0, lambda _node: None, shared=False, clock=Deadlines()
+            9, False, 10.0, lambda _node: None, one_loss_counts=True, clock=Deadlines()
         )
         self.below = NodesBelow(9, self.routes)
 

@@ -29,7 +29,7 @@ class Node:
     def __init__(self, is_gateway=False, has_key=True):
         self.antenna, self.proved = RecordingAntenna(), set()
         self.routes = BeaconRoutes(
-            9, is_gateway, 10.0, lambda _node: None, shared=False, clock=Deadlines()
+            9, is_gateway, 10.0, lambda _node: None, one_loss_counts=True, clock=Deadlines()
         )
         courier = Courier(
             9, self.antenna, Deadlines(), 1, lambda transit: DROP if transit.sent_s else 1,

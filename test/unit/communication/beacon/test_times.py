@@ -103,7 +103,7 @@ HOP_S = 0.01  # AlwaysHalf: node 9 waits for four hops more for each of its neig
 class Node:
     def __init__(self, rng):
         self.routes = BeaconRoutes(
-            9, False, 10.0, lambda _node: None, shared=False, clock=Deadlines()
+            9, False, 10.0, lambda _node: None, one_loss_counts=True, clock=Deadlines()
         )
         self.watch = ParentWatch(self.routes, HOP_S, rng)
 

@@ -22,7 +22,7 @@ class Node:
     def __init__(self):
         self.deadlines, self.searches = Deadlines(), []
         self.routes = BeaconRoutes(
-            9, False, 10.0, lambda _node: None, shared=False, clock=self.deadlines
+            9, False, 10.0, lambda _node: None, one_loss_counts=True, clock=self.deadlines
         )
         searches = Searches(9, self.routes, lambda _k, _c, body: self.searches.append(body), 1e-5)
         self.verdicts = Verdicts(self.routes, searches, self.deadlines)
@@ -124,7 +124,7 @@ class Sender:
     def __init__(self):
         self.deadlines = Deadlines()
         self.routes = BeaconRoutes(
-            GATEWAY, True, 10.0, lambda _node: None, shared=False, clock=self.deadlines
+            GATEWAY, True, 10.0, lambda _node: None, one_loss_counts=True, clock=self.deadlines
         )
         searches = Searches(GATEWAY, self.routes, lambda *_packet: None, 0.002)
         self.verdicts = Verdicts(self.routes, searches, self.deadlines)
@@ -215,7 +215,7 @@ FOR_21 = b"\x15\x07\x00\x02"  # node 21, number 7, two hops left
 
 @pytest.fixture
 def routes():
-    return BeaconRoutes(1, False, 9.0, lambda node: None, shared=True, clock=Deadlines())
+    return BeaconRoutes(1, False, 9.0, lambda node: None, one_loss_counts=False, clock=Deadlines())
 
 
 @pytest.fixture
