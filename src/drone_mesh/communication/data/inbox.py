@@ -282,7 +282,7 @@ class Inbox:
         return order
 
     def _completed(self, whole: Whole, index: int, now_s: float) -> None:
-        count = whole.count
+        count = whole.fragments
         self._complete = whole.head.number
         self._unacknowledged += count
         if self._unacknowledged >= ACK_AT or index != count - 1:

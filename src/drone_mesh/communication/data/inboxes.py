@@ -85,7 +85,7 @@ class Inboxes:
         """Process a fragment. Raises PacketError if it is damaged."""
         now_s = self._deadlines.now_s
         inbox = self._inbox(sender, to_all)
-        for head, payload, _count in inbox.fragment(index, body, now_s):
+        for head, payload, _fragments in inbox.fragment(index, body, now_s):
             self._deliver(sender, to_all, head.port, payload, head.reliable)
         if self._tidy_s == math.inf and inbox.unfinished:
             self._tidy_s = now_s + TIDY_PERIOD_S
@@ -103,7 +103,7 @@ class Inboxes:
         now_s = self._deadlines.now_s
         self._acknowledge_due(now_s)
         for (sender, to_all), inbox in list(self._inboxes.items()):
-            for head, payload, _count in inbox.on_time(now_s):
+            for head, payload, _fragments in inbox.on_time(now_s):
                 self._deliver(sender, to_all, head.port, payload, head.reliable)
         if now_s >= self._tidy_s:
             unfinished = any(inbox.unfinished for inbox in self._inboxes.values())

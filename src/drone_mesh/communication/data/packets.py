@@ -78,7 +78,7 @@ class Whole(NamedTuple):
 
     head: Head
     payload: bytes
-    count: int = 1  # of its fragments
+    fragments: int = 1
 
 
 class Ack(NamedTuple):
