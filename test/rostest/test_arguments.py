@@ -74,6 +74,12 @@ class LaunchArgumentsTest(unittest.TestCase):
         self.assertEqual(found["/mesh_console/demo"], "repair")
         self.assertEqual(found["/mesh_console/port"], "99")
         self.assertEqual(found["/mesh_console/tiles"], "/my.mbtiles")
+        found_of_station = parameters(
+            "factory.launch", "ground_station:=tcp:127.0.0.1:0", "cot:=udp:127.0.0.1:6969",
+            "ground_station_may_order:=true", "ground_station_key:=/my.key",
+        )  # fmt: skip
+        values = {n: found_of_station[f"/ground_station/{n}"] for n in ("may_order", "key_file")}
+        self.assertEqual(values, {"may_order": True, "key_file": "/my.key"})
         hosts = [(found[f"/mesh_host_{n}/index"], found[f"/mesh_host_{n}/hosts"]) for n in (1, 2)]
         self.assertEqual(hosts, [(1, 2), (2, 2)])
 
@@ -83,6 +89,8 @@ class LaunchArgumentsTest(unittest.TestCase):
         self.assertEqual(base - nodes("simulator:=false"), {"/WirelessSignalSimulator"})
         self.assertEqual(base - nodes("manager:=false"), {"/DroneManager"})
         self.assertEqual(nodes("actions:=true") - base, {"/fly_actions"})
+        stations = nodes("ground_station:=tcp:127.0.0.1:0"), nodes("cot:=udp:127.0.0.1:6969")
+        self.assertEqual(stations, (base | {"/ground_station"},) * 2)
         self.assertEqual(nodes("console:=true") - base, {"/mesh_console"})
         self.assertEqual(nodes("demo:=repair") - base, {"/mesh_console"})
         self.assertEqual(nodes("rviz:=true") - base, {"/mesh_markers", "/mesh_rviz"})

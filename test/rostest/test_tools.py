@@ -38,6 +38,7 @@ ROS_NODES = {
     "wireless_signal_simulator": "services.wireless_signal_simulator",
     "mesh_host": "host.mesh_host_node",
     "fly_actions": "services.fly_actions",
+    "ground_station": "services.ground_station",
     "mesh_markers": "views.markers_node",
     "console": "views.console_node",
 }

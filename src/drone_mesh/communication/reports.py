@@ -102,11 +102,13 @@ def _int16(number: int) -> int:
 
 
 WORDS_AGAIN_REPORTS = 10  # unchanged words are repeated for a new gateway
+LOOK_PERIOD_S = 1.0  # how often a node looks whether it flies, and the shortest period of reports
+FRAME_PERIOD_S = 2.0  # of a drone in flight on a shared channel: one frame of reports in this time
 
 
 @dataclass(eq=False)
 class NodeReporter:
-    """Sends the reports of one router, at most one per period. Called only by its component."""
+    """Sends the reports of one router: one per period, in flight more. Called by its component."""
 
     _node: IMeshDebugInfo  # the component itself
     _control: IControlPlane
@@ -119,17 +121,27 @@ class NodeReporter:
     def __post_init__(self) -> None:
         self._words = ""  # the last ones sent
         self._words_in = 0  # reports until they are repeated
+        self._regular_s = (
+            self._sent_s
+        ) = -math.inf  # when the next one is due, and the last was sent
+        self._has_moved = False  # since the last one
 
     def start(self, share: float) -> None:
         """Send the first report after this share of a period, if there is a period."""
         if self._period_s:
-            first_s = self._deadlines.now_s + share * self._period_s
-            self._deadlines.set(Due.NODE_REPORT, first_s)
+            self._regular_s = self._deadlines.now_s + share * self._period_s
+            self._deadlines.set(Due.NODE_REPORT, self._regular_s)
 
     @due(Due.NODE_REPORT)
     def on_due(self) -> None:
-        """Send a report if a gateway is connected."""
-        self._deadlines.set(Due.NODE_REPORT, self._deadlines.now_s + self._period_s)
+        """Send a report if it is time for one, and a gateway is connected."""
+        now_s = self._deadlines.now_s
+        is_regular = now_s >= self._regular_s
+        if is_regular:
+            self._regular_s = now_s + self._period_s
+        self._deadlines.set(Due.NODE_REPORT, min(self._regular_s, now_s + LOOK_PERIOD_S))
+        if not (is_regular or self._is_moving_report_due(now_s)):
+            return
         control, me = self._control, self._node.get_node_id()
         gateway = control.gateway
         connected = control.connected and gateway <= MAX_NODE_ID
@@ -148,7 +160,23 @@ class NodeReporter:
             shares_id=self._node.get_shares_id(),
         )
         control.delivery.send_own(report.packet(me, gateway))
+        self._sent_s, self._has_moved = now_s, report.flying
         self._send_words(why_not, me, gateway)
+
+    def _is_moving_report_due(self, now_s: float) -> bool:
+        """Whether a drone in flight, or one that has just landed, is to report again.
+
+        On a shared channel its reports take a frame per FRAME_PERIOD_S, over all hops, and fewer
+        where packets collide or users' messages wait: there is no count of those who fly.
+        """
+        self._has_moved = self._has_moved or self._pilot.goal is not None
+        if not self._has_moved:
+            return False
+        period_s, antenna = LOOK_PERIOD_S, self._antenna
+        if antenna.medium.shared:
+            frame_s = antenna.medium.stretched(FRAME_PERIOD_S)
+            period_s = frame_s * max(1, self._control.hops) * (1.0 + antenna.patience())
+        return now_s >= self._sent_s + period_s and antenna.data_room() > 0
 
     def _send_words(self, words: str, me: int, gateway: int) -> None:
         self._words_in -= 1

@@ -1,4 +1,4 @@
-"""The options that connect a node: a shared emulated air, HTTP, and MQTT."""
+"""The options that connect a node: a shared emulated air, HTTP, MQTT, and ground stations."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Mapping, NamedTuple
 
 from drone_mesh.arguments import decimal, is_up_to, whole
 from drone_mesh.errors import ConfigurationError, naming_argument
+from drone_mesh.ground_station.settings import GroundStationSettings
 from drone_mesh.internet import DEFAULT_PORT
 from drone_mesh.internet.http_settings import HttpSettings
 from drone_mesh.internet.mqtt_topics import PASSWORD_VARIABLE, Broker, parse_broker
@@ -186,3 +187,45 @@ def mqtt_options(parsed: argparse.Namespace, environment: Mapping[str, str]) -> 
             password = read_secret(parsed.mqtt_password_file, "password")
     broker = parse_broker(parsed.mqtt, password)
     return MqttOptions(broker, parsed.mqtt_ca, is_internet=parsed.internet == "mqtt")
+
+
+def add_ground_station_options(parser: argparse.ArgumentParser) -> None:
+    """Add the group to a parser."""
+    group = parser.add_argument_group("ground stations", "docs/ground-stations.md explains these.")
+    group.add_argument(
+        "--ground-station",
+        action="append",
+        default=[],
+        metavar="ADDRESS",
+        help="show the nodes to a MAVLink ground station: udp:HOST:14550 sends there; "
+        "tcp:ADDRESS:PORT listens there; may be given several times",
+    )
+    group.add_argument(
+        "--ground-station-may-order",
+        action="store_true",
+        help="take orders from it: go to, hold, return, land",
+    )
+    group.add_argument(
+        "--ground-station-key-file",
+        default="",
+        metavar="FILE",
+        help="file with the passphrase of MAVLink 2 signing, accessible only to its owner; needed "
+        "for orders from other machines",
+    )
+    group.add_argument(
+        "--cot",
+        action="append",
+        default=[],
+        metavar="ADDRESS",
+        help="send Cursor on Target to udp:ADDRESS:PORT, as for ATAK; may be given several times",
+    )
+
+
+def ground_station_options(parsed: argparse.Namespace) -> GroundStationSettings | None:
+    """The parsed options. Raises ConfigurationError."""
+    return GroundStationSettings.parse(
+        parsed.ground_station,
+        parsed.cot,
+        parsed.ground_station_may_order,
+        parsed.ground_station_key_file,
+    )

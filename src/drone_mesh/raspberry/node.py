@@ -98,6 +98,10 @@ class RadioNode:
         """Run this soon on the node's own thread. Any thread."""
         self._slot.submit(work)
 
+    def call_every(self, period_s: float, work: Work) -> Callable[[], None]:
+        """Run this once per period on the node's own thread; returns what ends that."""
+        return self._slot.call_every(period_s, work)
+
     def mesh(self, after: int) -> dict[str, Any]:
         """A gateway's `mesh_report`, with the events after this number; for the node's thread."""
         component, now_s = self.component, time.monotonic()

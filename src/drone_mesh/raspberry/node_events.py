@@ -14,15 +14,13 @@ from drone_mesh.communication.events.observer import (
     MeshEventKind,
     MeshObserver,
     Observers,
+    told,
 )
 from drone_mesh.communication.interfaces import MAX_NODE_ID, NO_ROUTE, KnownNode
 from drone_mesh.communication.reports import ReportedNode
 
 EVENTS_KEPT = 500  # an hour of a mesh with frequent changes
 
-_ABOUT_GATEWAYS = frozenset(
-    (MeshEventKind.CONNECTED, MeshEventKind.DISCONNECTED, MeshEventKind.GATEWAY_CHANGED)
-)
 _WITHOUT_LINE = frozenset(  # what fails has a line of the order book
     (
         MeshEventKind.NO_ROUTE,
@@ -77,13 +75,7 @@ def _log_event(event: MeshEvent) -> None:
     """Log one line per event; orders that were lost or flown have their own lines already."""
     if event.kind in _WITHOUT_LINE:
         return
-    words = event.kind.value
-    if event.peer <= MAX_NODE_ID:
-        peer = "gateway" if event.kind in _ABOUT_GATEWAYS else "node"
-        words += f": {peer} {event.peer}"
-    why = event.explanation()
-    if why:
-        words += f" ({why})"
+    words = told(event.kind, [event.peer], event.explanation())
     level = logging.WARNING if event.kind is MeshEventKind.EMERGENCY else logging.INFO
     _log.log(level, "node %d: %s", event.node, words)
 

@@ -226,6 +226,21 @@ def _internet(options: Options, node: RadioNode) -> IInternetConnection:
             silence_s=options.silence_s,
         )
         connections.append(over_http)
+    if options.ground_station is not None:
+        # Only here: pymavlink takes most of a second to load.
+        from drone_mesh.ground_station.gateway_link import GatewayLink
+
+        timing = options.mesh.timing
+        link = GatewayLink(
+            options.ground_station,
+            options.flight.origin,
+            max(timing.check_period_s, timing.report_period_s),
+            node.engine,
+            node.submit,
+            node.call_every,
+        )
+        node.events.others.add(link.observe)
+        connections.append(link)
     return SeveralInternets(*connections)
 
 

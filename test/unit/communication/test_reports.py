@@ -39,6 +39,18 @@ def test_a_node_reports_once_in_a_period():
     assert len(rig.sent(66)) == 3
 
 
+def test_in_flight_it_reports_every_second_and_once_after_its_landing():
+    rig = router()
+    rig.wait(16.0)
+    rig.sent(66)
+    rig.mesh._pilot.goal = Location(9.0, 9.0, 9.0)
+    rig.wait(4.5)
+    assert 4 <= len(rig.sent(66)) <= 5
+    rig.mesh._pilot.goal = None
+    rig.wait(8.0)
+    assert len(rig.sent(66)) == 1
+
+
 def test_without_a_period_nothing_is_reported():
     rig = Rig()
     rig.connect_to_gateway()

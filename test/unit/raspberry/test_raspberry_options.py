@@ -242,6 +242,18 @@ def test_help_names_the_defaults_and_ends_with_status_0(capsys, parse):
     assert "pin 22 of the header" in capsys.readouterr().out.replace("\n" + " " * 24, " ")
 
 
+def test_a_gateway_knows_its_ground_stations(tmp_path):
+    key = tmp_path / "passphrase"
+    key.write_text("0123456789abcdef")
+    key.chmod(0o600)
+    line = "--ground-station udp:pi:14550 --ground-station tcp:0.0.0.0:5760 --cot udp:a:6969"
+    orders = ["--ground-station-may-order", "--ground-station-key-file", str(key)]
+    settings = parse_gateway([*line.split(), *orders], {}).ground_station
+    assert [station.port for station in settings.stations] == [14550, 5760]
+    assert (settings.cot[0].host, settings.may_order, len(settings.key)) == ("a", True, 32)
+    assert parse_gateway([], {}).ground_station is None
+
+
 def test_a_gateway_may_have_no_internet_while_nobody_asks_over_http():
     assert parse_gateway(["--silence", "5"], {}).silence_s is None
     assert parse_gateway(["--internet", "http"], {}).silence_s == 60.0

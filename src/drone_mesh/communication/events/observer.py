@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import enum
-from typing import Callable, NamedTuple
+from typing import Callable, Iterable, NamedTuple
 
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.timing import Deadlines
@@ -70,6 +70,18 @@ def explanation(order: int, place: Location | None, detail: str = "") -> str:
     number = f"order {order}" if order else ""
     goal = "" if place is None else f"to {place.in_words()}"
     return ": ".join(filter(None, (" ".join(filter(None, (number, goal))), detail)))
+
+
+_ABOUT_GATEWAYS = (
+    MeshEventKind.CONNECTED, MeshEventKind.DISCONNECTED, MeshEventKind.GATEWAY_CHANGED,
+)  # fmt: skip
+
+
+def told(kind: MeshEventKind, peers: Iterable[int], why: str) -> str:
+    """An event as a line says it: connected: gateway 0 (2 hops)."""
+    others = " ".join(str(peer) for peer in peers if peer != NO_ROUTE)
+    whom = f": {'gateway' if kind in _ABOUT_GATEWAYS else 'node'} {others}" if others else ""
+    return f"{kind.value}{whom}{f' ({why})' if why else ''}"
 
 
 def in_hops(hops: int) -> str:

@@ -1,0 +1,85 @@
+"""GatewayLink: a real gateway's connection to ground stations."""
+
+from __future__ import annotations
+
+from typing import Callable
+
+from drone_mesh.communication.events.observer import MeshEvent
+from drone_mesh.communication.interfaces import MAX_NODE_ID, IGatewayCommands, IInternetConnection
+from drone_mesh.communication.node.gateway import MeshnetworkGateway
+from drone_mesh.drone.geodesy import Origin
+from drone_mesh.drone.interfaces import IDroneEngine
+from drone_mesh.drone.location import Location
+from drone_mesh.errors import GoalRefused
+from drone_mesh.execution import Submit, Work
+from drone_mesh.ground_station.server import GroundStationServer
+from drone_mesh.ground_station.settings import GroundStationSettings
+from drone_mesh.ground_station.vehicles import vehicles_of_gateway
+from drone_mesh.state.model import EventRecord
+
+SHOW_PERIOD_S = 1.0
+
+CallEvery = Callable[[float, Work], Callable[[], None]]
+"""Calls a function once per period on the gateway's thread; returns what ends that."""
+
+
+class GatewayLink(IInternetConnection):
+    """Shows ground stations what the gateway knows, and passes their orders to it."""
+
+    def __init__(
+        self,
+        settings: GroundStationSettings,
+        origin: Origin | None,
+        period_s: float,
+        engine: IDroneEngine,
+        submit: Submit,
+        call_every: CallEvery,
+    ) -> None:
+        """`engine`: of the gateway. For the rest see GroundStationServer."""
+        self.server = GroundStationServer(settings, origin, period_s, self._order)
+        self._engine = engine
+        self._submit = submit
+        self._call_every = call_every
+        self._commands: IGatewayCommands | None = None
+        self._end_showing: Callable[[], None] = lambda: None
+
+    def connect(self, commands: IGatewayCommands) -> None:
+        assert isinstance(commands, MeshnetworkGateway)
+        gateway, engine, show = commands, self._engine, self.server.show
+        self._commands = gateway
+        self.server.start()
+        self._end_showing = self._call_every(
+            SHOW_PERIOD_S, lambda now_s: show(vehicles_of_gateway(gateway, engine, now_s), now_s)
+        )
+
+    def disconnect(self) -> None:
+        self._end_showing()
+        self.server.stop()
+
+    def observe(self, event: MeshEvent) -> None:
+        """A MeshObserver."""
+        peers = (event.peer,) if event.peer <= MAX_NODE_ID else ()
+        self.server.tell(
+            EventRecord(
+                event.now_s,
+                event.node,
+                event.kind.value,
+                peers,
+                event.detail,
+                event.order,
+                event.place,
+            )
+        )
+
+    def _order(self, node: int, goal: Location, answer: Callable[[str], None]) -> None:
+        def order(now_s: float) -> None:
+            assert self._commands is not None
+            place = goal.latitude, goal.longitude, int(goal.height)
+            try:
+                taken = self._commands.send_goal_request_to_drone(node, *place, now_s)
+            except GoalRefused as error:
+                answer(str(error))
+            else:
+                answer("" if taken else "the gateway has no route to it")
+
+        self._submit(order)

@@ -1,0 +1,323 @@
+"""GroundStationServer: the sockets of ground stations, and the thread that serves them."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import hashlib
+import hmac
+import logging
+import math
+import queue
+import select
+import socket
+import threading
+import time
+from typing import Callable, Iterable
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from drone_mesh.drone.geodesy import Origin
+from drone_mesh.drone.location import Location
+from drone_mesh.errors import ConfigurationError
+from drone_mesh.ground_station.cursor_on_target import event_of
+from drone_mesh.ground_station.reports import COMPONENT, Fleet, Message
+from drone_mesh.ground_station.requests import (
+    MOST_ORDERS_AT_ONCE,
+    ORDER_PERIOD_S,
+    Desk,
+    OrderDrone,
+)
+from drone_mesh.ground_station.settings import Address, GroundStationSettings
+from drone_mesh.ground_station.vehicles import PROOF_PERIODS, Vehicle
+from drone_mesh.state.model import EventRecord
+from drone_mesh.web.access import Allowance
+
+ROUND_S = 0.02  # at least, between two readings
+IDLE_S = 0.1  # at most; what waits in the queue is done then
+MOST_BYTES = 4096  # of one station in a round; reading noise takes 1.2 ms then
+LEAST_BYTES = 128  # as which a shorter datagram counts
+LONGEST_BYTES = 280  # of a signed message, MAVLink 2
+MOST_NOISE = 2000  # pieces of a TCP connection that are no message; then it is closed
+MOST_STATIONS = 8  # over TCP
+MOST_UNSENT_BYTES = 256 * 1024  # for one station over TCP, which does not read; then it is closed
+MOST_MESSAGES_AT_ONCE, MESSAGE_PERIOD_S = 3000, 0.01  # all that 254 vehicles are asked at first
+OLD_VIEW_S = 3.0  # wall: without news of the mesh for so long, nothing is told
+COT_AGAIN_S = 10  # period of an unchanged event, for those who begin to listen
+_SIGNING_BEGAN_S = 1420070400  # 2015-01-01, MAVLink 2 "Message Signing"
+_UNITS_PER_S = 100_000
+
+_log = logging.getLogger(__name__)
+
+
+class _Codec(mavlink.MAVLink):  # type: ignore[misc]
+    """Checks a signature before its time counts, or else strangers could move that forwards."""
+
+    def check_signature(self, packet: bytearray, system: int, component: int) -> bool:
+        digest = hashlib.sha256(self.signing.secret_key + packet[:-6]).digest()[:6]
+        return hmac.compare_digest(digest, bytes(packet[-6:])) and bool(
+            super().check_signature(packet, system, component)
+        )
+
+
+class _Station:
+    """One ground station."""
+
+    def __init__(self, sock: socket.socket, peer: tuple[str, int] | None, signing: object) -> None:
+        """`peer`: of UDP; None: a TCP connection."""
+        self.socket = sock
+        self._peer = peer
+        self._codec = _Codec(None, 0, COMPONENT)
+        self._codec.robust_parsing = True
+        if signing is not None:
+            self._codec.signing = signing  # one for all: a packet counts once
+        self._numbers: dict[int, int] = {}  # by node, of its next message
+        self._unsent = b""
+        self._noise = 0
+        self.is_tcp = peer is None
+        self.limit = Allowance(MOST_MESSAGES_AT_ONCE, MESSAGE_PERIOD_S)
+
+    def send(self, node: int, message: Message) -> None:
+        """Send a message of this node. Raises OSError: the connection is over."""
+        codec = self._codec
+        codec.srcSystem = node + 1
+        codec.seq = self._numbers.get(node, 0)
+        self._numbers[node] = (codec.seq + 1) % 256
+        packet = message.pack(codec)
+        if self._peer is not None:
+            with contextlib.suppress(OSError):  # nobody listens now, or the network is full
+                self.socket.sendto(packet, self._peer)
+            return
+        self._unsent += packet
+        self.flush()
+
+    def flush(self) -> None:
+        """Send what waits. Raises OSError."""
+        try:
+            while self._unsent:
+                self._unsent = self._unsent[self.socket.send(self._unsent) :]
+        except BlockingIOError:
+            if len(self._unsent) > MOST_UNSENT_BYTES:
+                raise ConnectionError("it does not read") from None
+
+    def receive(self) -> Iterable[Message]:
+        """What has come, up to the limits of one round. Raises OSError."""
+        if self._peer is None:
+            data = self.socket.recv(MOST_BYTES)
+            if not data:
+                raise ConnectionError("it has closed the connection")
+            yield from self._read(data)
+            if self._noise > MOST_NOISE:
+                raise ConnectionError("it sends noise")
+            return
+        size = 0
+        with contextlib.suppress(OSError):  # nothing is left, or nobody listened there before
+            while size < MOST_BYTES:
+                data, sender = self.socket.recvfrom(MOST_BYTES)
+                size += max(len(data), LEAST_BYTES)
+                if sender == self._peer:
+                    yield from self._read(data)
+                    if self._codec.buf_len():  # cut off; the next one begins a message
+                        self._codec.parse_buffer(bytes(LONGEST_BYTES))
+
+    def _read(self, data: bytes) -> Iterable[Message]:
+        for message in self._codec.parse_buffer(data) or ():
+            if message.get_type() == "BAD_DATA":
+                self._noise += 1
+            elif not self.limit.is_over():
+                self.limit.note()
+                yield message
+
+
+class GroundStationServer:
+    """Its thread owns sockets, fleet and desk. Any thread may call `show` and `tell`."""
+
+    def __init__(
+        self,
+        settings: GroundStationSettings,
+        origin: Origin | None,
+        period_s: float,
+        order: OrderDrone,
+    ) -> None:
+        """Open the sockets. A node is heard at least every `period_s` of the mesh's clock.
+
+        Raises ConfigurationError for an address that is not available.
+        """
+        if settings.cot and origin is None:
+            raise ConfigurationError("--cot needs an origin (--origin): it has places in degrees")
+        self._settings = settings
+        self._origin = origin
+        self._period_s = period_s
+        self._signing = None if settings.key is None else _signing(settings.key)
+        self._work: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+        self._seen_s = -math.inf  # wall, when the mesh was last shown
+        self._fleet = Fleet(origin, PROOF_PERIODS * period_s, settings.may_order)
+        self._order = order
+        self._desk = Desk(
+            self._fleet,
+            self._order_later,
+            settings.may_order,
+            self._post,
+            Allowance(MOST_ORDERS_AT_ONCE, ORDER_PERIOD_S),
+        )
+        self._stations: list[_Station] = []
+        self._listeners: list[socket.socket] = []
+        self._cot = [(_udp(to), to[1:]) for to in settings.cot]
+        self._cot_told: dict[int, float] = {}  # by node: of which place
+        for address in settings.stations:
+            if address.kind == "tcp":
+                self._listeners.append(_listener(address))
+            else:
+                self._stations.append(_Station(_udp(address), _peer(address), self._signing))
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="ground stations")
+
+    @property
+    def addresses(self) -> list[tuple[str, int]]:
+        """Where it listens over TCP."""
+        return [listener.getsockname()[:2] for listener in self._listeners]
+
+    def start(self) -> None:
+        """Start its thread."""
+        self._thread.start()
+        for address in self._settings.stations:
+            allowed = "may order" if self._settings.may_order else "may only look"
+            _log.info("ground station %s:%s:%d: it %s", *address, allowed)
+
+    def stop(self) -> None:
+        """End the thread, and close all sockets."""
+        self._ended.set()
+        if self._thread.ident is not None:
+            self._thread.join()
+        stations = [station.socket for station in self._stations]
+        for sock in (*stations, *self._listeners, *(sock for sock, _to in self._cot)):
+            sock.close()
+
+    def show(self, vehicles: Iterable[Vehicle], now_s: float) -> None:
+        """The fleet now, with times of the mesh's clock; about once a second."""
+        self._work.put(functools.partial(self._show, list(vehicles), now_s))
+
+    def tell(self, event: EventRecord) -> None:
+        """An event of the mesh."""
+        self._work.put(functools.partial(self._tell, event))
+
+    # Its thread ------------------------------------------------------------------------------
+
+    def _run(self) -> None:
+        second, due_s = 0, time.monotonic()
+        while not self._ended.wait(ROUND_S):
+            while not self._work.empty():
+                self._work.get()()
+            if time.monotonic() >= due_s:
+                due_s = max(due_s + 1.0, time.monotonic())
+                second += 1
+                self._every_second(second)
+            sources = {station.socket: station for station in self._stations}
+            for sock in select.select([*sources, *self._listeners], [], [], IDLE_S)[0]:
+                station = sources.get(sock)
+                if station is None:
+                    self._accept(sock)
+                else:
+                    self._receive(station)
+
+    def _show(self, vehicles: list[Vehicle], now_s: float) -> None:
+        self._seen_s = time.monotonic()
+        self._fleet.show(vehicles, now_s)
+
+    def _tell(self, event: EventRecord) -> None:
+        self._desk.event(event)
+        for told in self._fleet.event(event):
+            self._post(*told, None)
+
+    def _every_second(self, second: int) -> None:
+        if self._signing is not None:  # its clock would stand still between two messages
+            self._signing.timestamp = max(self._signing.timestamp, _signing_time())
+        if time.monotonic() - self._seen_s > OLD_VIEW_S:
+            return
+        for told in self._fleet.every_second(second) if self._stations else ():
+            self._post(*told, None)
+        for vehicle in self._fleet.all_alive() if self._cot else ():
+            self._point(vehicle, second)
+
+    def _point(self, vehicle: Vehicle, second: int) -> None:
+        assert self._origin is not None
+        told_s = self._cot_told.get(vehicle.node)
+        if told_s == vehicle.place_s and (second + vehicle.node) % COT_AGAIN_S:
+            return
+        self._cot_told[vehicle.node] = vehicle.place_s
+        event = event_of(vehicle, self._origin, self._fleet.now_s, time.time(), self._period_s)
+        for sock, to in self._cot if event is not None else ():
+            with contextlib.suppress(OSError):  # nobody listens now, or there is no network
+                sock.sendto(event or b"", to)
+
+    def _order_later(self, node: int, goal: Location, answer: Callable[[str], None]) -> None:
+        self._order(node, goal, lambda why: self._work.put(functools.partial(answer, why)))
+
+    def _post(self, node: int, message: Message, station: object) -> None:
+        for one in list(self._stations):
+            if station in (None, one):
+                try:
+                    one.send(node, message)
+                except OSError as error:
+                    self._close(one, error)
+
+    def _receive(self, station: _Station) -> None:
+        try:
+            station.flush()
+            for message in station.receive():
+                self._desk.received(message, station)
+        except OSError as error:
+            self._close(station, error)
+
+    def _accept(self, listener: socket.socket) -> None:
+        try:
+            sock, peer = listener.accept()
+        except OSError:
+            return  # it has gone again
+        if sum(station.is_tcp for station in self._stations) >= MOST_STATIONS:
+            sock.close()
+            return
+        sock.setblocking(False)
+        self._stations.append(_Station(sock, None, self._signing))
+        _log.info("ground station at %s:%d: connected", *peer[:2])
+
+    def _close(self, station: _Station, why: OSError) -> None:
+        if station in self._stations:
+            self._stations.remove(station)
+            station.socket.close()
+            _log.info("ground station over TCP: disconnected: %s", why)
+
+
+def _signing_time() -> int:
+    return int((time.time() - _SIGNING_BEGAN_S) * _UNITS_PER_S)
+
+
+def _signing(key: bytes) -> mavlink.MAVLinkSigning:
+    signing = mavlink.MAVLinkSigning()
+    signing.secret_key, signing.sign_outgoing, signing.timestamp = key, True, _signing_time()
+    return signing
+
+
+def _peer(address: Address) -> tuple[str, int]:
+    """Its numeric address. Raises ConfigurationError."""
+    try:
+        return socket.gethostbyname(address.host), address.port
+    except OSError as error:
+        raise ConfigurationError(f"{address.host}: {error.strerror}") from error
+
+
+def _udp(address: Address) -> socket.socket:
+    sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    sock.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
+    sock.setblocking(False)
+    return sock
+
+
+def _listener(address: Address) -> socket.socket:
+    try:
+        listener = socket.create_server((address.host, address.port))
+    except OSError as error:
+        where = f"tcp:{address.host}:{address.port}"
+        raise ConfigurationError(f"--ground-station {where}: {error.strerror}") from error
+    listener.setblocking(False)
+    return listener
