@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from xml.etree import ElementTree
+from xml.etree.ElementTree import Element, SubElement, tostring
 
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.ground_station.vehicles import Vehicle
@@ -14,43 +14,30 @@ _UNKNOWN_M = "9999999.0"  # of the errors, as the schema has it
 
 def event_of(
     vehicle: Vehicle, origin: Origin, now_s: float, now_utc_s: float, period_s: float
-) -> bytes | None:
-    """The event; None: its place is not known.
+) -> bytes:
+    """The event; empty: its place is not known.
 
     `now_s` and the vehicle have the mesh's clock, which reads `now_utc_s` as seconds of 1970. The
     event is stale when the next report is due, `period_s` after its own.
     """
     if vehicle.place is None:
-        return None
-    earth = origin.to_earth(vehicle.place)
-    true_utc_s = now_utc_s - (now_s - vehicle.place_s)
-    event = ElementTree.Element(
-        "event",
-        version="2.0",
-        uid=f"drone_mesh.{vehicle.node}",
-        type=_DRONE,
-        how="m-g",  # by a machine, with GPS
-        time=_utc(true_utc_s),
-        start=_utc(true_utc_s),
-        stale=_utc(true_utc_s + period_s),
+        return b""
+    north_deg, east_deg, altitude_m = origin.to_earth(vehicle.place)
+    true_utc_s, uid = now_utc_s - (now_s - vehicle.place_s), f"drone_mesh.{vehicle.node}"
+    at, stale = _utc(true_utc_s), _utc(true_utc_s + period_s)
+    how = "m-g"  # by a machine, with GPS
+    event = Element(
+        "event", version="2.0", uid=uid, type=_DRONE, how=how, time=at, start=at, stale=stale
     )
-    ElementTree.SubElement(
-        event,
-        "point",
-        lat=f"{earth.latitude_deg:.7f}",
-        lon=f"{earth.longitude_deg:.7f}",
-        hae=f"{earth.altitude_m:.1f}",
-        ce=_UNKNOWN_M,
-        le=_UNKNOWN_M,
-    )
-    detail = ElementTree.SubElement(event, "detail")
-    ElementTree.SubElement(detail, "contact", callsign=f"drone {vehicle.node}")
+    where = {"lat": f"{north_deg:.7f}", "lon": f"{east_deg:.7f}", "hae": f"{altitude_m:.1f}"}
+    SubElement(event, "point", where, ce=_UNKNOWN_M, le=_UNKNOWN_M)
+    detail = SubElement(event, "detail")
+    SubElement(detail, "contact", callsign=f"drone {vehicle.node}")
     if vehicle.battery_percent is not None:
-        ElementTree.SubElement(detail, "status", battery=f"{vehicle.battery_percent:.0f}")
-    words = vehicle.why_not_fly or ("in flight" if vehicle.flying else "")
-    if words:
-        ElementTree.SubElement(detail, "remarks").text = words
-    return bytes(ElementTree.tostring(event, encoding="utf-8", xml_declaration=True))
+        SubElement(detail, "status", battery=f"{vehicle.battery_percent:.0f}")
+    doing = {True: "in flight", False: "on the ground", None: ""}[vehicle.flying]
+    SubElement(detail, "remarks").text = vehicle.why_not_fly or doing
+    return bytes(tostring(event, encoding="utf-8", xml_declaration=True))
 
 
 def _utc(seconds: float) -> str:

@@ -19,9 +19,6 @@ from drone_mesh.state.model import EventRecord
 
 SHOW_PERIOD_S = 1.0
 
-CallEvery = Callable[[float, Work], Callable[[], None]]
-"""Calls a function once per period on the gateway's thread; returns what ends that."""
-
 
 class GatewayLink(IInternetConnection):
     """Shows ground stations what the gateway knows, and passes their orders to it."""
@@ -33,50 +30,43 @@ class GatewayLink(IInternetConnection):
         period_s: float,
         engine: IDroneEngine,
         submit: Submit,
-        call_every: CallEvery,
+        call_every: Callable[[float, Work], Callable[[], None]],
     ) -> None:
-        """`engine`: of the gateway. For the rest see GroundStationServer."""
-        self.server = GroundStationServer(settings, origin, period_s, self._order)
-        self._engine = engine
-        self._submit = submit
-        self._call_every = call_every
-        self._commands: IGatewayCommands | None = None
+        """`engine`: of the gateway, on whose thread `submit` and `call_every` run a function.
+
+        `call_every` returns what ends that. For the rest see GroundStationServer.
+        """
+        self._server = GroundStationServer(settings, origin, period_s, self._order)
+        self._engine, self._submit, self._call_every = engine, submit, call_every
+        self._gateway: MeshnetworkGateway | None = None
         self._end_showing: Callable[[], None] = lambda: None
 
     def connect(self, commands: IGatewayCommands) -> None:
         assert isinstance(commands, MeshnetworkGateway)
-        gateway, engine, show = commands, self._engine, self.server.show
-        self._commands = gateway
-        self.server.start()
-        self._end_showing = self._call_every(
-            SHOW_PERIOD_S, lambda now_s: show(vehicles_of_gateway(gateway, engine, now_s), now_s)
-        )
+        self._gateway = commands
+        self._server.start()
+        self._end_showing = self._call_every(SHOW_PERIOD_S, self._show)
 
     def disconnect(self) -> None:
         self._end_showing()
-        self.server.stop()
+        self._server.stop()
 
     def observe(self, event: MeshEvent) -> None:
         """A MeshObserver."""
-        peers = (event.peer,) if event.peer <= MAX_NODE_ID else ()
-        self.server.tell(
-            EventRecord(
-                event.now_s,
-                event.node,
-                event.kind.value,
-                peers,
-                event.detail,
-                event.order,
-                event.place,
-            )
-        )
+        kind, node, now_s, peer, detail, order, place = event
+        peers = (peer,) if peer <= MAX_NODE_ID else ()
+        self._server.tell(EventRecord(now_s, node, kind.value, peers, detail, order, place))
+
+    def _show(self, now_s: float) -> None:
+        assert self._gateway is not None
+        self._server.show(vehicles_of_gateway(self._gateway, self._engine, now_s), now_s)
 
     def _order(self, node: int, goal: Location, answer: Callable[[str], None]) -> None:
         def order(now_s: float) -> None:
-            assert self._commands is not None
+            assert self._gateway is not None
             place = goal.latitude, goal.longitude, int(goal.height)
             try:
-                taken = self._commands.send_goal_request_to_drone(node, *place, now_s)
+                taken = self._gateway.send_goal_request_to_drone(node, *place, now_s)
             except GoalRefused as error:
                 answer(str(error))
             else:

@@ -13,7 +13,7 @@ import select
 import socket
 import threading
 import time
-from typing import Callable, Iterable
+from typing import Any, Callable, Iterable, Iterator
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -22,26 +22,20 @@ from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.ground_station.cursor_on_target import event_of
 from drone_mesh.ground_station.reports import COMPONENT, Fleet, Message
-from drone_mesh.ground_station.requests import (
-    MOST_ORDERS_AT_ONCE,
-    ORDER_PERIOD_S,
-    Desk,
-    OrderDrone,
-)
+from drone_mesh.ground_station.requests import Desk, OrderDrone
 from drone_mesh.ground_station.settings import Address, GroundStationSettings
 from drone_mesh.ground_station.vehicles import PROOF_PERIODS, Vehicle
 from drone_mesh.state.model import EventRecord
 from drone_mesh.web.access import Allowance
 
-ROUND_S = 0.02  # at least, between two readings
-IDLE_S = 0.1  # at most; what waits in the queue is done then
-MOST_BYTES = 4096  # of one station in a round; reading noise takes 1.2 ms then
+ROUND_S, IDLE_S = 0.02, 0.1  # between two readings at least, and at most
+MOST_BYTES = 4096  # of one station in a round; to read noise takes 1.2 ms then
 LEAST_BYTES = 128  # as which a shorter datagram counts
 LONGEST_BYTES = 280  # of a signed message, MAVLink 2
 MOST_NOISE = 2000  # pieces of a TCP connection that are no message; then it is closed
 MOST_STATIONS = 8  # over TCP
-MOST_UNSENT_BYTES = 256 * 1024  # for one station over TCP, which does not read; then it is closed
-MOST_MESSAGES_AT_ONCE, MESSAGE_PERIOD_S = 3000, 0.01  # all that 254 vehicles are asked at first
+MESSAGES = 3000, 0.01  # at once, which is what 254 vehicles are asked at first; then one per period
+ORDERS = 300, 0.05  # as over HTTP
 OLD_VIEW_S = 3.0  # wall: without news of the mesh for so long, nothing is told
 COT_AGAIN_S = 10  # period of an unchanged event, for those who begin to listen
 _SIGNING_BEGAN_S = 1420070400  # 2015-01-01, MAVLink 2 "Message Signing"
@@ -55,77 +49,60 @@ class _Codec(mavlink.MAVLink):  # type: ignore[misc]
 
     def check_signature(self, packet: bytearray, system: int, component: int) -> bool:
         digest = hashlib.sha256(self.signing.secret_key + packet[:-6]).digest()[:6]
-        return hmac.compare_digest(digest, bytes(packet[-6:])) and bool(
-            super().check_signature(packet, system, component)
-        )
+        is_right = hmac.compare_digest(digest, bytes(packet[-6:]))
+        return is_right and bool(super().check_signature(packet, system, component))
 
 
 class _Station:
-    """One ground station."""
+    """One ground station: at `peer` over UDP, or None: a TCP connection."""
 
-    def __init__(self, sock: socket.socket, peer: tuple[str, int] | None, signing: object) -> None:
-        """`peer`: of UDP; None: a TCP connection."""
-        self.socket = sock
-        self._peer = peer
+    def __init__(self, sock: socket.socket, peer: tuple[str, int] | None, signing: Any) -> None:
+        self.socket, self.peer = sock, peer
         self._codec = _Codec(None, 0, COMPONENT)
         self._codec.robust_parsing = True
         if signing is not None:
             self._codec.signing = signing  # one for all: a packet counts once
         self._numbers: dict[int, int] = {}  # by node, of its next message
-        self._unsent = b""
         self._noise = 0
-        self.is_tcp = peer is None
-        self.limit = Allowance(MOST_MESSAGES_AT_ONCE, MESSAGE_PERIOD_S)
+        self._limit = Allowance(*MESSAGES)
 
     def send(self, node: int, message: Message) -> None:
-        """Send a message of this node. Raises OSError: the connection is over."""
+        """Send a message of this node. Raises OSError: a connection is over."""
         codec = self._codec
-        codec.srcSystem = node + 1
-        codec.seq = self._numbers.get(node, 0)
+        codec.srcSystem, codec.seq = node + 1, self._numbers.get(node, 0)
         self._numbers[node] = (codec.seq + 1) % 256
         packet = message.pack(codec)
-        if self._peer is not None:
-            with contextlib.suppress(OSError):  # nobody listens now, or the network is full
-                self.socket.sendto(packet, self._peer)
+        if self.peer is None:
+            if self.socket.send(packet) < len(packet):
+                raise BlockingIOError("it does not read")
             return
-        self._unsent += packet
-        self.flush()
+        with contextlib.suppress(OSError):  # nobody listens now, or the network is full
+            self.socket.sendto(packet, self.peer)
 
-    def flush(self) -> None:
-        """Send what waits. Raises OSError."""
-        try:
-            while self._unsent:
-                self._unsent = self._unsent[self.socket.send(self._unsent) :]
-        except BlockingIOError:
-            if len(self._unsent) > MOST_UNSENT_BYTES:
-                raise ConnectionError("it does not read") from None
-
-    def receive(self) -> Iterable[Message]:
-        """What has come, up to the limits of one round. Raises OSError."""
-        if self._peer is None:
+    def receive(self) -> Iterator[Message]:
+        """What has come, up to the limits of one round. Raises OSError: a connection is over."""
+        if self.peer is None:
             data = self.socket.recv(MOST_BYTES)
-            if not data:
-                raise ConnectionError("it has closed the connection")
             yield from self._read(data)
-            if self._noise > MOST_NOISE:
-                raise ConnectionError("it sends noise")
+            if not data or self._noise > MOST_NOISE:
+                raise ConnectionError("it sends noise" if data else "it closed the connection")
             return
         size = 0
         with contextlib.suppress(OSError):  # nothing is left, or nobody listened there before
             while size < MOST_BYTES:
                 data, sender = self.socket.recvfrom(MOST_BYTES)
                 size += max(len(data), LEAST_BYTES)
-                if sender == self._peer:
+                if sender == self.peer:
                     yield from self._read(data)
                     if self._codec.buf_len():  # cut off; the next one begins a message
                         self._codec.parse_buffer(bytes(LONGEST_BYTES))
 
-    def _read(self, data: bytes) -> Iterable[Message]:
+    def _read(self, data: bytes) -> Iterator[Message]:
         for message in self._codec.parse_buffer(data) or ():
             if message.get_type() == "BAD_DATA":
                 self._noise += 1
-            elif not self.limit.is_over():
-                self.limit.note()
+            elif not self._limit.is_over():
+                self._limit.note()
                 yield message
 
 
@@ -145,44 +122,39 @@ class GroundStationServer:
         """
         if settings.cot and origin is None:
             raise ConfigurationError("--cot needs an origin (--origin): it has places in degrees")
-        self._settings = settings
-        self._origin = origin
-        self._period_s = period_s
-        self._signing = None if settings.key is None else _signing(settings.key)
+        self._settings, self._origin = settings, origin
+        self._period_s, self._order = period_s, order
         self._work: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
         self._seen_s = -math.inf  # wall, when the mesh was last shown
         self._fleet = Fleet(origin, PROOF_PERIODS * period_s, settings.may_order)
-        self._order = order
-        self._desk = Desk(
-            self._fleet,
-            self._order_later,
-            settings.may_order,
-            self._post,
-            Allowance(MOST_ORDERS_AT_ONCE, ORDER_PERIOD_S),
-        )
-        self._stations: list[_Station] = []
-        self._listeners: list[socket.socket] = []
-        self._cot = [(_udp(to), to[1:]) for to in settings.cot]
+        self._desk = Desk(self._fleet, self._order_later, self._post, Allowance(*ORDERS))
+        self._signing: Any = None
+        if settings.key is not None:
+            self._signing = mavlink.MAVLinkSigning()
+            self._signing.secret_key, self._signing.sign_outgoing = settings.key, True
+            self._signing.timestamp = _signing_time()
+        self._cot = [(_udp_socket(), _numeric(address)) for address in settings.cot]
         self._cot_told: dict[int, float] = {}  # by node: of which place
-        for address in settings.stations:
-            if address.kind == "tcp":
-                self._listeners.append(_listener(address))
-            else:
-                self._stations.append(_Station(_udp(address), _peer(address), self._signing))
+        self._listeners = [_listener(one) for one in settings.stations if one.kind == "tcp"]
+        self._stations = [
+            _Station(_udp_socket(), _numeric(one), self._signing)
+            for one in settings.stations
+            if one.kind == "udp"
+        ]
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name="ground stations")
 
     @property
-    def addresses(self) -> list[tuple[str, int]]:
+    def listens_at(self) -> list[tuple[str, int]]:
         """Where it listens over TCP."""
         return [listener.getsockname()[:2] for listener in self._listeners]
 
     def start(self) -> None:
         """Start its thread."""
         self._thread.start()
+        may = "may order" if self._settings.may_order else "may only look"
         for address in self._settings.stations:
-            allowed = "may order" if self._settings.may_order else "may only look"
-            _log.info("ground station %s:%s:%d: it %s", *address, allowed)
+            _log.info("ground stations at %s:%s:%d %s", *address, may)
 
     def stop(self) -> None:
         """End the thread, and close all sockets."""
@@ -214,11 +186,10 @@ class GroundStationServer:
                 self._every_second(second)
             sources = {station.socket: station for station in self._stations}
             for sock in select.select([*sources, *self._listeners], [], [], IDLE_S)[0]:
-                station = sources.get(sock)
-                if station is None:
-                    self._accept(sock)
+                if sock in sources:
+                    self._receive(sources[sock])
                 else:
-                    self._receive(station)
+                    self._accept(sock)
 
     def _show(self, vehicles: list[Vehicle], now_s: float) -> None:
         self._seen_s = time.monotonic()
@@ -237,18 +208,18 @@ class GroundStationServer:
         for told in self._fleet.every_second(second) if self._stations else ():
             self._post(*told, None)
         for vehicle in self._fleet.all_alive() if self._cot else ():
-            self._point(vehicle, second)
+            is_new = self._cot_told.get(vehicle.node) != vehicle.place_s
+            if is_new or (second + vehicle.node) % COT_AGAIN_S == 0:
+                self._cot_told[vehicle.node] = vehicle.place_s
+                self._point(vehicle)
 
-    def _point(self, vehicle: Vehicle, second: int) -> None:
+    def _point(self, vehicle: Vehicle) -> None:
         assert self._origin is not None
-        told_s = self._cot_told.get(vehicle.node)
-        if told_s == vehicle.place_s and (second + vehicle.node) % COT_AGAIN_S:
-            return
-        self._cot_told[vehicle.node] = vehicle.place_s
-        event = event_of(vehicle, self._origin, self._fleet.now_s, time.time(), self._period_s)
-        for sock, to in self._cot if event is not None else ():
+        now = self._fleet.now_s, time.time()
+        event = event_of(vehicle, self._origin, *now, self._period_s)
+        for sock, to in self._cot if event else ():
             with contextlib.suppress(OSError):  # nobody listens now, or there is no network
-                sock.sendto(event or b"", to)
+                sock.sendto(event, to)
 
     def _order_later(self, node: int, goal: Location, answer: Callable[[str], None]) -> None:
         self._order(node, goal, lambda why: self._work.put(functools.partial(answer, why)))
@@ -263,23 +234,20 @@ class GroundStationServer:
 
     def _receive(self, station: _Station) -> None:
         try:
-            station.flush()
             for message in station.receive():
                 self._desk.received(message, station)
         except OSError as error:
             self._close(station, error)
 
     def _accept(self, listener: socket.socket) -> None:
-        try:
+        with contextlib.suppress(OSError):  # it has gone again
             sock, peer = listener.accept()
-        except OSError:
-            return  # it has gone again
-        if sum(station.is_tcp for station in self._stations) >= MOST_STATIONS:
-            sock.close()
-            return
-        sock.setblocking(False)
-        self._stations.append(_Station(sock, None, self._signing))
-        _log.info("ground station at %s:%d: connected", *peer[:2])
+            if sum(station.peer is None for station in self._stations) >= MOST_STATIONS:
+                sock.close()
+                return
+            sock.setblocking(False)
+            self._stations.append(_Station(sock, None, self._signing))
+            _log.info("ground station at %s:%d: connected", *peer[:2])
 
     def _close(self, station: _Station, why: OSError) -> None:
         if station in self._stations:
@@ -292,21 +260,15 @@ def _signing_time() -> int:
     return int((time.time() - _SIGNING_BEGAN_S) * _UNITS_PER_S)
 
 
-def _signing(key: bytes) -> mavlink.MAVLinkSigning:
-    signing = mavlink.MAVLinkSigning()
-    signing.secret_key, signing.sign_outgoing, signing.timestamp = key, True, _signing_time()
-    return signing
-
-
-def _peer(address: Address) -> tuple[str, int]:
-    """Its numeric address. Raises ConfigurationError."""
+def _numeric(address: Address) -> tuple[str, int]:
+    """Where datagrams go to, and come from. Raises ConfigurationError."""
     try:
         return socket.gethostbyname(address.host), address.port
     except OSError as error:
         raise ConfigurationError(f"{address.host}: {error.strerror}") from error
 
 
-def _udp(address: Address) -> socket.socket:
+def _udp_socket() -> socket.socket:
     sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
     sock.setblocking(False)

@@ -34,11 +34,8 @@ class GroundStationSettings:
     @classmethod
     def parse(
         cls, stations: Sequence[str], cot: Sequence[str], may_order: bool, key_file: str
-    ) -> GroundStationSettings | None:
-        """From words of a user; None: neither stations nor Cursor on Target.
-
-        Raises ConfigurationError.
-        """
+    ) -> GroundStationSettings:
+        """From words of a user. Raises ConfigurationError."""
         if not stations and (may_order or key_file):
             raise ConfigurationError(
                 "orders from ground stations and their key need --ground-station"
@@ -48,14 +45,18 @@ class GroundStationSettings:
         if key_file:
             with naming_argument("--ground-station-key-file ", key_file):
                 key = signing_key(Path(key_file))
-        for address in addresses:
-            if (may_order or address.kind == "tcp") and not (key or is_loopback(address.host)):
+        for text, (kind, host, _port) in zip(stations, addresses):
+            if (may_order or kind == "tcp") and not (key or is_loopback(host)):
                 raise ConfigurationError(
-                    f"--ground-station {':'.join(map(str, address))}: other machines can reach it: "
-                    "--ground-station-may-order and tcp need --ground-station-key-file"
+                    f"--ground-station {text}: other machines can reach it: orders and tcp need "
+                    "--ground-station-key-file"
                 )
-        targets = tuple(_address("--cot", text, ("udp",)) for text in cot)
-        return cls(addresses, targets, may_order, key) if addresses or targets else None
+        return cls(
+            addresses, tuple(_address("--cot", text, ("udp",)) for text in cot), may_order, key
+        )
+
+
+NO_STATIONS = GroundStationSettings()
 
 
 def signing_key(path: Path) -> bytes:
@@ -69,7 +70,7 @@ def signing_key(path: Path) -> bytes:
 def _address(option: str, text: str, kinds: Sequence[str]) -> Address:
     kind, _, rest = text.partition(":")
     host, _, port = rest.rpartition(":")
-    if kind in kinds and host and is_up_to(port, MAX_PORT):
-        return Address(kind, host.strip("[]"), int(port))
-    forms = " or ".join(f"{kind}:HOST:PORT" for kind in kinds)
-    raise ConfigurationError(f"invalid {option} {text!r}: use {forms}")
+    if not (kind in kinds and host and is_up_to(port, MAX_PORT)):
+        forms = " or ".join(f"{kind}:HOST:PORT" for kind in kinds)
+        raise ConfigurationError(f"invalid {option} {text!r}: use {forms}")
+    return Address(kind, host, int(port))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from dataclasses import dataclass
 from typing import Iterable
@@ -36,43 +37,19 @@ def vehicles_of_gateway(
     gateway: MeshnetworkGateway, engine: IDroneEngine, now_s: float
 ) -> list[Vehicle]:
     """What a gateway with this drone knows from packets alone. Only on its thread."""
-    try:
-        place: Location | None = engine.get_location()
-    except LocationUnknown:
-        place = None
-    vehicles = [
-        Vehicle(
-            gateway.get_node_id(),
-            now_s,
-            True,
-            bool(engine.is_flying()),
-            place,
-            now_s,
-            engine.battery_percent(),
-            engine.why_not_fly(),
-        )
-    ]
-    heard_s = {node.node_id: node.heard_s for node in gateway.get_known_nodes()}
-    reported = {node.node_id: node for node in gateway.get_node_reports()}
-    for node in sorted(heard_s.keys() | reported.keys()):
-        told = reported.get(node)
-        if told is None or told.heard_s == -math.inf:
-            vehicles.append(Vehicle(node, heard_s.get(node, -math.inf)))
-            continue
-        report = told.report
-        vehicles.append(
-            Vehicle(
-                node,
-                max(told.heard_s, heard_s.get(node, -math.inf)),
-                False,
-                report.flying,
-                report.place,
-                told.heard_s,
-                report.battery_percent,
-                told.why_not_fly,
-            )
-        )
-    return vehicles
+    me, flying, place = gateway.get_node_id(), bool(engine.is_flying()), None
+    with contextlib.suppress(LocationUnknown):
+        place = engine.get_location()
+    battery, why_not = engine.battery_percent(), engine.why_not_fly()
+    vehicles = {me: Vehicle(me, now_s, True, flying, place, now_s, battery, why_not)}
+    for known in gateway.get_known_nodes():
+        vehicles[known.node_id] = Vehicle(known.node_id, known.heard_s)
+    for node, report, why_not, at_s in gateway.get_node_reports():
+        if at_s > -math.inf:
+            heard_s = max(at_s, vehicles[node].heard_s if node in vehicles else at_s)
+            told = report.flying, report.place, at_s, report.battery_percent, why_not
+            vehicles[node] = Vehicle(node, heard_s, False, *told)
+    return [vehicle for _node, vehicle in sorted(vehicles.items())]
 
 
 def vehicles_of_state(mesh: MeshStatus, before: Iterable[Vehicle]) -> list[Vehicle]:
@@ -81,18 +58,12 @@ def vehicles_of_state(mesh: MeshStatus, before: Iterable[Vehicle]) -> list[Vehic
     A node without a gateway stays as it was `before`, when it still had one.
     """
     vehicles = {vehicle.node: vehicle for vehicle in before}
-    present = {node.id for node in mesh.nodes}
     for node in mesh.nodes:
         if node.on and node.connected and node.report_age < OLD_REPORT_S:
-            vehicles[node.id] = Vehicle(
-                node.id,
-                mesh.stamp_s,
-                node.role == Role.GATEWAY,
-                len(node.path) > 0 or len(node.heading) > 0,
-                Location.from_vector(node.position) if position_is_known(node) else None,
-                mesh.stamp_s,
-                None if math.isnan(node.battery) else node.battery,
-                node.why_not_fly,
-                node.crashed,
-            )
-    return [vehicle for node, vehicle in sorted(vehicles.items()) if node in present]
+            flying = len(node.path) > 0 or len(node.heading) > 0
+            place = Location.from_vector(node.position) if position_is_known(node) else None
+            battery = None if math.isnan(node.battery) else node.battery
+            told = flying, place, mesh.stamp_s, battery, node.why_not_fly, node.crashed
+            is_gateway = node.role == Role.GATEWAY
+            vehicles[node.id] = Vehicle(node.id, mesh.stamp_s, is_gateway, *told)
+    return [vehicles[node.id] for node in mesh.nodes if node.id in vehicles]

@@ -221,7 +221,7 @@ def add_ground_station_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def ground_station_options(parsed: argparse.Namespace) -> GroundStationSettings | None:
+def ground_station_options(parsed: argparse.Namespace) -> GroundStationSettings:
     """The parsed options. Raises ConfigurationError."""
     return GroundStationSettings.parse(
         parsed.ground_station,

@@ -19,7 +19,7 @@ from drone_mesh.drone.engines import FlightOptions
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError, MeshError, naming_argument
-from drone_mesh.ground_station.settings import GroundStationSettings
+from drone_mesh.ground_station.settings import NO_STATIONS, GroundStationSettings
 from drone_mesh.internet.http_settings import HttpSettings
 from drone_mesh.nrf24.settings import DATA_RATES, BroadcastMode, RadioSettings, TxPower
 from drone_mesh.raspberry.connection_options import (
@@ -83,7 +83,7 @@ class Options:
     silence_s: float | None = None  # without a request, after which a gateway has no internet
     debug_period_s: float = DEBUG_PERIOD_S  # 0: no such lines
     record: Path | None = None  # of a gateway
-    ground_station: GroundStationSettings | None = None
+    ground_station: GroundStationSettings = NO_STATIONS
 
 
 def parse_router(
@@ -298,7 +298,7 @@ def _options(
             mqtt=mqtt_options(parsed, environment) if parsed.gateway else None,
             silence_s=parsed.silence if parsed.gateway and parsed.internet == "http" else None,
             record=parsed.record if parsed.gateway else None,
-            ground_station=ground_station_options(parsed) if parsed.gateway else None,
+            ground_station=ground_station_options(parsed) if parsed.gateway else NO_STATIONS,
         )
     except MeshError as error:
         parser.exit(2, f"{parser.prog}: {error}\n")

@@ -14,6 +14,7 @@ from typing import Callable, Iterable, Iterator, Sequence
 
 from drone_mesh.communication.interfaces import IInternetConnection
 from drone_mesh.drone.engines import create_engine
+from drone_mesh.ground_station.settings import NO_STATIONS
 from drone_mesh.internet.on_demand import (
     SeveralInternets,
     http_internet,
@@ -226,7 +227,7 @@ def _internet(options: Options, node: RadioNode) -> IInternetConnection:
             silence_s=options.silence_s,
         )
         connections.append(over_http)
-    if options.ground_station is not None:
+    if options.ground_station != NO_STATIONS:
         # Only here: pymavlink takes most of a second to load.
         from drone_mesh.ground_station.gateway_link import GatewayLink
 

@@ -31,7 +31,6 @@ class DeskRig:
         self.desk = Desk(
             self.fleet,
             lambda *order: self.ordered.append(order),
-            may_order,
             lambda *post: self.posted.append(post),
             Allowance(5, 1.0, clock=lambda: 0.0),
         )

@@ -28,7 +28,7 @@ class StationOfMesh:
         self.network.add_fleet(gateways=1, routers=routers, gridsize=gridsize, spacing=6.0)
         self.fleet = Fleet(ORIGIN, SILENT_S, may_order=True)
         limit = Allowance(300, 0.05, clock=lambda: self.network.clock.now_s)
-        self.desk = Desk(self.fleet, self._order, True, self._post, limit)
+        self.desk = Desk(self.fleet, self._order, self._post, limit)
         self.codec = mavlink.MAVLink(None, 255, 190)
         self.told, self._seen = [], 0
 

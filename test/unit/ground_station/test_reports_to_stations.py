@@ -120,4 +120,4 @@ def test_cursor_on_target_is_stale_when_the_next_report_is_due():
     assert b'start="2023-11-14T22:13:18.000Z" stale="2023-11-14T22:13:48.000Z"' in event
     assert b'callsign="drone 3"' in event
     assert b'<status battery="80" />' in event
-    assert event_of(drone(3, place=None), ORIGIN, 100.0, 0.0, 30.0) is None
+    assert event_of(drone(3, place=None), ORIGIN, 100.0, 0.0, 30.0) == b""

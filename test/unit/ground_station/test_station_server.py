@@ -106,7 +106,7 @@ def test_two_stations_see_the_same_and_only_who_asks_is_answered(serve):
 
 
 def test_a_station_over_tcp_is_served_and_one_too_many_is_not(serve):
-    (address,) = serve(Address("tcp", "127.0.0.1", 0)).addresses
+    (address,) = serve(Address("tcp", "127.0.0.1", 0)).listens_at
     stations = [Station(tcp=address) for _ in range(MOST_STATIONS)]
     stations[-1].hear("HEARTBEAT")
     assert Station(tcp=address).socket.recv(1) == b""
@@ -118,7 +118,7 @@ def test_a_station_over_tcp_is_served_and_one_too_many_is_not(serve):
 def test_noise_and_floods_stop_nobody(serve):
     one, stranger = Station(), Station()
     server = serve(one.address, Address("tcp", "127.0.0.1", 0))
-    noisy = Station(tcp=server.addresses[0])
+    noisy = Station(tcp=server.listens_at[0])
     one.hear("HEARTBEAT")
     question = asks_for_missions().pack(one.codec)
     for _ in range(300):
@@ -134,11 +134,10 @@ def test_noise_and_floods_stop_nobody(serve):
         stranger.socket.recv(100)
 
 
-def test_a_station_that_does_not_read_is_left(serve, monkeypatch):
-    monkeypatch.setattr("drone_mesh.ground_station.server.MOST_UNSENT_BYTES", 1000)
+def test_a_station_that_does_not_read_is_left(serve):
     server = serve(Address("tcp", "127.0.0.1", 0))
     server._listeners[0].setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
-    station = Station(tcp=server.addresses[0])
+    station = Station(tcp=server.listens_at[0])
     station.hear("HEARTBEAT")
     for _ in range(100_000):
         server._post(0, mavlink.MAVLink_statustext_message(6, b"x" * 50), None)
@@ -208,4 +207,3 @@ def test_without_an_origin_there_is_no_cursor_on_target():
     settings = GroundStationSettings.parse([], ["udp:127.0.0.1:6969"], False, "")
     with pytest.raises(ConfigurationError, match="needs an origin"):
         GroundStationServer(settings, None, 10.0, lambda *_: None)
-    assert GroundStationSettings.parse([], [], False, "") is None

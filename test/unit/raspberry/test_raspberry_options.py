@@ -14,6 +14,7 @@ from drone_mesh.drone import Location
 from drone_mesh.drone.engines import FlightOptions
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions
+from drone_mesh.ground_station.settings import NO_STATIONS
 from drone_mesh.internet.http_settings import HttpSettings
 from drone_mesh.nrf24.settings import BroadcastMode, DataRate, RadioSettings, TxPower
 from drone_mesh.raspberry.connection_options import AirAddress, AirOptions
@@ -251,7 +252,7 @@ def test_a_gateway_knows_its_ground_stations(tmp_path):
     settings = parse_gateway([*line.split(), *orders], {}).ground_station
     assert [station.port for station in settings.stations] == [14550, 5760]
     assert (settings.cot[0].host, settings.may_order, len(settings.key)) == ("a", True, 32)
-    assert parse_gateway([], {}).ground_station is None
+    assert parse_gateway([], {}).ground_station == NO_STATIONS
 
 
 def test_a_gateway_may_have_no_internet_while_nobody_asks_over_http():

@@ -88,13 +88,12 @@ class GroundStationNode:
 
 
 def _settings() -> GroundStationSettings:
-    settings = GroundStationSettings.parse(
+    return GroundStationSettings.parse(
         str(rospy.get_param("~addresses", "")).split(),
         str(rospy.get_param("~cot", "")).split(),
         bool(rospy.get_param("~may_order", False)),
         str(rospy.get_param("~key_file", "")),
     )
-    return GroundStationSettings() if settings is None else settings
 
 
 def main() -> None:
