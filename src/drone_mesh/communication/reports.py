@@ -103,7 +103,6 @@ def _int16(number: int) -> int:
 
 WORDS_AGAIN_REPORTS = 10  # unchanged words are repeated for a new gateway
 LOOK_PERIOD_S = 1.0  # how often a node looks whether it flies, and the shortest period of reports
-FRAME_PERIOD_S = 2.0  # of a drone in flight on a shared channel: one frame of reports in this time
 
 
 @dataclass(eq=False)
@@ -121,9 +120,8 @@ class NodeReporter:
     def __post_init__(self) -> None:
         self._words = ""  # the last ones sent
         self._words_in = 0  # reports until they are repeated
-        self._regular_s = (
-            self._sent_s
-        ) = -math.inf  # when the next one is due, and the last was sent
+        self._regular_s = -math.inf  # when the next one is due, also if it stands
+        self._sent_s = -math.inf
         self._has_moved = False  # since the last one
 
     def start(self, share: float) -> None:
@@ -166,17 +164,14 @@ class NodeReporter:
     def _is_moving_report_due(self, now_s: float) -> bool:
         """Whether a drone in flight, or one that has just landed, is to report again.
 
-        On a shared channel its reports take a frame per FRAME_PERIOD_S, over all hops, and fewer
-        where packets collide or users' messages wait: there is no count of those who fly.
+        A report takes a frame on each hop. It waits where packets collide, and for the messages of
+        users: nobody counts who else flies.
         """
         self._has_moved = self._has_moved or self._pilot.goal is not None
-        if not self._has_moved:
-            return False
-        period_s, antenna = LOOK_PERIOD_S, self._antenna
-        if antenna.medium.shared:
-            frame_s = antenna.medium.stretched(FRAME_PERIOD_S)
-            period_s = frame_s * max(1, self._control.hops) * (1.0 + antenna.patience())
-        return now_s >= self._sent_s + period_s and antenna.data_room() > 0
+        antenna, hops = self._antenna, self._control.hops
+        period_s = antenna.medium.report_frame_s * hops * (1.0 + antenna.patience())
+        is_due = now_s >= self._sent_s + max(LOOK_PERIOD_S, period_s)
+        return self._has_moved and is_due and antenna.data_room() > 0
 
     def _send_words(self, words: str, me: int, gateway: int) -> None:
         self._words_in -= 1

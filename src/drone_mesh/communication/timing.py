@@ -147,6 +147,7 @@ class Medium:
     heard_periods: float = 0.0
     place_periods: float = 0.0
     data_pause_s: float = 0.005  # between bursts of users' packets
+    report_frame_s: float = 0.0  # in flight, reports take at most one frame in this time
 
     @classmethod
     def for_hop(cls, hop_s: float) -> Medium:
@@ -165,6 +166,7 @@ class Medium:
             heard_periods=1.05,
             place_periods=2.5,
             data_pause_s=4 * hop_s,
+            report_frame_s=fast.stretched(2.0),
         )
 
     def stretched(self, seconds: float) -> float:
