@@ -127,6 +127,32 @@ class FactoryConfiguration:
     cruise_height: float = setting(
         MAX_HEIGHT_M, "ceiling of ordered flights in metres", "metres", above=0, most=MAX_HEIGHT_M
     )
+    relief: Literal["none", "spare_first", "named_backup", "rotate"] = setting(
+        "none",
+        "none, spare_first, named_backup or rotate: how drones whose batteries run low are "
+        "relieved, with flight dynamic (docs/endurance.md)",
+    )
+    hover_minutes: float = setting(
+        20.0,
+        "minutes for which a drone hovers with a full battery, with flight dynamic",
+        "minutes",
+        above=0,
+        most=1000.0,
+    )
+    swap_time: float = setting(
+        60.0,
+        "seconds in which a battery is swapped where its drone started, with a relief",
+        "seconds",
+        above=0,
+        most=36_000.0,
+    )
+    swaps_at_once: int = setting(
+        1,
+        "number of batteries that are swapped at once",
+        "a whole number of batteries",
+        least=1,
+        most=MAX_DRONES,
+    )
     missions: str = setting(
         "",
         "absolute path of a YAML file of missions, which pilots fly; the mesh is not told "

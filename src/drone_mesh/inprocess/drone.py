@@ -10,6 +10,7 @@ from typing import Any, Callable, Iterable, Mapping, Optional
 import numpy as np
 
 from drone_mesh.air.obstacles import NO_PATH
+from drone_mesh.drone.battery import LAND_AT_PERCENT, Battery
 from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath, PlanFlight
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine
@@ -44,14 +45,17 @@ class InProcessDrone(IDroneEngine):
         self.speed_m_s = SPEED_M_S  # of its next flight; experiments with wind change it
         # Returns None if there is no path; the drone then stays. Obstacles replace this planner.
         self.plan_flight: PlanFlight = FlightPath
+        self.battery: Battery | None = None  # None: it never runs low; experiments use it up
 
     def set_goal(self, latitude: float, longitude: float, height: float) -> None:
         """Fly there, if it can. Raises GoalRefused for a goal out of bounds or without a path."""
         check_goal(latitude, longitude, height)
-        if self._why_not_fly:
-            return
-        here = self.get_location()
-        goal = Location(latitude, longitude, height).to_vector()
+        if not self.why_not_fly():
+            self.fly_to(Location(latitude, longitude, height))
+
+    def fly_to(self, place: Location) -> None:
+        """Like set_goal, whatever the battery has left."""
+        here, goal = self.get_location(), place.to_vector()
         if goal == (self.path.goal if self.path else here.to_vector()):
             return
         plan = self.plan_flight(here.to_vector(), goal, self._clock.now_s, self.speed_m_s)
@@ -73,9 +77,22 @@ class InProcessDrone(IDroneEngine):
         """Move the drone to a place where its pilot has flown it."""
         self._place = place
 
+    def fall(self) -> None:
+        """Its motors have stopped: it lies where it was above."""
+        self._place, was_flying = self.get_location()._replace(height=0.0), self.path is not None
+        self.path = None
+        if was_flying:
+            self._on_flight(False)
+
     def why_not_fly(self) -> str:
-        """The reason given at creation."""
+        """The reason given at creation, or its battery."""
+        percent = self.battery_percent()
+        if percent is not None and percent <= LAND_AT_PERCENT:
+            return f"battery at {percent:.0f} %"
         return self._why_not_fly
+
+    def battery_percent(self) -> float | None:
+        return None if self.battery is None else self.battery.percent
 
     def get_location(self) -> Location:
         """Its position now. Never raises."""
@@ -123,6 +140,9 @@ class PositionReceiver(IDroneEngine):
 
     def why_not_fly(self) -> str:
         return self._drone.why_not_fly()
+
+    def battery_percent(self) -> float | None:
+        return self._drone.battery_percent()
 
     def get_location(self) -> Location:
         if not self._errors.known:

@@ -108,6 +108,9 @@ def _node_status(node_id: int, node: InProcessNode, now_s: float) -> NodeStatus:
     status = NodeStatus(node_id, Role.GATEWAY if node.is_gateway else Role.ROUTER)
     describe_component(status, node.component, node.antenna.on(), now_s)
     status.position = node.drone.get_location().to_vector()
+    percent = node.drone.battery_percent()
+    status.battery = math.nan if percent is None else percent
+    status.why_not_fly = node.drone.why_not_fly()
     path = node.drone.path
     status.path = () if path is None else path_ahead(path, now_s)
     return status

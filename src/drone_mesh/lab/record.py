@@ -7,6 +7,7 @@ from typing import Mapping, NamedTuple, Sequence, Tuple
 
 from drone_mesh.air.graph import Graph
 from drone_mesh.communication.data.transport import ReceivedMessage
+from drone_mesh.lab.endurance import EnduranceFigures
 from drone_mesh.lab.flights import Leg
 from drone_mesh.lab.formations import Formations
 from drone_mesh.lab.impairments import Traffic
@@ -86,6 +87,7 @@ class RunRecord:
     probes: Sequence[ProbeFate]
     frames: Mapping[str, int] | None  # shared channel: "control" and "data"
     formations: Formations  # what became of layouts
+    endurance: EnduranceFigures | None  # None: batteries do not count
 
     @property
     def healed_at_s(self) -> float | None:

@@ -12,10 +12,12 @@ from drone_mesh.air.obstacles import CUT_DB, Obstacles
 from drone_mesh.communication.node.node_configuration import DEFAULT_ROUTING
 from drone_mesh.communication.repair.options import DEFAULT_REPAIR, RANGE_M, RepairOptions
 from drone_mesh.communication.timing import MeshTiming
+from drone_mesh.drone.battery import PowerModel
 from drone_mesh.drone.fleet import MAX_DRONES
 from drone_mesh.drone.flight_path import SPEED_M_S
 from drone_mesh.drone.goal import MAX_HEIGHT_M
 from drone_mesh.errors import ConfigurationError
+from drone_mesh.formations.relief import ReliefRules
 from drone_mesh.lab.scenario_parts import (
     Above0,
     AtLeast0,
@@ -221,6 +223,18 @@ class ObstacleSettings(Part):
     ceiling_m: Annotated[float, Field(gt=0, le=MAX_HEIGHT_M)] = MAX_HEIGHT_M  # of flights
 
 
+class Endurance(Part):
+    """Batteries, pads and the relief of drones that hover for hours; see docs/endurance.md."""
+
+    hover_min: Above0 = PowerModel.hover_s / 60.0  # with a full battery
+    height_m: Annotated[float, Field(ge=1, le=MAX_HEIGHT_M)] = 4.0  # of all drones but the spares
+    spares: Share = 0.15  # of the routers; these are further drones
+    pads: Annotated[List[Point], Field(min_length=1)] = [[0.0, 0.0]]  # x, y from the gateway, m
+    swap_s: Above0 = ReliefRules().swap_s
+    at_once: Annotated[int, Field(ge=1, le=MAX_DRONES)] = 1  # swaps on one pad
+    relief: Literal["none", "spare_first", "named_backup", "rotate"] = "spare_first"
+
+
 class Sequence(Part):
     """A few random faults over a random mesh, all drawn from the seed; the run ends at rest.
 
@@ -267,6 +281,7 @@ class Scenario(Part):
     probes: Probes = Probes()
     faults: List[Fault] = []
     sequence: Optional[Sequence] = None
+    endurance: Optional[Endurance] = None
     grounded_share: Share = 0.0  # of the routers: their drones cannot fly
     duration_s: Annotated[float, Field(gt=0, le=1e6)] = 120.0
     sample_s: Annotated[float, Field(ge=0.05, le=60)] = 1.0  # sampling period of the network
@@ -283,6 +298,8 @@ class Scenario(Part):
             raise ValueError("a sequence is for the disc radio")
         if self.model == "ideal" and is_moved:
             raise ValueError("model ideal: only repairs move drones there, mobility does not")
+        if self.endurance is not None and (self.model == "ideal" or is_moved):
+            raise ValueError("endurance: its drones hover, so it needs model mesh and no mobility")
         if "load" in actions and actions.count("load") + actions.count("send") > 1:
             raise ValueError("a load says from when on messages count: no other load or send fits")
         is_piloted = is_moved and not self.mobility.told

@@ -14,6 +14,7 @@ from drone_mesh.air.graph import Graph
 from drone_mesh.channel.statistics import RadioStatistics
 from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.radio import InProcessAir
+from drone_mesh.lab.endurance import EnduranceRun, with_spares
 from drone_mesh.lab.flights import Flights
 from drone_mesh.lab.formations import ToldPilots, tracks
 from drone_mesh.lab.impairments import Impairments, OneWay
@@ -54,7 +55,9 @@ class Simulation:
     def __init__(self, scenario: Scenario, streams: Streams) -> None:
         """Raises ConfigurationError for a layout that cannot be drawn."""
         self.scenario = scenario
-        places = places_of(scenario, streams)
+        places = layout = places_of(scenario, streams)
+        if scenario.endurance is not None:
+            places = with_spares(scenario.endurance, layout)
         one_way = OneWay(scenario, streams)
         self.network = network_of(scenario, streams, places, one_way)
         self.impairments = Impairments(
@@ -64,6 +67,9 @@ class Simulation:
         self.flights = Flights(self.network)
         self.timeline = Timeline(
             scenario, self.network, self.impairments, self.flights, streams, self._observing
+        )
+        self._endurance = scenario.endurance and EnduranceRun(
+            scenario.endurance, layout, self.network, self.timeline
         )
         self._move(tracks(scenario, places, streams))
         self._probes = ProbeSender(
@@ -147,6 +153,7 @@ class Simulation:
             probes=self._probes.results(),
             frames=self.impairments.frames,
             formations=self.timeline.formations,
+            endurance=self._endurance.finished() if self._endurance else None,
             refused_flights=0 if self._planner is None else len(self._planner.refused),
             cut_offs=[*self._cut_offs, *(ServiceGap(*gap, None) for gap in self._cut_off.items())],
             in_the_air=frozenset(self.flights.in_the_air),
@@ -200,6 +207,8 @@ class Simulation:
     def _take_sample(self) -> NetworkSample:
         sample = sample_of(self.network)
         self._samples.append(sample)
+        if self._endurance:
+            self._endurance.look(sample)
         if self._is_watched:
             self._links.look(sample, physical_graph(self.network), gateways_of(self.network))
         for node in self._cut_off.keys() & sample.served:

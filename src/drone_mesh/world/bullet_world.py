@@ -7,9 +7,9 @@ from typing import Sequence
 import pybullet
 
 from drone_mesh.air.obstacles import Box
+from drone_mesh.drone.battery import GRAVITY_M_S2
 from drone_mesh.drone.flight_path import Vector
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.world.dynamic_engine import GRAVITY_M_S2
 from drone_mesh.world.worlds import PhysicalWorld
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)  # unit quaternion, pybullet's order x y z w

@@ -7,6 +7,15 @@ import math
 from dataclasses import dataclass
 
 from drone_mesh.communication.events.observer import MeshEventKind
+from drone_mesh.drone.battery import (
+    FLAT,
+    GRAVITY_M_S2,
+    LAND_AT_PERCENT,
+    READY_PERCENT,
+    Battery,
+    Crews,
+    PowerModel,
+)
 from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath, PlanFlight, Vector
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.route import Route
@@ -14,12 +23,12 @@ from drone_mesh.errors import GoalRefused
 from drone_mesh.world.engine import DroneEngine
 from drone_mesh.world.worlds import PhysicalWorld
 
-GRAVITY_M_S2 = 9.81
 ARRIVED_M = 0.15
 STANDS_M_S = 0.1
 PILOT_LEAD_M = 1.0  # greatest distance of the place that a pilot wants it to hold
 ON_GROUND_M = 0.02  # of its underside
-LAND_AT_PERCENT = 20.0  # it lands while it still can
+AT_HOME_M = 0.5
+ONE_PAD = 0  # of the crews: all places where drones start
 MOVED_M = 1e-4  # a smaller movement is not reported
 SETTLED_S = 0.1  # time after the last movement until its position is reported once more
 
@@ -36,8 +45,7 @@ class BodyLimits:
     max_speed_m_s: float = 5.0  # horizontally
     max_climb_m_s: float = 3.0
     max_sink_m_s: float = 1.5
-    hover_s: float = 1200.0  # hovering time with a full battery
-    standby_s: float = 36_000.0  # time for which a full battery powers the node on the ground
+    power: PowerModel = PowerModel()  # of a drone of that mass
     crash_m_s: float = 1.0  # a change of speed within one step that no motor could cause
     # Something that holds the drone in the air destroys its rotors too. It is recognised by
     # smaller changes of speed:
@@ -112,8 +120,13 @@ class DynamicEngine(DroneEngine):
         wind: Vector = (0.0, 0.0, 0.0),
         limits: BodyLimits = BodyLimits(),  # noqa: B008 (frozen)
         plan_flight: PlanFlight = FlightPath,
+        crews: Crews | None = None,
     ) -> None:
-        """`box` is a body with a mass; `wind` blows everywhere, m/s."""
+        """`box` is a body with a mass; `wind` blows everywhere, m/s.
+
+        `crews` swap its battery while it stands where it is created, and it goes there when it
+        runs low; None: it lands where it is.
+        """
         super().__init__(world, box, centre, half_height_m, plan_flight)
         self._physics = world
         self._wind = wind
@@ -124,7 +137,8 @@ class DynamicEngine(DroneEngine):
         self._pushed: Vector | None = None  # speed that the last forces alone would have caused
         self._trim: Vector = (0.0, 0.0, 0.0)
         self._stepped_s = world.now_s
-        self._battery_percent = 100.0
+        self._battery = Battery(limits.power)
+        self._home, self._crews = Location.from_vector(centre), crews
         self._was_flat = False
         self._settled = True
         self._held_s = 0.0  # how long an obstacle has held it in the air
@@ -133,16 +147,16 @@ class DynamicEngine(DroneEngine):
     def why_not_fly(self) -> str:
         if self.crashed:
             return "crashed"
-        if self._battery_percent <= LAND_AT_PERCENT:
-            return f"battery at {self._battery_percent:.0f} %"
+        if self.battery_percent() <= LAND_AT_PERCENT:
+            return f"battery at {self.battery_percent():.0f} %"
         return ""
 
     def battery_percent(self) -> float:
-        return self._battery_percent
+        return self._battery.percent
 
     @property
     def is_flat(self) -> bool:
-        return self._battery_percent == 0.0
+        return self._battery.percent == FLAT
 
     def is_flying(self) -> bool:
         return self._route is not None or bool(self._goals)
@@ -169,7 +183,8 @@ class DynamicEngine(DroneEngine):
             self._fly(position, passed_s)
         else:
             self._pushed = None
-            self._drain(passed_s / self._limits.standby_s)
+            self._drain(passed_s, None)
+            self._ask_for_battery(position, now_s)
         path = self._state.path if self._route is not None else None
         is_news = path is not self._state.path or self.is_flat is not self._was_flat
         self._was_flat = self.is_flat
@@ -192,14 +207,15 @@ class DynamicEngine(DroneEngine):
                 "box %d stays: no path past the obstacles to %s", self._box, goal.in_words()
             )
             return
-        # As high as a kinematic drone would fly.
-        across_m = max(path.above_start[2], path.above_goal[2])
         self.pause_pilot(True)
-        self._route = Route(
-            here, goal, across_m, lands=False, speed_m_s=SPEED_M_S, around=path.around
-        )
+        self._route = self._route_of(path, here, goal)
         self._hover = None
         self._notify(position, path, now_s)
+
+    def _route_of(self, path: FlightPath, here: Location, goal: Location) -> Route:
+        """As high as a kinematic drone would fly."""
+        high_m = max(path.above_start[2], path.above_goal[2])
+        return Route(here, goal, high_m, lands=False, speed_m_s=SPEED_M_S, around=path.around)
 
     def _follow_pilot(self, now_s: float) -> bool:
         """Move the place that the drone holds as its pilot says; it waits for a slow drone."""
@@ -249,21 +265,38 @@ class DynamicEngine(DroneEngine):
         self._hover = None if stands else end
 
     def _use_battery(self, position: Vector, passed_s: float) -> None:
-        before = self._battery_percent
-        self._drain(passed_s / self._limits.hover_s)
-        if before > LAND_AT_PERCENT >= self._battery_percent:
-            self._note(MeshEventKind.BATTERY_LOW, "it lands")
-            ground = Location.from_vector((position[0], position[1], self._half_height_m))
-            here = Location.from_vector(position)
-            self._route = Route(here, ground, here.height, lands=False, speed_m_s=SPEED_M_S)
-            self._hover = None
-        elif self._battery_percent == 0.0:
+        before = self.battery_percent()
+        self._drain(passed_s, math.dist(self._velocity, (0.0, 0.0, 0.0)))
+        if before > LAND_AT_PERCENT >= self.battery_percent():
+            self._come_down(position)
+        elif self.is_flat:
             self._route = self._hover = None  # the motors stop
 
-    def _drain(self, share: float) -> None:
-        before = self._battery_percent
-        self._battery_percent = max(0.0, before - 100.0 * share)
-        if before > 0.0 == self._battery_percent:
+    def _come_down(self, position: Vector) -> None:
+        """With its last fifth: to its pad if there are crews, else to the ground below."""
+        here = Location.from_vector(position)
+        ground, path = here._replace(height=self._half_height_m), None
+        if self._crews is not None:
+            path = self._plan(position, self._home.to_vector(), self._world.now_s)
+        self._note(MeshEventKind.BATTERY_LOW, "it lands" if path is None else "it goes home")
+        self._hover = None
+        self._route = Route(here, ground, here.height, lands=False, speed_m_s=SPEED_M_S)
+        if path is not None:
+            self._route = self._route_of(path, here, self._home)
+
+    def _ask_for_battery(self, position: Vector, now_s: float) -> None:
+        is_home = self._home.distance_m(Location.from_vector(position)) <= AT_HOME_M
+        if self._crews is None or self.crashed:
+            return
+        if not is_home or self._battery.percent >= READY_PERCENT:
+            self._crews.leave(self._box, ONE_PAD)
+        elif self._crews.serve(self._box, ONE_PAD, now_s):
+            self._battery.swap()
+
+    def _drain(self, passed_s: float, speed_m_s: float | None) -> None:
+        was_flat = self.is_flat
+        self._battery.use(passed_s, speed_m_s)
+        if self.is_flat and not was_flat:
             self._note(MeshEventKind.BATTERY_EMPTY)
 
     def _check_hits(self, velocity: Vector, passed_s: float) -> None:

@@ -7,6 +7,7 @@ import math
 from typing import ClassVar, Sequence
 
 from drone_mesh.air.obstacles import Obstacles
+from drone_mesh.drone.battery import Crews
 from drone_mesh.drone.fleet import MAX_DRONES, StartPlace
 from drone_mesh.drone.flight_path import FlightPath, PlanFlight, Vector
 from drone_mesh.drone.goal import check_goal
@@ -30,11 +31,13 @@ class VirtualDrone:
         place: StartPlace,
         wind: Vector | None = None,
         plan_flight: PlanFlight = FlightPath,
+        limits: BodyLimits = BodyLimits(),  # noqa: B008 (frozen)
+        crews: Crews | None = None,
     ) -> None:
         """Create a drone on the ground at this place. World's thread.
 
         With a `wind` (m/s) physics moves it, in a PhysicalWorld; without, it follows its path.
-        `plan_flight` plans its flights.
+        `plan_flight` plans its flights. `limits` and `crews` as for DynamicEngine.
         """
         self.node_id = place.node_id
         size_m = self.role.size_m
@@ -42,9 +45,9 @@ class VirtualDrone:
         centre = (place.longitude, place.latitude, half_height_m)
         self.engine: DroneEngine
         if wind is not None and isinstance(world, PhysicalWorld):
-            self.box = world.add_body(size_m, centre, BodyLimits().mass_kg)
+            self.box = world.add_body(size_m, centre, limits.mass_kg)
             self.engine = DynamicEngine(
-                world, self.box, centre, half_height_m, wind, plan_flight=plan_flight
+                world, self.box, centre, half_height_m, wind, limits, plan_flight, crews
             )
         else:
             self.box = world.add_box(size_m, centre)
@@ -80,8 +83,10 @@ class DroneFactory:
         wind: Vector | None = None,
         obstacles: Obstacles | None = None,
         cruise_height_m: float = math.inf,
+        limits: BodyLimits = BodyLimits(),  # noqa: B008 (frozen)
+        crews: Crews | None = None,
     ) -> None:
-        """`fleet`: as of `plan_fleet`; `wind`: as for VirtualDrone.
+        """`fleet`: as of `plan_fleet`; `wind`, `limits` and `crews`: as for VirtualDrone.
 
         The `obstacles` are added to the world too; without them, `cruise_height_m` is the ceiling
         of ordered flights. Raises ConfigurationError if a drone would start in or against an
@@ -89,6 +94,7 @@ class DroneFactory:
         """
         self._world = world
         self._wind = wind
+        self._limits, self._crews = limits, crews
         self._for_flights: Obstacles | None = None
         self._plan_flight: PlanFlight = functools.partial(FlightPath, ceiling_m=cruise_height_m)
         if obstacles is not None:
@@ -159,7 +165,9 @@ class DroneFactory:
         drone.engine.leave()
 
     def _make(self, place: StartPlace) -> VirtualDrone:
-        return _KINDS[place.role](self._world, place, self._wind, self._plan_flight)
+        return _KINDS[place.role](
+            self._world, place, self._wind, self._plan_flight, self._limits, self._crews
+        )
 
     def _check_place(self, place: StartPlace) -> None:
         try:

@@ -8,14 +8,11 @@ from typing import Iterator
 import pytest
 
 from drone_mesh.communication.events.observer import MeshEventKind
+from drone_mesh.drone.battery import LAND_AT_PERCENT, PowerModel
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused
 from drone_mesh.world.bullet_world import BulletWorld
-from drone_mesh.world.dynamic_engine import (
-    LAND_AT_PERCENT,
-    BodyLimits,
-    DynamicEngine,
-)
+from drone_mesh.world.dynamic_engine import BodyLimits, DynamicEngine
 
 SIZE, HALF_M = (0.2, 0.2, 0.1), 0.05
 
@@ -129,7 +126,7 @@ def test_two_drones_that_press_against_each_other_in_the_air_crash_and_do_not_ha
 
 
 def test_a_drone_that_runs_empty_lands_where_it_is_and_does_not_fly_again(world):
-    engine = drone(world, limits=BodyLimits(hover_s=60.0))
+    engine = drone(world, limits=BodyLimits(power=PowerModel(hover_s=60.0)))
     engine.set_goal(0.0, 0.0, 5)
     run_until_arrived(world, engine)
     run(world, 80.0)
@@ -143,7 +140,7 @@ def test_a_drone_that_runs_empty_lands_where_it_is_and_does_not_fly_again(world)
 
 
 def test_a_drone_is_flat_when_standing_has_used_the_rest_and_this_is_reported_once(world):
-    engine = drone(world, limits=BodyLimits(standby_s=5.0))
+    engine = drone(world, limits=BodyLimits(power=PowerModel(hover_s=0.16)))
     told, noted = [], []
     engine.add_listener(lambda _state: told.append(engine.is_flat))
     engine.observe(lambda kind, now_s, detail: noted.append(kind))

@@ -6,6 +6,7 @@ import math
 
 import pytest
 
+from drone_mesh.drone.battery import PowerModel
 from drone_mesh.drone.fleet import StartPlace
 from drone_mesh.drone.flight_path import FlightPath
 from drone_mesh.drone.roles import Role
@@ -100,7 +101,8 @@ def test_a_kinematic_pilot_moves_the_drone_ten_times_a_second(world):
 
 def test_a_pilot_lets_physics_land_a_drone_whose_battery_is_low(world):
     box = world.add_body((0.2, 0.2, 0.1), (0.0, 0.0, 0.05), BodyLimits().mass_kg)
-    engine = DynamicEngine(world, box, (0.0, 0.0, 0.05), 0.05, limits=BodyLimits(hover_s=30.0))
+    limits = BodyLimits(power=PowerModel(hover_s=30.0))
+    engine = DynamicEngine(world, box, (0.0, 0.0, 0.05), 0.05, limits=limits)
     engine.fly_with(pilot())
     run(world, 60.0)
     assert engine.why_not_fly()

@@ -18,6 +18,8 @@ from drone_mesh.formations.airspace import SWAY_M
 from drone_mesh.formations.departures import FlightRules
 from drone_mesh.formations.layouts import Order
 from drone_mesh.formations.preview import FormationPreview, LostRoutes, lost_routes, preview
+from drone_mesh.formations.relief import Relief, ReliefRules
+from drone_mesh.formations.relief_policies import relief_policy
 from drone_mesh.formations.standing_orders import PartState, StandingOrders, StandingProgress
 from drone_mesh.msg import (
     LayoutAction,
@@ -98,6 +100,7 @@ class StandingLayouts:
         self._lock = threading.Lock()
         self._reporter = ThreadPoolExecutor(max_workers=1, thread_name_prefix="standing layouts")
         self._orders = StandingOrders()
+        self._relief: Relief | None = None  # made with the first state: then there is a fleet
         self._mesh: MeshStatus | None = None  # the latest state
         self._run: Run | None = None  # of that state
         self._shown: dict[int, StandingProgress] = {}
@@ -183,11 +186,14 @@ class StandingLayouts:
         if before not in (None, self._run):
             self._on_other_run()
             return
+        relief = self._relief = self._relief or relief_of_fleet()
         with self._lock:
-            is_idle = not self._orders.all_progress()
+            is_idle = not (relief and relief.is_active or self._orders.all_progress())
         rules = FlightRules() if is_idle else flight_rules()
         with self._lock:
             self._mesh = mesh
+            if relief:
+                relief.update(mesh, self._orders, rules)
             wanted = [Order(*one) for one in self._orders.update(mesh, rules)]
         self._order(wanted)
         self._show()
@@ -285,6 +291,16 @@ def _tell(handle: actionlib.ServerGoalHandle, progress: StandingProgress) -> Non
     complete = len(arrived) == sum(map(len, progress.drones.values()))
     end = handle.set_succeeded if complete else handle.set_aborted
     end(LayoutResult(progress.number, complete, words), words)
+
+
+def relief_of_fleet() -> Relief | None:
+    """What relieves the drones of the present factory; None if there is none (yet)."""
+    try:
+        fleet = get_fleet_parameter()
+    except (KeyError, *NO_ANSWER):
+        return None
+    rules = ReliefRules(fleet.swap_time, fleet.swaps_at_once, 60.0 * fleet.hover_minutes)
+    return Relief(relief_policy(fleet.relief), rules)
 
 
 def flight_rules() -> FlightRules:

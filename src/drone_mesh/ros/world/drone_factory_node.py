@@ -14,6 +14,7 @@ import rospy
 from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.arguments import is_whole
 from drone_mesh.configuration import FactoryConfiguration
+from drone_mesh.drone.battery import Crews, PowerModel
 from drone_mesh.drone.fleet import StartPlace, plan_fleet
 from drone_mesh.drone.flight_path import Vector
 from drone_mesh.drone.goal import MAX_HEIGHT_M
@@ -48,6 +49,7 @@ from drone_mesh.state.model import EventRecord, MeshStatus
 from drone_mesh.state.observation import describe_obstacles
 from drone_mesh.view.scene import Scene, scene_of
 from drone_mesh.view.window_process import WindowProcess, require_screen
+from drone_mesh.world.dynamic_engine import BodyLimits
 from drone_mesh.world.factory import DroneFactory
 from drone_mesh.world.physics import open_world, require_pybullet
 from drone_mesh.world.worlds import World
@@ -87,6 +89,10 @@ class FactoryParameters:
         if configuration.drones == "external" and (missions or configuration.mobility != "none"):
             raise ConfigurationError(
                 "argument: missions and mobility need drones builtin: others fly external drones"
+            )
+        if configuration.relief != "none" and configuration.flight != "dynamic":
+            raise ConfigurationError(
+                "argument: relief needs flight dynamic: others have no battery"
             )
         unknown = sorted(missions.keys() - {place.node_id for place in fleet})
         if unknown:
@@ -134,12 +140,15 @@ class RosSimulation:
         self._world = world
         self._happened: deque[EventRecord] = deque()  # events of the drones; any thread fills it
         wind = (configuration.wind_x, configuration.wind_y, 0.0)
+        relieves = configuration.relief != "none"
         self._factory = DroneFactory(
             world,
             parameters.fleet,
             wind if configuration.flight == "dynamic" else None,
             parameters.obstacles,
             configuration.cruise_height,
+            BodyLimits(power=PowerModel(hover_s=60.0 * configuration.hover_minutes)),
+            Crews(configuration.swap_time, configuration.swaps_at_once) if relieves else None,
         )
         start_pilots(configuration, parameters.missions, self._factory.drones)
         _log.info(

@@ -1,0 +1,142 @@
+"""Drones whose batteries run low are relieved, by whom and when."""
+
+from __future__ import annotations
+
+import pytest
+
+from drone_mesh.configuration import FactoryConfiguration
+from drone_mesh.drone.location import Location
+from drone_mesh.drone.roles import Role
+from drone_mesh.errors import ConfigurationError
+from drone_mesh.formations.relief import Relief, ReliefRules
+from drone_mesh.formations.relief_policies import POLICIES, ReliefView, relief_policy
+from drone_mesh.formations.standing_orders import StandingOrders
+from drone_mesh.lab.scenario import Endurance
+from drone_mesh.state.model import MeshStatus, NodeStatus
+
+POST, HOME, OTHER = Location(6.0, 0.0, 4.0), Location(0.0, 4.0, 0.0), Location(0.0, 8.0, 0.0)
+
+
+def view(left_s, ready=(), spares=None, interval_s=100.0, places=None, blocked=()):
+    return ReliefView(
+        left_s=left_s,
+        ready=ready,
+        spares=ready if spares is None else spares,
+        interval_s=interval_s,
+        places=places or {},
+        gateways=[0],
+        range_m=9.0,
+        can_fly=lambda new, old: (new, old) not in blocked,
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "seen", "chosen"),
+    [
+        ("none", view({1: -5.0}, [7]), None),
+        ("spare_first", view({1: 250.0, 2: 350.0, 3: 450.0}, [7]), None),
+        ("spare_first", view({1: 250.0, 2: 299.0}, [7]), (1, 7)),  # two and one more in 299 s
+        ("spare_first", view({1: 50.0}, [7, 8], blocked=[(7, 1)]), (1, 8)),
+        ("spare_first", view({1: 50.0, 2: 60.0}, [7], blocked=[(7, 1)]), (2, 7)),
+        ("spare_first", view({1: 50.0}, [], spares=[7]), None),
+        ("named_backup", view({1: 5.0, 2: 6.0}, [7, 8]), None),
+        ("named_backup", view({2: 0.0, 1: 5.0}, [7, 8]), (2, 8)),  # 7 is the backup of 1
+        ("named_backup", view({2: 0.0, 1: 5.0}, [7], spares=[7, 8]), None),
+    ],
+)
+def test_each_policy_chooses(name, seen, chosen):
+    assert relief_policy(name).choose(seen) == chosen
+
+
+def test_the_rotation_sends_the_fullest_neighbour_that_the_mesh_does_not_need():
+    places = {0: (0.0, 0.0), 1: (8.0, 0.0), 2: (16.0, 0.0), 3: (8.0, 4.0), 4: (8.0, -4.0)}
+    left_s = {2: 0.0, 3: 100.0, 4: 200.0, 1: 900.0}
+    assert relief_policy("rotate").choose(view(left_s, places=places)) == (2, 1)
+    del left_s[1]
+    assert relief_policy("rotate").choose(view(left_s, places=places)) == (2, 4)
+    del places[3], places[4]  # now 2 is reached over 1 alone
+    left_s = {2: 0.0, 1: 900.0}
+    assert relief_policy("rotate").choose(view(left_s, places=places)) is None
+
+
+def test_the_policies_have_the_same_names_everywhere():
+    for name in POLICIES:
+        assert Endurance(relief=name).relief == FactoryConfiguration(seed=1, relief=name).relief
+    with pytest.raises(ConfigurationError, match="unknown relief c3r: use none, spare_first"):
+        relief_policy("c3r")
+
+
+class Mesh:
+    """One drone on a post and one spare at home; the mesh is told to Relief second by second."""
+
+    def __init__(self):
+        self.now_s, self.orders = 0.0, StandingOrders()
+        self.holder = NodeStatus(1, connected=True, position=POST.to_vector(), battery=100.0)
+        self.spare = NodeStatus(2, connected=True, position=HOME.to_vector(), battery=100.0)
+        self.relief = Relief(relief_policy("spare_first"), ReliefRules(), {1: OTHER, 2: HOME})
+
+    def hover(self, node, percent):
+        """Until its battery has so much left."""
+        self.now_s += 12.0 * (node.battery - percent)
+        node.battery = percent
+
+    def sent(self, seconds=1):
+        """The orders of so many seconds."""
+        sent = {}
+        for _ in range(seconds):
+            gateway = NodeStatus(0, Role.GATEWAY, connected=True, position=(0.0, 0.0, 4.0))
+            mesh = MeshStatus(self.now_s, [gateway, self.holder, self.spare])
+            self.relief.update(mesh, self.orders)
+            sent.update(dict(self.orders.update(mesh)))
+            self.now_s += 1.0
+        return sent
+
+
+def test_the_old_drone_leaves_when_the_new_one_beside_it_has_been_connected_for_a_while():
+    mesh = Mesh()
+    assert mesh.sent() == {}
+    mesh.hover(mesh.holder, 26.0)  # 20 and 2 percent stay, 1 percent is 12 s
+    ((drone, place),) = mesh.sent().items()
+    assert drone == 2
+    assert 1.4 < place.distance_m(POST) < 1.6
+    mesh.spare.position, mesh.spare.connected = place.to_vector(), False
+    assert mesh.sent(30) == {}
+    mesh.spare.connected = True
+    assert mesh.sent(5) == {}
+    assert mesh.sent() == {1: OTHER}
+    assert mesh.relief.reliefs == 1
+    mesh.holder.position, mesh.holder.battery = OTHER.to_vector(), 100.0
+    mesh.hover(mesh.spare, 26.0)  # the next one comes to the first place of the post again
+    assert mesh.sent(2) == {1: POST}
+
+
+def test_a_drone_that_nobody_can_relieve_goes_home_in_time_and_its_post_is_filled_later():
+    mesh = Mesh()
+    mesh.spare.battery = 50.0
+    assert mesh.sent() == {}
+    mesh.hover(mesh.holder, 22.0)
+    assert mesh.sent() == {1: OTHER}
+    mesh.holder.position = OTHER.to_vector()
+    mesh.spare.battery = 100.0
+    ((drone, place),) = mesh.sent().items()
+    assert drone == 2
+    assert place.distance_m(POST) < 1.6
+
+
+def test_a_spare_that_does_not_come_is_called_back_and_another_relief_begins():
+    mesh = Mesh()
+    mesh.sent()
+    mesh.hover(mesh.holder, 30.0)
+    assert list(mesh.sent()) == [2]
+    mesh.spare.position = (0.0, 2.0, 4.0)  # it hangs there
+    assert mesh.sent(130)[2] == HOME
+
+
+def test_where_a_drone_is_ordered_is_its_post_from_then_on():
+    mesh = Mesh()
+    mesh.sent()
+    mesh.holder.position = (-6.0, 0.0, 4.0)
+    mesh.sent()
+    mesh.hover(mesh.holder, 26.0)
+    ((_drone, place),) = mesh.sent().items()
+    assert place.distance_m(Location(0.0, -6.0, 4.0)) < 1.6
