@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass
 from typing import Mapping, NamedTuple, Sequence
 
-from drone_mesh.drone.battery import LAND_AT_PERCENT, READY_PERCENT
+from drone_mesh.drone.battery import LAND_AT_PERCENT, READY_PERCENT, PowerModel
 from drone_mesh.drone.flight_path import SPEED_M_S
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
@@ -38,7 +38,7 @@ class ReliefRules(NamedTuple):
 
     swap_s: float = 60.0
     at_once: int = 1  # drones that all pads serve together
-    hover_s: float = 1200.0  # with a full battery, until the use of a drone is known
+    hover_s: float = PowerModel.hover_s  # with a full battery, until the use of a drone is known
 
 
 @dataclass
