@@ -76,20 +76,20 @@ class Policy:
     """
 
     queued: bool = False  # the antenna queues packets, and reports their fate later
-    one_loss_counts: bool = True  # who does not take one packet is lost
-    losses_noticed_late: bool = False  # maybe by a later check than the others' losses
-    checks_soon: bool = False  # after the loss of a neighbour: what else has changed?
-    asks_in_turn: bool = False  # the neighbours for a gateway, instead of all at once
-    searches_from_start: bool = False  # before its first gateway, too, it presents itself again
-    answers_prove_relays: bool = False  # that forward them from the gateway
-    announces_flights: bool = False  # ordered ones: neighbours that will be lost look for a way
-    drops_are_certain: bool = True  # no copy of an order passed a relay that says so
-    search_within_s: float = 0.0  # orders: a gateway searches for who was heard within this time
-    search_pause_s: float = 0.0  # between two searches of a node, each a broadcast of all nodes
-    ask_sealed_s: float = 0.3  # a flight asks for places so often, if they are sealed
-    data_in_trains: bool = False  # over relays, which cannot receive while they send
-    data_yields: bool = False  # what is repeated, while this node looks for a gateway
-    challenges_all: bool = False  # by broadcast, if many that may not exist are to be challenged
+    one_loss_counts: bool = True  # a neighbour that does not take one packet is lost
+    losses_noticed_late: bool = False  # neighbours lost together may be noticed by several checks
+    checks_soon: bool = False  # the loss of a neighbour is soon followed by a check
+    asks_in_turn: bool = False  # a router asks one neighbour at a time for a gateway, not all
+    searches_from_start: bool = False  # a node presents itself again before its first gateway, too
+    answers_prove_relays: bool = False  # a gateway's answer counts for the relays that forward it
+    announces_flights: bool = False  # ordered ones, so that neighbours find other routes in time
+    drops_are_certain: bool = True  # an order that a relay says it dropped did not get past it
+    search_within_s: float = 0.0  # a gateway searches for a drone that was heard within this time
+    search_pause_s: float = 0.0  # between two searches of a node; every node repeats each
+    ask_sealed_s: float = 0.3  # how often a drone in flight asks for places, in a mesh with a key
+    data_in_trains: bool = False  # users' data over relays, which cannot receive while they send
+    data_yields: bool = False  # a node that lost its gateway holds users' data that it repeats
+    challenges_all: bool = False  # one broadcast challenges many neighbours that may not exist
 
 
 IMMEDIATE = Policy()
