@@ -31,7 +31,10 @@ _CAN = (
     | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT
     | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
 )  # fmt: skip
-_UNTOLD = {MeshEventKind.NEIGHBOUR_FOUND, MeshEventKind.NEIGHBOUR_LOST, MeshEventKind.NODE_MISSING}
+_UNTOLD = {
+    MeshEventKind.NEIGHBOUR_FOUND, MeshEventKind.NEIGHBOUR_LOST, MeshEventKind.NODE_MISSING,
+    MeshEventKind.FLIGHT_ORDERED,  # which its gateway tells, too
+}  # fmt: skip
 _CRITICAL = {MeshEventKind.EMERGENCY, MeshEventKind.CRASHED, MeshEventKind.BATTERY_EMPTY}
 _WARNINGS = {
     MeshEventKind.DISCONNECTED, MeshEventKind.POWER_OFF, MeshEventKind.BATTERY_LOW,
@@ -106,7 +109,7 @@ class Fleet:
         kind = MeshEventKind(event.kind)
         if kind in _UNTOLD:
             return
-        is_order = event.order and event.peers and kind is not MeshEventKind.FLIGHT_ORDERED
+        is_order = event.order and event.peers
         words = told(kind, () if is_order else event.peers, event.explanation())
         severity = mavlink.MAV_SEVERITY_NOTICE - (kind in _WARNINGS) - 3 * (kind in _CRITICAL)
         yield from self.texts(event.peers[0] if is_order else event.node, severity, words)
@@ -212,4 +215,5 @@ def _on_earth(origin: Origin, place: Location) -> tuple[int, int, int]:
 
 
 def _percent(vehicle: Vehicle) -> int:
-    return -1 if vehicle.battery_percent is None else round(vehicle.battery_percent)
+    percent = vehicle.battery_percent
+    return -1 if percent is None else round(max(0.0, min(100.0, percent)))
