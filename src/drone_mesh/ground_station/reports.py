@@ -165,7 +165,8 @@ class Fleet:
 
     def status(self, vehicle: Vehicle) -> Message:
         """Whether it can fly, and its battery."""
-        healthy = _NO_BREACH | _PREARM * (not vehicle.why_not_fly)
+        can_fly = vehicle.flying is not None and not vehicle.why_not_fly
+        healthy = _NO_BREACH | _PREARM * can_fly
         unknown = 0, _UINT16_UNKNOWN, -1, _percent(vehicle)
         return mavlink.MAVLink_sys_status_message(_PREARM, _PREARM, healthy, *unknown, *[0] * 6)
 

@@ -123,7 +123,7 @@ class Desk:
         if event.kind == MeshEventKind.FLIGHT_DECIDED.value:  # it repairs the mesh
             self._fleet.modes.pop(event.node, None)
         elif event.kind == MeshEventKind.ORDER_ACCEPTED.value:  # which others may have given
-            self._fleet.modes.pop(event.peers[0], None)
+            self._fleet.modes.pop(event.peers[0] if event.peers else -1, None)
         for node, order in self._orders.items():
             progress = order.progress
             before = progress.was_sent, progress.state

@@ -17,9 +17,11 @@ from typing import Any, Callable, Iterable, Iterator
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from drone_mesh.communication.timing import Throttle
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError
+from drone_mesh.execution import FAILURE_PERIOD_S
 from drone_mesh.ground_station.cursor_on_target import event_of
 from drone_mesh.ground_station.reports import COMPONENT, Fleet, Message
 from drone_mesh.ground_station.requests import Desk, OrderDrone
@@ -141,6 +143,8 @@ class GroundStationServer:
             for one in settings.stations
             if one.kind == "udp"
         ]
+        self._second, self._due_s = 0, time.monotonic()
+        self._failures = Throttle(FAILURE_PERIOD_S)
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name="ground stations")
 
@@ -176,20 +180,26 @@ class GroundStationServer:
     # Its thread ------------------------------------------------------------------------------
 
     def _run(self) -> None:
-        second, due_s = 0, time.monotonic()
         while not self._ended.wait(ROUND_S):
-            while not self._work.empty():
-                self._work.get()()
-            if time.monotonic() >= due_s:
-                due_s = max(due_s + 1.0, time.monotonic())
-                second += 1
-                self._every_second(second)
-            sources = {station.socket: station for station in self._stations}
-            for sock in select.select([*sources, *self._listeners], [], [], IDLE_S)[0]:
-                if sock in sources:
-                    self._receive(sources[sock])
-                else:
-                    self._accept(sock)
+            try:
+                self._round()
+            except Exception as error:  # of one message: the others must not wait for ever
+                if self._failures.count(type(error).__name__, time.monotonic()):
+                    _log.exception("ground stations")
+
+    def _round(self) -> None:
+        while not self._work.empty():
+            self._work.get()()
+        if time.monotonic() >= self._due_s:
+            self._due_s = max(self._due_s + 1.0, time.monotonic())
+            self._second += 1
+            self._every_second()
+        sources = {station.socket: station for station in self._stations}
+        for sock in select.select([*sources, *self._listeners], [], [], IDLE_S)[0]:
+            if sock in sources:
+                self._receive(sources[sock])
+            else:
+                self._accept(sock)
 
     def _show(self, vehicles: list[Vehicle], now_s: float) -> None:
         self._seen_s = time.monotonic()
@@ -200,16 +210,16 @@ class GroundStationServer:
         for told in self._fleet.event(event):
             self._post(*told, None)
 
-    def _every_second(self, second: int) -> None:
+    def _every_second(self) -> None:
         if self._signing is not None:  # its clock would stand still between two messages
             self._signing.timestamp = max(self._signing.timestamp, _signing_time())
         if time.monotonic() - self._seen_s > OLD_VIEW_S:
             return
-        for told in self._fleet.every_second(second) if self._stations else ():
+        for told in self._fleet.every_second(self._second) if self._stations else ():
             self._post(*told, None)
         for vehicle in self._fleet.all_alive() if self._cot else ():
             is_new = self._cot_told.get(vehicle.node) != vehicle.place_s
-            if is_new or (second + vehicle.node) % COT_AGAIN_S == 0:
+            if is_new or (self._second + vehicle.node) % COT_AGAIN_S == 0:
                 self._cot_told[vehicle.node] = vehicle.place_s
                 self._point(vehicle)
 
