@@ -63,6 +63,7 @@ def wait_for(mesh, what, condition):
         time.sleep(0.2)
 
 
+@pytest.mark.slow
 def test_mavsdk_sees_two_vehicles_and_orders_one(mesh):
     from mavsdk.plugins.action import action
     from mavsdk.plugins.mission import mission

@@ -72,7 +72,9 @@ class StationOfMesh:
         ]
 
 
-@pytest.mark.parametrize(("routers", "gridsize"), [(16, 4), (99, 10)])
+@pytest.mark.parametrize(
+    ("routers", "gridsize"), [(16, 4), pytest.param(99, 10, marks=pytest.mark.slow)]
+)
 def test_each_node_is_a_vehicle_at_the_place_that_it_reported(routers, gridsize):
     station = StationOfMesh(routers, gridsize)
     station.run_for(40)
@@ -87,6 +89,7 @@ def test_each_node_is_a_vehicle_at_the_place_that_it_reported(routers, gridsize)
         assert last_s - message.time_boot_ms / 1000 <= REPORT_PERIOD_S + 1.0
 
 
+@pytest.mark.slow
 def test_a_lost_node_ends_its_heartbeats_and_begins_them_again():
     station = StationOfMesh(16, 4)
     station.run_for(40)

@@ -15,6 +15,14 @@ NAN = math.nan
 ACCEPTED, REJECTED, DENIED, UNSUPPORTED, FAILED, IN_PROGRESS, CANCELLED = range(7)
 GO_TO = mavlink.MAV_CMD_DO_REPOSITION
 NORTH_DEG = 52.0 + 100 / 111_267  # 100 m north of the origin
+IN_UNITS = round(NORTH_DEG * 1e7), 50000000
+GUIDED = 4, 1, 0, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT, 16, 2, 0, 0, 0, 0, 0
+
+
+def target(x, y, mask=0b110111111000):
+    frame, rest = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT, [0] * 8
+    make = mavlink.MAVLink_set_position_target_global_int_message
+    return make(0, 4, 1, frame, mask, x, y, 8.0, *rest)
 
 
 def goal_of(rig):
@@ -130,24 +138,9 @@ def test_the_same_command_again_is_the_same_order_and_another_one_replaces_it():
         (long(mavlink.MAV_CMD_DO_SET_MODE, 1, 4, 6), (10, 20, 0)),
         (mavlink.MAVLink_set_mode_message(4, 129, LAND), (10, 20, 0)),
         (mavlink.MAVLink_set_mode_message(4, 129, RETURN), (10, 20, 0)),
-        (
-            mavlink.MAVLink_mission_item_int_message(
-                4, 1, 0, 6, 16, 2, 0, 0, 0, 0, 0, round(NORTH_DEG * 1e7), 50000000, 8.0
-            ),
-            (100, 0, 8),
-        ),
-        (
-            mavlink.MAVLink_mission_item_message(
-                4, 1, 0, 3, 16, 2, 0, 0, 0, 0, 0, NORTH_DEG, 5.0, 8.0
-            ),
-            (100, 0, 8),
-        ),
-        (
-            mavlink.MAVLink_set_position_target_global_int_message(
-                0, 4, 1, 6, 0b110111111000, round(NORTH_DEG * 1e7), 50000000, 8.0, *[0] * 8
-            ),
-            (100, 0, 8),
-        ),
+        (mavlink.MAVLink_mission_item_int_message(*GUIDED, *IN_UNITS, 8.0), (100, 0, 8)),
+        (mavlink.MAVLink_mission_item_message(*GUIDED, NORTH_DEG, 5.0, 8.0), (100, 0, 8)),
+        (target(*IN_UNITS), (100, 0, 8)),
     ],
 )
 def test_each_way_to_order_leads_to_its_place(message, goal):
@@ -162,12 +155,7 @@ def test_each_way_to_order_leads_to_its_place(message, goal):
         (reposition(NORTH_DEG, 5.0, 15.0, 10), "heights must be above sea level or above home"),
         (reposition(95.0, 5.0, 15.0), "95, 5 is no place on the earth"),
         (mavlink.MAVLink_set_mode_message(4, 129, 0x04040000), "only Hold, Return and Land"),
-        (
-            mavlink.MAVLink_set_position_target_global_int_message(
-                0, 4, 1, 6, 0b000111000111, 0, 0, 0, *[0] * 8
-            ),
-            "only places can be targets",
-        ),
+        (target(0, 0, mask=0b000111000111), "only places can be targets"),
     ],
 )
 def test_what_cannot_be_ordered_is_refused_in_words(message, words):
@@ -186,16 +174,11 @@ def test_without_permission_nothing_is_ordered():
 
 
 def test_a_stream_of_targets_is_one_order_and_its_refusal_is_said_once():
-    def target(north_m):
-        return mavlink.MAVLink_set_position_target_global_int_message(
-            0, 4, 1, 6, 0b110111111000, 520000000 + north_m, 50000000, 8.0, *[0] * 8
-        )
-
     rig, looker = DeskRig(), DeskRig(may_order=False)
     for step in range(10):
-        rig.ask(target(700 + step // 5 * 100))
+        rig.ask(target(520000700 + step // 5 * 100, 50000000))
     assert len(rig.ordered) == 1  # the other place comes within the same second
-    assert sum(len(looker.ask(target(700))) for _ in range(10)) == 2  # one text in two parts
+    assert sum(len(looker.ask(target(*IN_UNITS))) for _ in range(10)) == 2  # one text in two parts
 
 
 def test_the_mode_is_what_the_drone_does_not_what_was_asked():
