@@ -240,7 +240,7 @@ class Desk:
             home_m = self._fleet.home_height_m(vehicle.node)
             above_m = home_m if frame in _ABOVE_HOME else -origin.altitude_m
             place = place._replace(height=height_m + above_m)
-        return place._replace(height=max(0.0, place.height))
+        return place
 
     def _give(self, vehicle: Vehicle, message: Message, station: object) -> None:
         node, now_s, latest = vehicle.node, self._fleet.now_s, self._orders.get(vehicle.node)
@@ -252,8 +252,9 @@ class Desk:
             goal, mode = self._goal(vehicle, message)
             if not self._fleet.may_order:
                 raise _NotOrdered("no orders are taken here (--ground-station-may-order)")
-            goal = goal.as_ordered()
-            if latest is not None and (latest.goal, latest.mode) == (goal, mode):
+            goal = goal._replace(height=max(0.0, goal.height)).as_ordered()
+            is_same = latest is not None and latest.mode == mode  # it may fly on meanwhile
+            if latest is not None and is_same and (mode != HOLD or latest.goal == goal):
                 is_open = latest.progress.state.is_open
                 if is_stream or (is_open and latest.result in (_IN_PROGRESS, _ACCEPTED)):
                     acknowledge(latest.result)  # it came again, as that may be lost

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from desk_rig import GCS, HERE, DeskRig, long, reposition
+from desk_rig import GCS, HERE, DeskRig, drone, long, reposition
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from drone_mesh.drone.location import Location
@@ -191,6 +191,15 @@ def test_the_mode_is_what_the_drone_does_not_what_was_asked():
     rig.ordered.append((3, Location(0.0, 0.0, 5.0), None))  # somebody else orders it
     rig.event("order accepted", number=8)
     assert rig.fleet.heartbeat(rig.fleet.alive(3)).custom_mode == HOLD
+
+
+def test_a_landing_that_is_asked_for_again_is_the_same_though_the_drone_flies_on():
+    rig = DeskRig()
+    rig.ask(mavlink.MAVLink_set_mode_message(4, 129, LAND))
+    further = HERE._replace(latitude=14.0)
+    rig.fleet.show([drone(3, 102.0, flying=True, place=further)], 102.0)
+    rig.ask(mavlink.MAVLink_set_mode_message(4, 129, LAND))
+    assert len(rig.ordered) == 1
 
 
 def test_orders_are_limited():
