@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import queue
+
 import pytest
 from desk_rig import ORIGIN, reposition, text_of
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
+from test_station_server import Station
 
+from drone_mesh.communication.events.observer import MeshEvent, MeshEventKind
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused
+from drone_mesh.ground_station.gateway_link import GatewayLink
 from drone_mesh.ground_station.reports import Fleet
 from drone_mesh.ground_station.requests import Desk
+from drone_mesh.ground_station.settings import GroundStationSettings
 from drone_mesh.ground_station.vehicles import PROOF_PERIODS, vehicles_of_gateway
 from drone_mesh.inprocess import Network
 from drone_mesh.web.access import Allowance
@@ -127,12 +133,30 @@ def test_an_order_from_a_station_flies_and_the_new_place_is_told_at_once(routing
 
 
 def test_the_place_of_another_drone_is_refused_in_the_words_of_the_gateway():
-    station = StationOfMesh(16, 4)
-    station.run_for(40)
-    there = station.network.location(1)
-    station.send(
-        reposition(52.0 + there.latitude / 111_267, 5.0 + there.longitude / 68_670, 3.0, node=16)
+    network = Network(seed=1)
+    network.add_fleet(gateways=1, routers=3, gridsize=3, spacing=6.0)
+    network.run_for(20.0)
+    work, shown, ends, station = queue.SimpleQueue(), [], [], Station()
+    link = GatewayLink(
+        GroundStationSettings((station.address,), may_order=True),
+        ORIGIN,
+        10.0,
+        network.nodes[0].drone,
+        work.put,
+        lambda _period_s, show: shown.append(show) or (lambda: ends.append(True)),
     )
-    (_, first), (_, last) = station.of("COMMAND_ACK", 16)
-    assert (first.result, last.result) == (5, mavlink.MAV_RESULT_DENIED)
-    assert "drone 1" in "".join(text_of(m) for _at_s, m in station.of("STATUSTEXT", 16))
+    link.connect(network.nodes[0].component)
+    try:
+        shown[0](network.clock.now_s)
+        assert {station.hear("HEARTBEAT").get_srcSystem() for _ in range(4)} == {1, 2, 3, 4}
+        station.say(reposition(52.0, 5.0, 3.0, node=3))  # where drone 1 stands
+        assert station.hear("COMMAND_ACK").result == mavlink.MAV_RESULT_IN_PROGRESS
+        work.get(timeout=20.0)(network.clock.now_s)
+        assert station.hear("COMMAND_ACK").result == mavlink.MAV_RESULT_DENIED
+        parts = [text_of(station.hear("STATUSTEXT")) for _ in range(2)]
+        assert "".join(parts).startswith("not ordered: drone 1 stands 0.0 m from there")
+        link.observe(MeshEvent(MeshEventKind.LANDED, 2, network.clock.now_s))
+        assert text_of(station.hear("STATUSTEXT")) == "landed"
+    finally:
+        link.disconnect()
+    assert ends == [True]
