@@ -99,6 +99,7 @@ class ConsoleProcess:
         return int(code)
 
 
+MOVING = {"reduced_motion": "no-preference"}  # of a visit: packets are drawn, 30 times a second
 WAIT_WITHIN_S = 30.0  # for as long as the page itself waits for the answer to an order
 HANGS_AFTER_S = 600  # a test of many waits, each of which may be long on a busy machine
 expect.set_options(timeout=1000 * WAIT_WITHIN_S)
@@ -260,11 +261,15 @@ class Visit:
 
 @contextlib.contextmanager
 def visits_of(browser: Browser) -> Iterator[Callable[..., Visit]]:
-    """Opens pages: visit(url, **options of the browser's context). None may have complaints."""
+    """Opens pages: visit(url, **options of the browser's context). None may have complaints.
+
+    The user of a page wishes for little motion, as long as the options are not `MOVING`.
+    """
     contexts, visits = [], []
 
     def open_page(url: str, **options: object) -> Visit:
         options.setdefault("viewport", {"width": 1440, "height": 900})
+        options.setdefault("reduced_motion", "reduce")
         context = browser.new_context(**options)  # type: ignore[arg-type]
         contexts.append(context)
         visit = Visit(context.new_page())

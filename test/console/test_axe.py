@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from conftest import Visit
+from conftest import MOVING, Visit
 
 HASTE = ("--skip", "25", "--haste", "5")
 
@@ -31,7 +31,7 @@ def check(page: Visit, state: str) -> None:
 @pytest.mark.parametrize("size", [(1400, 880), (390, 780)], ids=["desk", "phone"])
 def test_axe_finds_no_violation(start_console, visit, size):
     width, height = size
-    page = visit(start_console(*HASTE).url, viewport={"width": width, "height": height})
+    page = visit(start_console(*HASTE).url, viewport={"width": width, "height": height}, **MOVING)
     page.wait_for_drones(18)
     keyboard = page.page.keyboard
     check(page, "nothing selected")
@@ -98,7 +98,7 @@ def test_axe_finds_no_violation(start_console, visit, size):
 
 
 def test_axe_finds_no_violation_on_a_recording(start_console, visit):
-    page = visit(start_console(*HASTE, "--recording", "run.bag", "--recorded", "40").url)
+    page = visit(start_console(*HASTE, "--recording", "run.bag", "--recorded", "40").url, **MOVING)
     page.wait_for_drones(18)
     page.wait_for("the badge", lambda: page.page.is_visible("#badge"))
     check(page, "a recording that is played")

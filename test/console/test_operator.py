@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 
 import pytest
 from conftest import Visit
-from test_page import FAR_FROM_17, PLACES, STATE, on_screen
+from test_page import FAR_FROM_17, PLACES, STATE, X, Y, on_screen
 
 FAST = ("--skip", "25")
 
@@ -47,6 +48,10 @@ def test_a_drag_can_be_sent_at_once(page):
     page.wait_for("the order is followed", lambda: "under way" in order.inner_text())
     page.page.select_option("#speed", "5")
     page.wait_for("its end", lambda: "arrived" in order.inner_text())
+    page.wait_for(
+        "17 at its goal",
+        lambda: math.dist((float(page.row(17, X)), float(page.row(17, Y))), FAR_FROM_17) < 0.3,
+    )
 
 
 def test_a_layout_can_be_undone_before_it_leaves_or_be_sent_at_once(page):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from conftest import Visit
+from conftest import MOVING, Visit
 
 HASTE = ("--skip", "5", "--haste", "5")
 SPACING_M = 6.0  # of the grid
@@ -45,7 +45,7 @@ def off_whole(value: float) -> float:
 
 @pytest.fixture
 def page(start_console, visit) -> Visit:
-    opened = visit(start_console(*HASTE).url)
+    opened = visit(start_console(*HASTE).url, **MOVING)
     opened.wait_for_drones(18)
     return opened
 
@@ -86,7 +86,7 @@ def test_dots_can_be_switched_off_and_there_are_none_in_the_past(page):
 
 
 def test_with_reduced_motion_there_are_no_dots_until_they_are_switched_on(start_console, visit):
-    page = visit(start_console(*HASTE).url, reduced_motion="reduce")
+    page = visit(start_console(*HASTE).url)
     page.wait_for_drones(18)
     assert not page.page.is_checked("#show-packets")
     page.page.click("#show-packets")

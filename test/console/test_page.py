@@ -6,7 +6,7 @@ import math
 import re
 
 import pytest
-from conftest import WAIT_WITHIN_S, Visit
+from conftest import MOVING, WAIT_WITHIN_S, Visit
 
 # The fleet: gateway 0 at (-1, 0); 17 routers in rows of 6, 6 m apart, in range below 9 m.
 PLACES = [(-1.0, 0.0)] + [(6.0 * (k % 6), 6.0 * (k // 6)) for k in range(17)]
@@ -80,22 +80,6 @@ def test_switching_a_node_off_by_click_turns_it_grey_and_the_routes_change(page)
     page.wait_for("16 routes again", lambda: page.drawn("route-links") == 16)
     page.page.click("#power")
     page.wait_for("2 is back", lambda: page.row(2, STATE) == "connected")
-
-
-def test_a_drag_sends_the_drone_there(page):
-    start, goal = on_screen(page, *PLACES[17]), on_screen(page, *FAR_FROM_17)
-    page.page.mouse.move(*start)
-    page.page.mouse.down()
-    page.page.mouse.move((start[0] + goal[0]) / 2, start[1], steps=4)
-    page.page.mouse.move(*goal, steps=4)
-    page.page.mouse.up()
-    page.wait_for("17 flies", lambda: page.row(17, STATE) == "flying")
-    page.page.select_option("#speed", "5")
-    page.wait_for(
-        "17 arrived",
-        lambda: page.row(17, STATE) != "flying" and abs(float(page.row(17, X)) - 3.0) < 0.2,
-    )
-    page.wait_for("its y", lambda: abs(float(page.row(17, Y)) - 3.0) < 0.2)
 
 
 def test_a_drag_that_ends_with_escape_sends_no_drone(page):
@@ -292,7 +276,8 @@ def test_the_page_follows_the_scheme_of_the_system(start_console, visit, scheme)
 
 
 def test_at_phone_width_nothing_sticks_out_and_each_view_is_one_tap_away(start_console, visit):
-    page = visit(start_console(*FAST).url, viewport={"width": 390, "height": 780}, has_touch=True)
+    phone = {"viewport": {"width": 390, "height": 780}, "has_touch": True}
+    page = visit(start_console(*FAST).url, **phone, **MOVING)
     page.wait_for_drones(len(PLACES))
     for tab, card in (
         ("nodes", "nodes"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from conftest import Visit
+from conftest import MOVING, Visit
 
 HASTE = ("--skip", "5", "--haste", "5")
 ORDERS = ("#power", "#fly-form", "#pause", "#layout-form", "#demonstrate", "#add", "#remove")
@@ -88,7 +88,7 @@ def test_one_page_looks_back_while_another_stays_in_the_present(start_console, v
 
 def test_the_whole_of_a_recording_can_be_viewed_while_it_is_played(start_console, visit):
     recording = ("--recording", "run.bag", "--recorded", "80")
-    page = visit(start_console("--skip", "2", "--haste", "1", *recording).url)
+    page = visit(start_console("--skip", "2", "--haste", "1", *recording).url, **MOVING)
     page.wait_for_drones(18)
     page.wait_for("the badge", lambda: page.page.is_visible("#badge"))
     assert page.page.title() == "run.bag: recording"
