@@ -194,6 +194,12 @@ class FactoryConfiguration:
         "radio, and drones fly over or round them",
         "the absolute path of a file of boxes, or empty",
     )
+    fence: str = setting(
+        "",
+        "absolute path of a file of areas that drones stay inside or out of: YAML in metres, or "
+        "with an origin GeoJSON or a QGroundControl plan (docs/flying.md)",
+        "the absolute path of a file of areas, or empty",
+    )
     obstacle_radio: Literal["block", "wall"] = setting(
         "block",
         "block: a box between two nodes ends their link; wall: it attenuates the link, depending "

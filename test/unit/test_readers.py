@@ -20,6 +20,7 @@ from drone_mesh.console import tiles
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.earth_files import read_placemarks
 from drone_mesh.errors import ConfigurationError
+from drone_mesh.fence_file import read_fence
 from drone_mesh.formations.layouts import Layouts
 from drone_mesh.formations.missions import read_missions
 from drone_mesh.lab.experiment import load_experiment
@@ -131,6 +132,21 @@ NS2 = (
 RECORD = {"uptime_s": 1.5, "nodes": [{"id": 3, "place": [1.0, 2.0, 3.0]}], "events": []}
 CSV = '"t", id,x,y,z\n0,3,1,2,3\n1.5,3,1e3,-2,3\n'
 BOXES = "boxes:\n- {center: [1, 2, 3.0], size: [1, 1, 1], yaw_deg: 30, material: brick}\n"
+FENCE = "areas:\n- {name: a, polygon: [[0, 0], [9, 0], [9.5, 9]], max_height: 5, min_height: -1}\n"
+CORNERS = [[52.09, 5.12], [52.09, 5.13], [52.1, 5.13]]
+AREAS = {
+    "type": "Feature",
+    "properties": {"name": "a", "inclusion": False, "max_height": 5},
+    "geometry": {"type": "Polygon", "coordinates": [[[y, x] for x, y in CORNERS]]},
+}
+PLAN = {
+    "geoFence": {
+        "version": 2,
+        "polygons": [{"inclusion": True, "polygon": CORNERS}],
+        "circles": [{"inclusion": True, "circle": {"center": CORNERS[0], "radius": 9.5}}],
+    },
+    "rallyPoints": {"points": [[52.093, 5.128, 10.0]], "version": 2},
+}
 MISSIONS = "missions:\n- {drones: [1, 2], waypoints: [[0, 1], [2, 3]], height: 3, loop: true}\n"
 EXPERIMENT = (
     "name: yard\nseeds: 2\nbase:\n  layout: {kind: grid, drones: 4}\nsweep: {range_m: [9]}\n"
@@ -142,6 +158,9 @@ READERS: list[tuple[str, Callable[[Path], object], str]] = [
     ("layout.yaml", Layouts.load, "cases:\n  5:\n    1: [0, 1.5, 0]\n    10: [0, 1.0e+1, 0]\n"),
     ("missions.yaml", read_missions, MISSIONS),
     ("boxes.yaml", read_obstacles, BOXES),
+    ("fence.yaml", lambda path: read_fence(path, ORIGIN), FENCE),
+    ("fence.geojson", lambda path: read_fence(path, ORIGIN), json.dumps(AREAS)),
+    ("fence.plan", lambda path: read_fence(path, ORIGIN), json.dumps(PLAN)),
     ("factory.yaml", load_configuration, "routers: 3\nspacing: 1.5\nrouting: beacon\n"),
     ("trial.yaml", load_experiment, EXPERIMENT),
     ("yard.csv", rows_of_file, 'id,x,"y",role\n0,0,0,gateway\n3,5,0,router\n'),

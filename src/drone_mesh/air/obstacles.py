@@ -1,14 +1,15 @@
-"""All boxes of the world: their effect on links, and flights past them. Pure geometry."""
+"""All boxes of the world: their effect on links, and flights past them and within the fence."""
 
 from __future__ import annotations
 
-import heapq
 import math
 from dataclasses import dataclass, replace
 from typing import Iterator, Sequence
 
+from drone_mesh.drone.fence import CLEAR_M, Fence, Rule
 from drone_mesh.drone.flight_path import FlightPath, Point, Vector
 from drone_mesh.drone.goal import MAX_HEIGHT_M
+from drone_mesh.drone.way_round import way_across
 
 # dB per surface crossed. brick: Sommer et al., "A Computationally Inexpensive Empirical Model of
 # IEEE 802.11p Radio Shadowing in Urban Environments", WONS 2011, the defaults of Veins. The others:
@@ -69,6 +70,14 @@ class Box:
                 return None
         return enters, leaves
 
+    def meets(self, a: Vector, b: Vector) -> bool:
+        """Whether it is in the way from a to b."""
+        return self.chord(a, b) is not None
+
+    def turns(self, _height_m: float) -> tuple[Point, ...]:
+        """Where a way round it may turn."""
+        return self.grown(BESIDE_M).corners
+
     def contains(self, point: Vector) -> bool:
         """Whether a point is inside or on its surface."""
         return all(abs(c) <= s / 2 for c, s in zip(self._to_own_frame(point), self.size))
@@ -81,10 +90,16 @@ class Box:
 
 METRE_DB = 0.4  # dB per metre inside, the same source as brick
 NO_PATH = "no path past the obstacles"  # reason for refusing a goal
+
+
+def no_path(fence: Fence) -> str:
+    """The same, where there is a fence as well."""
+    return f"{NO_PATH} and fence {fence.names}" if fence else NO_PATH
+
+
 BOX_CLEARANCE_M = 0.5  # least distance between a flight and a box, above and beside it
 ABOVE_M = BOX_CLEARANCE_M + 1e-6  # height above a box at which a flight is just clear of it
 BESIDE_M = 0.01  # distance of a corner of the path from its box, so that it does not touch it
-MOST_BOXES = 10  # on one path; the search time grows with the cube
 
 
 @dataclass(frozen=True)
@@ -100,6 +115,8 @@ class Obstacles:
     metre_db: float = METRE_DB
     exponent: float = 2.0  # of the path loss; 2 is free space
     ceiling_m: float = MAX_HEIGHT_M  # no flight goes higher
+    cruise_m: float = math.inf  # height of the way across at most, unless it has to pass over a box
+    fence: Fence = Fence()  # noqa: RUF009 (frozen)
 
     def loss_db(self, a: Vector, b: Vector) -> float:
         """Attenuation by the boxes between a and b, in dB; the same in both directions."""
@@ -121,9 +138,10 @@ class Obstacles:
         distance_m = max(math.dist(a, b), 1e-3)  # two drones may share a point
         return 10 * self.exponent * math.log10(range_m / distance_m) - self.loss_db(a, b)
 
-    def for_flights(self, half_width_m: float) -> Obstacles:
-        """The same boxes, enlarged for the centre of a body with this half width (m)."""
-        return replace(self, boxes=[box.grown(half_width_m) for box in self.boxes])
+    def for_flights(self, half_width_m: float, half_height_m: float) -> Obstacles:
+        """The same for flights of the centre of a body with this half width and height (m)."""
+        boxes = [box.grown(half_width_m) for box in self.boxes]
+        return replace(self, boxes=boxes, fence=self.fence.raised(half_height_m))
 
     def is_free(self, place: Vector) -> bool:
         """Whether a drone can be at this position."""
@@ -132,115 +150,73 @@ class Obstacles:
     def plan_flight(
         self, start: Vector, goal: Vector, start_s: float, speed_m_s: float
     ) -> FlightPath | None:
-        """The quickest flight over or round the obstacles; None if there is none.
+        """The quickest flight over or round the obstacles, within the fence; None: there is none.
 
         It climbs at its start and descends at its goal, so there is no flight if a box is above
-        either, or contains the goal. Nor is there one over a box that reaches the ceiling.
+        either, or contains the goal. Nor is there one over a box that reaches the ceiling. It
+        crosses lower than usual if only that is within the fence; from outside it first flies to
+        the nearest place inside.
         """
-        if not self.is_free(goal):
+        if not self.is_free(goal) or self.fence.why_not(goal):
             return None
-        over = self._over(start, goal, start_s, speed_m_s)
-        if over is not None and over.across_m == -math.inf:
-            return over  # nothing is in the way
-        ways = [over, *self._ways_round(start, goal, start_s, speed_m_s)]
-        flights = [way for way in ways if way is not None]
+        usual = FlightPath(start, goal, start_s, speed_m_s, ceiling_m=self.cruise_m)
+        lower = (height_m - CLEAR_M for height_m in self.fence.ceilings)
+        sinks = bool(self.fence.why_not(start))
+        at = [
+            usual,
+            *(replace(usual, ceiling_m=h, sinks=sinks) for h in lower if h < self.cruise_m),
+        ]
+        flights = []
+        for one in at:
+            over = self._over(one)
+            if over is not None:
+                flights.append(over)
+                if over.across_m == -math.inf:
+                    return over  # nothing is in the way
+        flights += [way for one in at for way in self._ways_round(one)]
         return min(flights, key=lambda way: way.duration_s) if flights else None
 
-    def _over(
-        self, start: Vector, goal: Vector, start_s: float, speed_m_s: float
-    ) -> FlightPath | None:
-        across_m = -math.inf
-        for _ in range(len(self.boxes) + 1):
-            path = FlightPath(start, goal, start_s, speed_m_s, across_m)
+    def _over(self, usual: FlightPath) -> FlightPath | None:
+        path = usual
+        for _ in range(len(self.boxes) + len(self.fence.rules) + 1):
             if not self._rises_freely(path):
                 return None
             in_the_way = self._met(path)
             if not in_the_way:
                 return path
-            across_m = max(across_m, max(box.top_m for box in in_the_way) + ABOVE_M)
+            top_m = max(one.top_m for one in in_the_way) + ABOVE_M
+            path = replace(usual, across_m=max(path.across_m, top_m))
         return None
 
-    def _ways_round(
-        self, start: Vector, goal: Vector, start_s: float, speed_m_s: float
-    ) -> Iterator[FlightPath]:
+    def _ways_round(self, usual: FlightPath) -> Iterator[FlightPath]:
         """Flights at the usual height and just above each higher box on the path, lowest first."""
-        usual = FlightPath(start, goal, start_s, speed_m_s)
         lowest_m = max(usual.above_start[2], usual.above_goal[2])
-        tops = {box.top_m + ABOVE_M for box in self._met(usual)}
+        tops = {one.top_m + ABOVE_M for one in self._met(usual)} - {math.inf}
         wide = [box.grown(BOX_CLEARANCE_M) for box in self.boxes]
         for height_m in sorted({lowest_m, *(top for top in tops if top > lowest_m)}):
-            corners = way_round(wide, start[:2], goal[:2], height_m)
+            corners = way_across(self.fence, wide, usual.start, usual.goal, height_m)
             if corners is not None:
-                path = FlightPath(start, goal, start_s, speed_m_s, height_m, corners)
+                path = replace(usual, across_m=height_m, around=corners)
                 if self._rises_freely(path):
                     yield path
 
-    def _met(self, path: FlightPath) -> list[Box]:
-        """The boxes on a straight horizontal path, or too close to it."""
+    def _met(self, path: FlightPath) -> list[Box | Rule]:
+        """What is on a straight path across, or too close to it."""
+        a, b = path.above_start, path.above_goal
+        high_m = max(a[2], b[2])  # a dynamic drone crosses there, a kinematic one in a slope
+        level = (*a[:2], high_m), (*b[:2], high_m)
         return [
-            box
-            for box in self.boxes
-            if box.grown(BOX_CLEARANCE_M).chord(path.above_start, path.above_goal) is not None
+            *(box for box in self.boxes if box.grown(BOX_CLEARANCE_M).meets(a, b)),
+            *(rule for rule in self.fence.rules if rule.meets(a, b) or rule.meets(*level)),
         ]
 
     def _rises_freely(self, path: FlightPath) -> bool:
-        """Whether its climb and descent meet no box and stay below the ceiling."""
+        """Whether its climb and descent are free and stay below the ceiling."""
         if max(path.above_start[2], path.above_goal[2]) > self.ceiling_m:
             return False
-        ends = ((path.start, path.above_start), (path.above_goal, path.goal))
-        return not any(box.chord(a, b) is not None for box in self.boxes for a, b in ends)
-
-
-def way_round(
-    boxes: Sequence[Box], start: Point, goal: Point, height_m: float
-) -> tuple[Point, ...] | None:
-    """The corners (x, y in metres) of the shortest path from start to goal at this height.
-
-    None: there is no path, or it passes more than MOST_BOXES. Only boxes that the path meets count:
-    each search adds those that the previous path met.
-    """
-    met: list[Box] = []
-    while len(met) <= MOST_BOXES:
-        way = _shortest(met, start, goal, height_m)
-        if way is None:
-            return None
-        new = [
-            box
-            for box in boxes
-            if box not in met and any(_is_met(box, *leg, height_m) for leg in zip(way, way[1:]))
-        ]
-        if not new:
-            return way[1:-1]
-        met += new
-    return None
-
-
-def _shortest(
-    boxes: Sequence[Box], start: Point, goal: Point, height_m: float
-) -> tuple[Point, ...] | None:
-    """A* over the corners of the boxes; two see each other if no box is between them."""
-    points = [start, goal, *(c for box in boxes for c in box.grown(BESIDE_M).corners)]
-    came_from: dict[int, int] = {}
-    waiting = [(0.0, 0.0, 0, 0)]  # least total length, length so far, point, previous point
-    while waiting:
-        _least, metres, here, before = heapq.heappop(waiting)
-        if here in came_from:
-            continue
-        came_from[here] = before
-        if here == 1:
-            way = [1]
-            while way[-1] != 0:
-                way.append(came_from[way[-1]])
-            return tuple(points[index] for index in reversed(way))
-        for other, point in enumerate(points):
-            if other in came_from or any(
-                _is_met(box, points[here], point, height_m) for box in boxes
-            ):
-                continue
-            until = metres + math.dist(points[here], point)
-            heapq.heappush(waiting, (until + math.dist(point, goal), until, other, here))
-    return None
-
-
-def _is_met(box: Box, a: Point, b: Point, height_m: float) -> bool:
-    return box.chord((*a, height_m), (*b, height_m)) is not None
+        rules = self.fence.rules
+        climb = (path.start, path.above_start), [r for r in rules if r.allows(path.start)]
+        descent = (path.above_goal, path.goal), rules
+        return not any(
+            one.meets(*leg) for leg, kept in (climb, descent) for one in (*self.boxes, *kept)
+        )

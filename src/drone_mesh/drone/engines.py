@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from drone_mesh.by_name import in_one_line, load_by_name
+from drone_mesh.drone.fence import Fence
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
@@ -51,6 +52,7 @@ class FlightOptions:
     origin: Origin | None = None
     limits: FlightLimits = field(default_factory=FlightLimits)
     permissions: Permissions = field(default_factory=Permissions)
+    fence: Fence = field(default_factory=Fence)
 
     def __post_init__(self) -> None:
         """Raise ConfigurationError for a combination that cannot fly."""
@@ -63,12 +65,16 @@ def create_engine(node_id: int, location: Location | None, options: FlightOption
 
     Raises ConfigurationError if the engine cannot be created.
     """
-    if options.drone == GROUND:
-        digest = options.origin.digest if options.origin is not None else 0
-        return GroundEngine(node_id, location, digest)
     if options.drone.startswith(MAVLINK):
         return _mavlink_engine(node_id, options)
-    return _own_engine(node_id, options.drone)
+    engine: IDroneEngine
+    if options.drone == GROUND:
+        digest = options.origin.digest if options.origin is not None else 0
+        engine = GroundEngine(node_id, location, digest)
+    else:
+        engine = _own_engine(node_id, options.drone)
+    engine.fence = options.fence
+    return engine
 
 
 def _mavlink_engine(node_id: int, options: FlightOptions) -> IDroneEngine:
@@ -81,7 +87,9 @@ def _mavlink_engine(node_id: int, options: FlightOptions) -> IDroneEngine:
         ) from error
     assert options.origin is not None  # checked by FlightOptions
     address = options.drone[len(MAVLINK) :]
-    return MavlinkEngine(node_id, address, options.origin, options.limits, options.permissions)
+    return MavlinkEngine(
+        node_id, address, options.origin, options.limits, options.permissions, options.fence
+    )
 
 
 def _own_engine(node_id: int, name: str) -> IDroneEngine:

@@ -41,6 +41,7 @@ class FlightPath:
     across_m: float = -math.inf  # least height of the way across, to pass over obstacles
     around: tuple[Point, ...] = ()  # x, y: corners of a detour on the way across
     ceiling_m: float = math.inf  # height of the way across at most, unless it starts or ends higher
+    sinks: bool = False  # if it starts above the ceiling, it first goes down to it
     duration_s: float = field(init=False)
     above_start: Vector = field(init=False)  # where it is at 10 %
     above_goal: Vector = field(init=False)  # where it is at 90 %
@@ -49,7 +50,8 @@ class FlightPath:
         distance_m = math.dist(self.start, self.goal)
         climb_m = distance_m / 2
         usual = (self.start[2] + climb_m, self.goal[2] + climb_m)
-        ceiling_m = max(self.ceiling_m, self.start[2], self.goal[2])
+        least_m = self.goal[2] if self.sinks else max(self.start[2], self.goal[2])
+        ceiling_m = max(self.ceiling_m, least_m)
         heights = [max(min(height, ceiling_m), self.across_m) for height in usual]
         if self.around:
             heights = [max(heights)] * 2

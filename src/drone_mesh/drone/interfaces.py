@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import abc
 
+from drone_mesh.drone.fence import Fence
 from drone_mesh.drone.location import Location
 
 
@@ -13,6 +14,8 @@ class IDroneEngine(abc.ABC):
     A custom engine needs `set_goal` and `get_location`; the other functions have defaults that suit
     a drone that can always fly.
     """
+
+    fence = Fence()  # of the whole mesh; whoever creates the engine sets it
 
     @abc.abstractmethod
     def set_goal(self, latitude: float, longitude: float, height: float) -> None:
@@ -25,6 +28,13 @@ class IDroneEngine(abc.ABC):
     def why_not_fly(self) -> str:
         """Why the drone cannot fly to a goal now; empty if it can."""
         return ""
+
+    def fences(self) -> Fence:
+        """All fences that this drone keeps: the mesh's, and its own if it has one.
+
+        The mesh gives it no goal outside. That its way does not lead outside is up to the engine.
+        """
+        return self.fence
 
     def can_fly(self) -> bool:
         """Whether the drone can fly to a goal now. Override `why_not_fly` instead."""

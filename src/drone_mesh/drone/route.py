@@ -30,9 +30,10 @@ class Route:
     ) -> None:
         """`cross_at_m` is the height in between; `around` are corners (x, y) in between.
 
-        `lands` leaves the final descent to the autopilot.
+        A start above `cross_at_m` first goes down. `lands` leaves the final descent to the
+        autopilot.
         """
-        height = max(cross_at_m, start.height, goal.height)
+        height = max(cross_at_m, goal.height)
         between_ends = [Location.from_vector((x, y, height)) for x, y in around]
         corners = [start, start._replace(height=height), *between_ends]
         corners.append(goal._replace(height=height))

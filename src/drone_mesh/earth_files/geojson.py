@@ -30,7 +30,7 @@ def read_geojson(text: str, origin: Origin) -> Placemarks:
     """
     content = read_json(text)
     found = Placemarks()
-    for number, feature in enumerate(_features(content), start=1):
+    for number, feature in enumerate(features_of(content), start=1):
         try:
             _add(found, feature, origin)
         except ConfigurationError as error:
@@ -68,7 +68,8 @@ def _feature(drone: int | None, kind: str, coordinates: object, more: Mapping[st
     }
 
 
-def _features(content: Any) -> Iterator[Any]:
+def features_of(content: Any) -> Iterator[Any]:
+    """The features of a file, or its one geometry as a feature. Raises ConfigurationError."""
     kind = content.get("type") if isinstance(content, dict) else None
     if kind == "FeatureCollection" and isinstance(content.get("features"), list):
         yield from content["features"]

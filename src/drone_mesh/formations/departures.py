@@ -14,6 +14,7 @@ import numpy as np
 
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.repair.options import CLEARANCE_M
+from drone_mesh.drone.fence import Fence
 from drone_mesh.drone.fleet import ids_in_words
 from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath, PlanFlight
 from drone_mesh.drone.goal import ROUNDING_M
@@ -67,6 +68,7 @@ class FlightRules(NamedTuple):
     plan_flight: PlanFlight = FlightPath
     sway_m: float = 0.0  # airspace.SWAY_M for dynamic drones
     clearance_m: float = CLEARANCE_M  # between drones at rest
+    fence: Fence = Fence()  # which `plan_flight` keeps
 
 
 @dataclass

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Callable, NamedTuple, Sequence
 
 from drone_mesh.communication.interfaces import MAX_NODE_ID
+from drone_mesh.drone.fence import Fence
 from drone_mesh.drone.flight_path import Vector
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.errors import ConfigurationError, GoalRefused
@@ -25,8 +26,15 @@ class Mission(NamedTuple):
     speed_m_s: float
     loop: bool  # from the last to the first again, and so on
 
-    def pilot(self) -> TrackPilot:
-        """A pilot who flies it. Raises GoalRefused for a mission that cannot be flown."""
+    def pilot(
+        self,
+        fence: Fence = Fence(),  # noqa: B008 (frozen)
+        here: Vector | None = None,
+    ) -> TrackPilot:
+        """A pilot who flies it from `here`, if that is given.
+
+        Raises GoalRefused for a mission that cannot be flown within the fence.
+        """
         if not 1 <= len(self.waypoints) <= MOST_WAYPOINTS:
             raise GoalRefused(f"{len(self.waypoints)} waypoints: use 1..{MOST_WAYPOINTS}")
         if not 0 < self.speed_m_s <= MAX_SPEED_M_S:
@@ -35,7 +43,13 @@ class Mission(NamedTuple):
             )
         for x, y, height in self.waypoints:
             check_goal(y, x, height)
-        return TrackPilot(along(self.waypoints, self.speed_m_s, self.loop), self.speed_m_s)
+        pilot = TrackPilot(along(self.waypoints, self.speed_m_s, self.loop), self.speed_m_s)
+        begin = [] if here is None else [here, *pilot.way_back(here)]
+        end = self.waypoints[:1] if self.loop else ()
+        why_not = fence.why_not_straight([*begin, *self.waypoints, *end])
+        if why_not:
+            raise GoalRefused(why_not)
+        return pilot
 
 
 def read_missions(path: str | Path) -> dict[int, Mission]:

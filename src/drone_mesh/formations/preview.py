@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import AbstractSet, Mapping, Sequence
 
+from drone_mesh.air.obstacles import no_path
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.drone.fleet import drones_in_words, ids_in_words
 from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath
@@ -177,7 +178,8 @@ class _Rehearsal:
         x, y, z = node.position
         path = self._rules.plan_flight((x, y, z), goal.to_vector(), self._now_s, SPEED_M_S)
         if path is None:
-            self._found.stays[node.id] = "no path past the obstacles"
+            fence = self._rules.fence
+            self._found.stays[node.id] = fence.why_not(goal.to_vector()) or no_path(fence)
             return
         self._flights[node.id] = path
         node.path = path_ahead(path, self._now_s)

@@ -9,8 +9,9 @@ from typing import Any, Callable, Iterable, Mapping, Optional
 
 import numpy as np
 
-from drone_mesh.air.obstacles import NO_PATH
+from drone_mesh.air.obstacles import Obstacles, no_path
 from drone_mesh.drone.battery import LAND_AT_PERCENT, Battery
+from drone_mesh.drone.fence import Fence
 from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath, PlanFlight
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine
@@ -33,8 +34,10 @@ class InProcessDrone(IDroneEngine):
         start: Location,
         on_flight: Callable[[bool], None],
         why_not_fly: str = "",
+        fence: Fence = Fence(),  # noqa: B008 (frozen)
     ) -> None:
         """`on_flight` is called with True at the start of a flight and with False at its end."""
+        self.fence = fence
         self._why_not_fly = why_not_fly
         self._clock = clock
         self._place = start
@@ -46,6 +49,8 @@ class InProcessDrone(IDroneEngine):
         # Returns None if there is no path; the drone then stays. Obstacles replace this planner.
         self.plan_flight: PlanFlight = FlightPath
         self.battery: Battery | None = None  # None: it never runs low; experiments use it up
+        if fence:
+            self.plan_flight = Obstacles((), fence=fence).plan_flight
 
     def set_goal(self, latitude: float, longitude: float, height: float) -> None:
         """Fly there, if it can. Raises GoalRefused for a goal out of bounds or without a path."""
@@ -60,7 +65,7 @@ class InProcessDrone(IDroneEngine):
             return
         plan = self.plan_flight(here.to_vector(), goal, self._clock.now_s, self.speed_m_s)
         if plan is None:
-            raise GoalRefused(NO_PATH)
+            raise GoalRefused(self.fence.why_not(goal) or no_path(self.fence))
         self.under_pilot = False
         if self.path is None:
             self._on_flight(True)
@@ -132,6 +137,7 @@ class PositionReceiver(IDroneEngine):
         self, drone: InProcessDrone, clock: Clock, errors: PositionErrors, rng: random.Random
     ) -> None:
         self._drone, self._clock, self._errors, self._rng = drone, clock, errors, rng
+        self.fence = drone.fence
         self._error_m = (self._drawn(), self._drawn())
         self._drawn_s = 0.0
 

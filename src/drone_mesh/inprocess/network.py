@@ -21,6 +21,7 @@ from drone_mesh.communication.repair.interfaces import IRepairStrategy
 from drone_mesh.communication.repair.options import DEFAULT_REPAIR, RANGE_M, RepairOptions
 from drone_mesh.communication.seals.keys import Keys
 from drone_mesh.communication.timing import MeshTiming
+from drone_mesh.drone.fence import Fence
 from drone_mesh.drone.fleet import (
     DEFAULT_GRIDSIZE,
     DEFAULT_ROUTERS,
@@ -74,6 +75,7 @@ class Network:
         repair_options: RepairOptions | None = None,
         key: Keys | Callable[[int], Keys | None] | None = None,
         positions: PositionErrors | None = None,
+        fence: Fence = Fence(),  # noqa: B008 (frozen)
     ) -> None:
         """`loss`, `delay_s` and `jitter_s` as for InProcessAir; `routing` as in a launch file, or
         "shortest_path", which knows all links: the bound for every other technique; or a class.
@@ -89,7 +91,7 @@ class Network:
         ConfigurationError.
 
         `key`: the key of the mesh, for every node, or a function that returns the keys of each
-        node. None: no seals, of that node or of all.
+        node. None: no seals, of that node or of all. `fence`: what all drones keep.
         """
         self._seed = seed
         self._rng = random.Random(seed)
@@ -102,6 +104,7 @@ class Network:
             repair_options or RepairOptions(),
         )
         self._key = key
+        self._fence = fence
         self._positions = positions or PositionErrors()
         if isinstance(radio, str):
             medium = (loss, delay_s, jitter_s, rate, links, fading, rician_k_db)
@@ -147,7 +150,7 @@ class Network:
             raise ValueError(f"node {node_id} already exists")
         radio_rng = random.Random(f"{self._seed} radio {node_id}")
         place = Location.from_vector((x, y, 0.0))
-        node = InProcessNode(self.air, node_id, place, radio_rng, gateway, why_not_fly)
+        node = InProcessNode(self.air, node_id, place, radio_rng, gateway, why_not_fly, self._fence)
         self._install(node, node_id)
         self.nodes[node_id] = node
         self.clock.call_at(start_s, self.air.run, node.start)

@@ -11,6 +11,7 @@ from drone_mesh.communication.events.observer import MeshEvent
 from drone_mesh.communication.interfaces import IGatewayCommands, IInternetConnection, IMeshNetwork
 from drone_mesh.communication.node.component import MeshnetworkComponent
 from drone_mesh.communication.timing import Deadlines
+from drone_mesh.drone.fence import Fence
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
 from drone_mesh.inprocess.drone import InProcessDrone
@@ -41,13 +42,14 @@ class InProcessNode:
         rng: random.Random,
         is_gateway: bool,
         why_not_fly: str = "",
+        fence: Fence = Fence(),  # noqa: B008 (frozen)
     ) -> None:
         """`rng`: the random numbers of the antenna."""
         self.node_id = node_id
         self.is_gateway = is_gateway
         self._clock = air.clock
         self.drone = InProcessDrone(
-            air.clock, start, functools.partial(air.flight, node_id), why_not_fly
+            air.clock, start, functools.partial(air.flight, node_id), why_not_fly, fence
         )
         self.antenna = air.antenna(self, rng)
         self.component: MeshnetworkComponent

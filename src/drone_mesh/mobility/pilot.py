@@ -61,9 +61,13 @@ class TrackPilot:
         """The drone falls behind: let no time of the track pass."""
         self._last_s = now_s
 
+    def way_back(self, place: Vector) -> list[Vector]:
+        """The corners of the way from this place to the track."""
+        track = self._track.position_at(self._track_s)
+        return [(place[0], place[1], track[2]), track]
+
     def _approach(self, place: Vector, budget_m: float) -> Vector:
-        x, y, z = self._track.position_at(self._track_s)
-        for corner in ((place[0], place[1], z), (x, y, z)):
+        for corner in self.way_back(place):
             way_m = math.dist(place, corner)
             if way_m > budget_m:
                 return between(place, corner, budget_m / way_m)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 from drone_mesh.drone.engines import GROUND, FlightOptions
+from drone_mesh.drone.fence import Fence
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions
-from drone_mesh.errors import ConfigurationError
+from drone_mesh.errors import ConfigurationError, naming_argument
 
 
 def add_flight_options(parser: argparse.ArgumentParser) -> None:
@@ -28,6 +30,13 @@ def add_flight_options(parser: argparse.ArgumentParser) -> None:
         metavar="LAT,LON,ALT",
         help="origin of the common frame: degrees (WGS84), metres above sea level; the same on "
         "every node",
+    )
+    group.add_argument(
+        "--fence",
+        type=Path,
+        metavar="FILE",
+        help="areas that drones stay inside or out of: a QGroundControl plan or GeoJSON, with "
+        "--origin, or YAML in metres; the same on every node",
     )
     for name, default, unit, text in (
         ("--max-height", limits.max_height_m, "METRES", "maximum height above home"),
@@ -72,6 +81,7 @@ def flight_options(parsed: argparse.Namespace) -> FlightOptions:
         raise ConfigurationError("--drone is for a single node, not for --emulated")
     return FlightOptions(
         drone=parsed.drone,
+        fence=_fence(parsed.fence, parsed.origin),
         origin=parsed.origin,
         limits=FlightLimits(
             max_height_m=parsed.max_height,
@@ -89,6 +99,15 @@ def flight_options(parsed: argparse.Namespace) -> FlightOptions:
             parsed.orders_may_take_back,
         ),
     )
+
+
+def _fence(path: Path | None, origin: Origin | None) -> Fence:
+    if path is None:
+        return Fence()
+    from drone_mesh.fence_file import read_fence  # with pymap3d and numpy
+
+    with naming_argument("--fence ", path):
+        return read_fence(path, origin)
 
 
 def _origin(text: str) -> Origin:

@@ -6,6 +6,7 @@ import logging
 import math
 from dataclasses import dataclass
 
+from drone_mesh.air.obstacles import no_path
 from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.drone.battery import (
     FLAT,
@@ -203,9 +204,7 @@ class DynamicEngine(DroneEngine):
             return
         path = self._plan(position, goal.to_vector(), now_s)
         if path is None:
-            _log.warning(
-                "box %d stays: no path past the obstacles to %s", self._box, goal.in_words()
-            )
+            _log.warning("box %d stays: %s to %s", self._box, no_path(self.fence), goal.in_words())
             return
         self.pause_pilot(True)
         self._route = self._route_of(path, here, goal)

@@ -7,7 +7,7 @@ import math
 from collections import deque
 from typing import Callable, NamedTuple
 
-from drone_mesh.air.obstacles import NO_PATH
+from drone_mesh.air.obstacles import no_path
 from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath, PlanFlight, Vector
 from drone_mesh.drone.goal import check_goal
@@ -113,12 +113,16 @@ class DroneEngine(IDroneEngine):
 
         A goal equal to the current goal or position changes nothing; any other goal replans the
         flight from the current position. Raises GoalRefused for NaN, infinity, positions out of
-        bounds, and goals that obstacles make unreachable.
+        bounds or outside the fence, and goals that obstacles or the fence make unreachable.
         """
         check_goal(latitude, longitude, height)
+        why_not = self.fence.why_not((longitude, latitude, height))
+        if why_not:
+            raise GoalRefused(why_not)
         goal = Location(latitude, longitude, height + self._half_height_m).to_vector()
         if self._plan(self._state.position, goal, self._world.now_s) is None:
-            raise GoalRefused(f"{NO_PATH}: x {longitude:g} m, y {latitude:g} m, z {height:g} m")
+            where = f"x {longitude:g} m, y {latitude:g} m, z {height:g} m"
+            raise GoalRefused(f"{no_path(self.fence)}: {where}")
         self._goals.append(goal)
         self._world.wake(self)
 
@@ -197,7 +201,7 @@ class DroneEngine(IDroneEngine):
             return
         path = self._plan(position, goal, now_s)
         if path is None:  # it has moved since the goal was accepted
-            _log.warning("box %d stays: no path past the obstacles to %s", self._box, goal)
+            _log.warning("box %d stays: %s to %s", self._box, no_path(self.fence), goal)
             return
         self.pause_pilot(True)
         self._state = DroneState(position, path, now_s)

@@ -8,6 +8,7 @@ from typing import ClassVar, Sequence
 
 from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.drone.battery import Crews
+from drone_mesh.drone.fence import Fence
 from drone_mesh.drone.fleet import MAX_DRONES, StartPlace
 from drone_mesh.drone.flight_path import FlightPath, PlanFlight, Vector
 from drone_mesh.drone.goal import check_goal
@@ -17,6 +18,7 @@ from drone_mesh.world.dynamic_engine import BodyLimits, DynamicEngine
 from drone_mesh.world.engine import DroneEngine
 from drone_mesh.world.worlds import PhysicalWorld, World
 
+HALF_HEIGHT_M = 0.1  # of the higher kind of box
 HALF_WIDTH_M = 0.15  # from the centre of a drone's box to its corner, plus a margin
 
 
@@ -97,8 +99,9 @@ class DroneFactory:
         self._limits, self._crews = limits, crews
         self._for_flights: Obstacles | None = None
         self._plan_flight: PlanFlight = functools.partial(FlightPath, ceiling_m=cruise_height_m)
+        self._fence = Fence() if obstacles is None else obstacles.fence
         if obstacles is not None:
-            self._for_flights = obstacles.for_flights(HALF_WIDTH_M)
+            self._for_flights = obstacles.for_flights(HALF_WIDTH_M, HALF_HEIGHT_M)
             for place in fleet:
                 if not _is_free(place, self._for_flights):
                     raise ConfigurationError(
@@ -165,9 +168,11 @@ class DroneFactory:
         drone.engine.leave()
 
     def _make(self, place: StartPlace) -> VirtualDrone:
-        return _KINDS[place.role](
+        drone = _KINDS[place.role](
             self._world, place, self._wind, self._plan_flight, self._limits, self._crews
         )
+        drone.engine.fence = self._fence
+        return drone
 
     def _check_place(self, place: StartPlace) -> None:
         try:

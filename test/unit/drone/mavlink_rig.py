@@ -9,6 +9,7 @@ from mavlink_vehicle.modes import Mode
 from mavlink_vehicle.vehicle import MavlinkVehicle
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from drone_mesh.drone.fence import Fence
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.autopilots import ARDUPILOT, OUR_SYSTEM_ID, Autopilot
@@ -56,13 +57,14 @@ class Rig:
         permissions: Permissions = ALL,
         limits: FlightLimits = FlightLimits(),  # noqa: B008 - frozen
         node_id: int = 1,
+        fence: Fence = Fence(),  # noqa: B008 - frozen
     ) -> None:
         self.now_s = 100.0
         self.limits = limits
         self.down = Wire(OUR_SYSTEM_ID, mavlink.MAV_COMP_ID_ONBOARD_COMPUTER)
         self.up = Wire(1, mavlink.MAV_COMP_ID_AUTOPILOT1)
         self.vehicle = MavlinkVehicle(autopilot, ORIGIN, self.up.send)
-        self.pilot = MavlinkPilot(node_id, ORIGIN, limits, permissions, self.down.send)
+        self.pilot = MavlinkPilot(node_id, ORIGIN, limits, permissions, self.down.send, fence)
         self.heights: list[float] = []
         self.shown_mode: int | None = None  # in heartbeats, in place of the vehicle's own
 

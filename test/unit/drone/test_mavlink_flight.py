@@ -7,6 +7,7 @@ from mavlink_rig import ARDUPILOT, Rig, lift
 from mavlink_vehicle.modes import Mode
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from drone_mesh.drone.fence import Fence, Zone
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.autopilots import PX4, Autopilot
 from drone_mesh.drone.mavlink.limits import FlightLimits
@@ -125,3 +126,36 @@ def test_a_drone_that_its_pilot_flew_out_of_the_limits_is_not_led_further() -> N
     rig.ready()
     assert rig.targets()
     assert all(target.latitude == pytest.approx(50.0, abs=0.1) for target in rig.targets())
+
+
+POND = Zone.circle("pond", (0.0, 20.0), 5.0, inside=False)
+SHED = Zone("shed", (((-50, 15), (50, 15), (50, 25), (-50, 25)),), highest_m=15.0)
+FAR = Zone("far", (((90, 0), (99, 0), (99, 9)),))
+LOW = Zone("low", (((-60, -60), (60, -60), (60, 60), (-60, 60)),), highest_m=6.0)
+
+
+@pytest.mark.parametrize(
+    ("fence", "goal", "words", "highest_m"),
+    [
+        (Fence.of([LOW], []), (70.0, 0.0, 5.0), "outside fence low", 0.0),
+        (Fence.of([LOW], []), (40.0, 0.0, 7.0), "above fence low", 0.0),
+        (Fence.of([], [POND]), (40.0, 0.0, 5.0), "", 12.0),
+        (Fence.of([], [SHED]), (40.0, 0.0, 5.0), "", 15.5),
+        (Fence.of([LOW], [POND]), (40.0, 0.0, 5.0), "", 5.5),
+        (Fence.of([LOW, FAR], []), (1.0, 98.0, 5.0), "no path", 0.0),
+    ],
+)  # fmt: skip
+def test_it_flies_round_over_or_under_what_the_fence_forbids_or_refuses(
+    fence: Fence, goal: tuple[float, float, float], words: str, highest_m: float
+) -> None:
+    rig = Rig(fence=fence).ready()
+    if words:
+        with pytest.raises(GoalRefused, match=words):
+            rig.goal(*goal)
+        return
+    rig.goal(*goal)
+    while rig.status().phase is not Phase.HOLDING:
+        rig.step()
+        assert not fence.why_not(rig.place._replace(height=max(0.0, rig.place.height)).to_vector())
+    assert rig.place.distance_m(Location(*goal)) < 1.0
+    assert max(rig.heights) == pytest.approx(highest_m, abs=0.3)

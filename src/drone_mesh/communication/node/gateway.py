@@ -113,6 +113,9 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         if not 0 <= node_id <= MAX_NODE_ID:
             raise GoalRefused(f"invalid drone id {node_id}: must be 0..{MAX_NODE_ID}")
         check_goal(latitude, longitude, height)
+        why_not = self._engine.fence.why_not((longitude, latitude, height))
+        if why_not:
+            raise GoalRefused(why_not)
         if height != int(height):
             raise GoalRefused(f"invalid height {height} m: must be in whole metres")
         goal = Location(latitude, longitude, height)

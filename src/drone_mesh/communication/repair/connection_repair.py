@@ -50,7 +50,12 @@ class ConnectionRepair(RepairActions):
     def __post_init__(self) -> None:
         super().__post_init__()
         self._taken = TakenPlaces(
-            self.node_id, self._deadlines, self._neighbours, self._places, self._options
+            self.node_id,
+            self._deadlines,
+            self._neighbours,
+            self._places,
+            self._options,
+            lambda place: not self.why_not_there(place),
         )
         again_s = self.medium.policy.ask_sealed_s if self._has_key else ASK_AGAIN_S
         self._ask_again_s = self.medium.stretched(again_s)
@@ -211,8 +216,15 @@ class ConnectionRepair(RepairActions):
         if not all(map(math.isfinite, step.place)):  # beside it no spot would be free
             self._strategy.reason = "its strategy names no place to fly to"
             return
+        goal = self.goal_of(step)
+        why_not = self.why_not_there(goal)
+        if why_not:
+            self._strategy.reason = f"no place to fly to: {why_not}"
+            self._tried_goals.append(step.place)
+            self._tried_spots.append(goal)
+            return
         self._report(MeshEventKind.FLIGHT_DECIDED, step.owner)
-        flight = self._new_flight(step, self.goal_of(step))
+        flight = self._new_flight(step, goal)
         flight.stops_when_connected = until_connected or step.home
         self._flies_to_place_of = step.owner if step in self.steps else NO_ROUTE
         if step.owner != self.node_id:
@@ -313,10 +325,12 @@ class ConnectionRepair(RepairActions):
         place, landing = at_whole_metres(step.place), self._landing(step)
         known = [place, *self._taken.all(), *self._tried_spots]
         if self.silent:
-            return own_spot(place, self.node_id, self.clearance_m, known)
+            return own_spot(place, self.node_id, self.clearance_m, known, self._taken.allows)
         rivals = self._rivals(step)
         if rivals:
-            return spot_beside_rivals(place, self.node_id, rivals, landing, self._options, known)
+            return spot_beside_rivals(
+                place, self.node_id, rivals, landing, self._options, known, self._taken.allows
+            )
         return self._taken.at_or_beside(place, landing, self._tried_spots)
 
     def _rivals(self, step: Step) -> list[int]:

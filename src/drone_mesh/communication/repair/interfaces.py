@@ -22,7 +22,7 @@ from drone_mesh.communication.events.observer import MeshEventKind, Reporter
 from drone_mesh.communication.interfaces import NO_ROUTE, IWirelessCommunication
 from drone_mesh.communication.repair.election import NO_BID
 from drone_mesh.communication.repair.options import RepairOptions
-from drone_mesh.communication.repair.spots import NEAR, PITCH, may_be_flown_to
+from drone_mesh.communication.repair.spots import NEAR, PITCH, at_whole_metres, may_be_flown_to
 from drone_mesh.communication.timing import Deadlines, Due, MeshTiming
 from drone_mesh.communication.wire.messages import (
     GatewayPlace,
@@ -169,9 +169,22 @@ class RepairActions(abc.ABC):
         ]
         return [
             Step(place, owner, home=owner == gateway != NO_ROUTE)
-            for place, owner in candidates
-            if place is not None and may_be_flown_to(place)
+            for known, owner in candidates
+            for place in self.within_fences(known)
+            if may_be_flown_to(place)
         ]
+
+    def within_fences(self, place: Location | None) -> list[Location]:
+        """A known place, or the nearest one to it that the fences allow, if there is one."""
+        fences = self._engine.fences()
+        if place is None or not fences:
+            return [] if place is None else [place]
+        inside = fences.nearest_inside(at_whole_metres(place).to_vector())
+        return [] if inside is None else [Location.from_vector(inside)]
+
+    def why_not_there(self, place: Location) -> str:
+        """Why the fences do not allow a place; empty if they do."""
+        return self._engine.fences().why_not(place.to_vector())
 
     @property
     def gateway_place(self) -> Location | None:

@@ -195,7 +195,10 @@ class NamedBackup(Nearest):
         if place is None or mesh.now_s - named_s > NAMED_FOR * mesh.check_period_s:
             return None
         known = [step for step in mesh.steps if step.owner == node]  # as late as can be
-        step = known[0] if known else Step(place, node)
+        known += [Step(inside, node) for inside in mesh.within_fences(place)]
+        if not known:
+            return None
+        step = known[0]
         near = here is not None and here.distance_m(step.place) <= mesh.range_m / WITHIN_REACH
         return step if near and may_be_flown_to(step.place) and not mesh.was_at(step) else None
 

@@ -165,4 +165,5 @@ class RepairFlight:
     def _beside(self, place: Location, landing: Landing) -> Location:
         """A free spot; two drones that divert at the same time skip different numbers of spots."""
         skip = self._node_id % 5 if self._diversions > 1 else 0
-        return free_spot(place, landing, self._options, self._taken.all(), skip)
+        taken = self._taken
+        return free_spot(place, landing, self._options, taken.all(), skip, taken.allows)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass
-from typing import Iterable, Iterator, NamedTuple, Sequence
+from typing import Callable, Iterable, Iterator, NamedTuple, Sequence
 
 from drone_mesh.communication.control.places import KnownPlaces
 from drone_mesh.communication.neighbours import Neighbours
@@ -46,6 +46,15 @@ def may_be_flown_to(place: Location) -> bool:
     return True
 
 
+Allows = Callable[[Location], bool]
+"""Whether the fences allow a place."""
+
+
+def everywhere(_place: Location) -> bool:
+    """There are no fences."""
+    return True
+
+
 BLOCK = 8  # spots along each side of a block
 BLOCKS = (2, 4, BLOCK)  # each divides the next one
 FLOORS = 4  # BLOCK * BLOCK * FLOORS spots: one for each of the 256 ids
@@ -63,15 +72,19 @@ class Landing(NamedTuple):
 
 
 def own_spot(
-    place: Location, node: int, clearance_m: float, occupied: Iterable[Location] = ()
+    place: Location,
+    node: int,
+    clearance_m: float,
+    occupied: Iterable[Location] = (),
+    allows: Allows = everywhere,
 ) -> Location:
-    """The spot nearest to `place` that belongs to `node` alone and is clear of `occupied`.
+    """The allowed spot nearest to `place` that belongs to `node` alone and is clear of `occupied`.
 
     Space is a lattice of spots that are clear of each other, divided among the ids 0..255 in blocks
     of 8 x 8 x 4. So drones that cannot hear each other never land at the same spot.
     """
     spots = sorted(_own_spots(place, node, clearance_m, BLOCK), key=place.distance_m)
-    return _first_clear(spots, clearance_m, occupied)
+    return _first_clear(spots, clearance_m, occupied, allows)
 
 
 def spot_beside_rivals(
@@ -81,6 +94,7 @@ def spot_beside_rivals(
     landing: Landing,
     options: RepairOptions,
     occupied: Iterable[Location],
+    allows: Allows = everywhere,
 ) -> Location:
     """A spot near `place` that belongs to `node` and to none of `rivals`, and keeps most links.
 
@@ -94,7 +108,7 @@ def spot_beside_rivals(
         _own_spots(place, node, options.clearance_m, block),
         key=lambda spot: (_too_long(spot, landing.links, options), place.distance_m(spot)),
     )
-    return _first_clear(spots, options.clearance_m, occupied)
+    return _first_clear(spots, options.clearance_m, occupied, allows)
 
 
 def _class_of(node: int, block: int) -> tuple[int, ...]:
@@ -119,10 +133,14 @@ def _own_spots(place: Location, node: int, clearance_m: float, block: int) -> li
 
 
 def _first_clear(
-    spots: Sequence[Location], clearance_m: float, occupied: Iterable[Location]
+    spots: Sequence[Location], clearance_m: float, occupied: Iterable[Location], allows: Allows
 ) -> Location:
     occupied = list(occupied)
-    free = (s for s in spots if all(s.distance_m(other) >= clearance_m for other in occupied))
+    free = (
+        spot
+        for spot in spots
+        if allows(spot) and all(spot.distance_m(other) >= clearance_m for other in occupied)
+    )
     return next(free, spots[0])
 
 
@@ -132,16 +150,21 @@ def free_spot(
     options: RepairOptions,
     occupied: Iterable[Location],
     skip: int = 0,
+    allows: Allows = everywhere,
 ) -> Location:
     """The nearest spot to `place`, but not at it, that is clear of all `occupied` places.
 
     Of the spots at the same distance, the one that keeps most links comes first, then the one
     nearest to the place where the drone comes from. `skip` skips that many free spots, so that two
-    drones that search at the same time can choose different ones.
+    drones that search at the same time can choose different ones. If the fences allow none within
+    range of the place, the place itself, which the drone is then refused.
     """
     occupied = list(occupied)
     for spot in _spots(place, landing, options):
-        if all(spot.distance_m(other) >= options.clearance_m for other in occupied):
+        if not allows(spot):
+            if spot.distance_m(place) > options.range_m:
+                return place
+        elif all(spot.distance_m(other) >= options.clearance_m for other in occupied):
             if skip == 0:
                 return spot
             skip -= 1
@@ -209,6 +232,7 @@ class TakenPlaces:
     _neighbours: Neighbours
     _places: KnownPlaces
     _options: RepairOptions
+    allows: Allows = everywhere
 
     def all(self) -> list[Location]:
         """Where each other node was last heard, and the gateway's place."""
@@ -223,9 +247,11 @@ class TakenPlaces:
         ]
 
     def is_free(self, spot: Location, tried: Sequence[Location] = ()) -> bool:
-        """Whether the spot is clear of other drones, and of spots that were tried in vain."""
+        """Whether it is allowed, and clear of other drones and of spots that were tried in vain."""
         clearance_m = self._options.clearance_m + ROUNDING_M
-        return all(spot.distance_m(other) >= clearance_m for other in [*self.all(), *tried])
+        return self.allows(spot) and all(
+            spot.distance_m(other) >= clearance_m for other in [*self.all(), *tried]
+        )
 
     def at_or_beside(
         self, place: Location, landing: Landing, tried: Sequence[Location] = ()
@@ -233,4 +259,5 @@ class TakenPlaces:
         """`place` if that is free, else the best spot near it; none of those that it `tried`."""
         if self.is_free(place, tried):
             return place
-        return free_spot(place, landing, self._options, [*self.all(), *tried])
+        occupied = [*self.all(), *tried]
+        return free_spot(place, landing, self._options, occupied, allows=self.allows)

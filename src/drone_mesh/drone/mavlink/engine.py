@@ -7,6 +7,7 @@ import threading
 import time
 from collections import deque
 
+from drone_mesh.drone.fence import Fence
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
@@ -61,13 +62,15 @@ class MavlinkEngine(IDroneEngine):
         origin: Origin,
         limits: FlightLimits,
         permissions: Permissions,
+        fence: Fence = Fence(),  # noqa: B008 (frozen)
     ) -> None:
         """Open the link. Raises ConfigurationError if that fails."""
+        self.fence = fence
         self._node_id = node_id
         self._origin = origin
         self._limits = limits
         self._link = MavlinkLink(address)
-        self._pilot = MavlinkPilot(node_id, origin, limits, permissions, self._link.send)
+        self._pilot = MavlinkPilot(node_id, origin, limits, permissions, self._link.send, fence)
         self._goals: deque[tuple[Location, bool, bool]] = deque()  # lands there; for a repair
         self._latest = (PilotStatus(), time.monotonic())
         self._missed: tuple[PilotStatus, float] | None = None  # was waited for in vain
@@ -149,6 +152,9 @@ class MavlinkEngine(IDroneEngine):
         if home is None:  # the status has become stale since
             raise GoalRefused("the drone cannot fly: its home is not known")
         self._limits.check(goal, home)
+        why_not = self.fences().why_not(goal.to_vector())
+        if why_not:
+            raise GoalRefused(why_not)
         self._goals.append((goal, lands, for_repair))
 
     def _run(self) -> None:

@@ -12,6 +12,8 @@ from typing import Callable
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from drone_mesh.drone.fence import CLEAR_M, Fence
+from drone_mesh.drone.flight_path import Point
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.authority import Authority, FlightArea
@@ -21,6 +23,7 @@ from drone_mesh.drone.mavlink.parameter_check import ParameterCheck
 from drone_mesh.drone.mavlink.pilot_status import UNDER_WAY, Phase, PilotStatus
 from drone_mesh.drone.mavlink.telemetry import Message, Telemetry
 from drone_mesh.drone.route import Route
+from drone_mesh.drone.way_round import way_across
 from drone_mesh.errors import GoalRefused
 
 TARGET_PERIOD_S = 0.2  # 5 Hz: PX4 needs at least 2 Hz
@@ -48,7 +51,9 @@ class MavlinkPilot:
         limits: FlightLimits,
         permissions: Permissions,
         send: Callable[[Message], None],
+        fence: Fence = Fence(),  # noqa: B008 (frozen)
     ) -> None:
+        self._fence = fence
         self._limits = limits
         self._cruise_m = limits.layer_height_m(node_id)
         self._node_id = node_id
@@ -103,6 +108,9 @@ class MavlinkPilot:
         home = self._area.home()
         assert home is not None  # otherwise there was a reason
         self._limits.check(goal, home)
+        here = self._area.here(now_s)
+        assert here is not None  # likewise
+        self._way(here, goal, home)
         self._stalled = False
         self._goal, self._lands, self._for_repair = goal, lands, for_repair
         self._ended = ""
@@ -295,18 +303,38 @@ class MavlinkPilot:
         assert here is not None
         assert home is not None
         assert self._goal is not None
-        ceiling_m = self._limits.ceiling_m(home)
         start = self._area.within(here)
+        try:
+            cross_at_m, around = self._way(start, self._goal, home)
+        except GoalRefused as error:  # the wind has moved it meanwhile
+            self._let_go(str(error), now_s)
+            return
         self._route = Route(
-            start,
-            self._goal,
-            min(self._cruise_m, ceiling_m),
-            self._lands,
-            self._limits.speed_m_s,
+            start, self._goal, cross_at_m, self._lands, self._limits.speed_m_s, around
         )
         self._commander.no_command()
         self._moved = None
         self._enter(Phase.FLYING, now_s)
+
+    def _way(
+        self, start: Location, goal: Location, home: Location
+    ) -> tuple[float, tuple[Point, ...]]:
+        """Height and corners of the way across that keeps the fences. Raises GoalRefused."""
+        fence, ceiling_m = self._fence, self._limits.ceiling_m(home)
+        lowest_m = goal.height  # one that is too high goes down first
+        if not fence.why_not(start.to_vector()):
+            lowest_m = max(start.height, goal.height)
+        usual_m = max(min(self._cruise_m, ceiling_m), lowest_m)
+        below = (height_m - CLEAR_M for height_m in fence.ceilings)
+        above = sorted(rule.top_m + CLEAR_M for rule in fence.rules)
+        others = [*(h for h in below if h < usual_m), *(h for h in above if h > usual_m)]
+        for height_m in (usual_m, *(h for h in others if lowest_m <= h <= ceiling_m)):
+            around = way_across(fence, (), start.to_vector(), goal.to_vector(), height_m)
+            if around is not None:
+                return height_m, around
+        raise GoalRefused(
+            fence.why_not(goal.to_vector()) or f"no path that keeps fence {fence.names}"
+        )
 
     def _fly_on(self, passed_s: float, now_s: float) -> None:
         here, route = self._area.here(now_s), self._route

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Callable, TypeVar
 
@@ -15,6 +16,7 @@ from drone_mesh.configuration import FactoryConfiguration, load_configuration
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError, naming_argument
+from drone_mesh.fence_file import read_fence
 from drone_mesh.formations.layouts import Layouts
 from drone_mesh.formations.missions import Mission, read_missions
 from drone_mesh.ros.graph import names
@@ -42,11 +44,21 @@ def factory_configuration(*keys: str) -> FactoryConfiguration:
 
 
 def configured_obstacles(configuration: FactoryConfiguration) -> Obstacles | None:
-    """The boxes that the configuration names, or None. Raises ConfigurationError."""
+    """The boxes and the fence that the configuration names; None without any of both.
+
+    A fence in degrees needs the origin of the simulation. Raises ConfigurationError.
+    """
     blocks = configuration.obstacle_radio == "block"
-    return _read_named_file(
+    boxes = _read_named_file(
         "obstacles", configuration.obstacles, lambda path: read_obstacles(path, blocks)
     )
+    fence = _read_named_file(
+        "fence", configuration.fence, lambda path: read_fence(path, earth_origin(""))
+    )
+    if fence is None:
+        return boxes
+    cruise_m = configuration.cruise_height
+    return replace(boxes or Obstacles(()), fence=fence, cruise_m=cruise_m)
 
 
 def configured_missions(configuration: FactoryConfiguration) -> dict[int, Mission]:

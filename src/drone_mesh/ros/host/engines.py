@@ -10,7 +10,7 @@ from typing import Any, Callable
 
 import rospy
 
-from drone_mesh.air.obstacles import NO_PATH, Obstacles
+from drone_mesh.air.obstacles import Obstacles, no_path
 from drone_mesh.drone.flight_path import SPEED_M_S, Vector
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
@@ -117,6 +117,8 @@ class RosDroneEngineConnector(IDroneEngine):
         would refuse are refused here as well.
         """
         self._obstacles = obstacles
+        if obstacles is not None:
+            self.fence = obstacles.fence
         self._node_id = node_id
         self._why_not_fly = why_not_fly
         self._gps = PersistentService(names.gps_service(node_id), RequestGPS)
@@ -164,7 +166,7 @@ class RosDroneEngineConnector(IDroneEngine):
         except LocationUnknown:
             return
         if obstacles.plan_flight(start, goal.to_vector(), 0.0, SPEED_M_S) is None:
-            raise GoalRefused(NO_PATH)
+            raise GoalRefused(no_path(self.fence))
 
     def get_location(self) -> Location:
         """The position that the engine reports. Raises LocationUnknown if it does not answer."""

@@ -167,11 +167,18 @@ class DroneManager:
         at_once: bool,
         handle: actionlib.ServerGoalHandle | None = None,
     ) -> srv.OrderLayoutResponse:
-        """Make a standing order of these. Raises ServiceException for places that are too near."""
-        with _refusing():
-            check_apart(dict(orders), flight_rules().clearance_m)
-        fleet = drones_if_known()
+        """Make a standing order of these.
+
+        Raises ServiceException for places that are too near, or outside the fence.
+        """
+        fleet, rules = drones_if_known(), flight_rules()
         known, missing = _in_fleet(orders, fleet)
+        with _refusing():
+            check_apart(dict(orders), rules.clearance_m)
+            for drone, goal in known:
+                why_not = rules.fence.why_not(goal.to_vector())
+                if why_not:
+                    raise GoalRefused(f"nobody flies: the place of drone {drone} is {why_not}")
         if not self._gateway_is_there():
             raise rospy.ServiceException("no gateway is running")
         lost = self._standing.lost_routes(known)

@@ -12,6 +12,7 @@ from typing import Callable, NamedTuple, Sequence
 import actionlib
 import rospy
 
+from drone_mesh.drone.fence import Fence
 from drone_mesh.drone.flight_path import FlightPath, PlanFlight
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.formations.airspace import SWAY_M
@@ -314,4 +315,5 @@ def flight_rules() -> FlightRules:
     if obstacles is not None:
         plan = obstacles.plan_flight
     sway_m = SWAY_M if fleet.flight == "dynamic" else 0.0
-    return FlightRules(plan, sway_m, fleet.node.repair_options.clearance_m)
+    fence = Fence() if obstacles is None else obstacles.fence
+    return FlightRules(plan, sway_m, fleet.node.repair_options.clearance_m, fence)

@@ -81,9 +81,13 @@ class FactoryParameters:
             configuration.spacing,
         )
         obstacles = configured_obstacles(configuration)
-        if obstacles is not None and configuration.cruise_height < MAX_HEIGHT_M:
+        if configuration.obstacles and configuration.cruise_height < MAX_HEIGHT_M:
             raise ConfigurationError(
                 "argument: cruise_height does not go with obstacles: flights cross over boxes"
+            )
+        if configuration.fence and configuration.mobility != "none":
+            raise ConfigurationError(
+                "argument: mobility does not go with a fence: its models know none; missions do"
             )
         missions = configured_missions(configuration)
         if configuration.drones == "external" and (missions or configuration.mobility != "none"):

@@ -84,7 +84,8 @@ class EngineServer:
             places = [(p.longitude, p.latitude, float(p.height)) for p in request.waypoints]
             why_not = engine.why_not_fly()
             try:
-                pilot = Mission(places, request.speed, request.loop).pilot()
+                mission = Mission(places, request.speed, request.loop)
+                pilot = mission.pilot(engine.fence, engine.get_location().to_vector())
             except GoalRefused as error:
                 why_not = str(error)
             if why_not:
@@ -94,8 +95,14 @@ class EngineServer:
             return srv.FlyMissionResponse(False, f"drone {self._node_id} has no mission")
         elif request.action == srv.FlyMissionRequest.STOP:
             engine.fly_with(None)
+        elif request.action == srv.FlyMissionRequest.PAUSE:
+            engine.pause_pilot(True)
         else:
-            engine.pause_pilot(request.action == srv.FlyMissionRequest.PAUSE)
+            here = engine.get_location().to_vector()
+            why_not = engine.fence.why_not_straight([here, *engine.pilot.way_back(here)])
+            if why_not:
+                return srv.FlyMissionResponse(False, f"drone {self._node_id}: {why_not}")
+            engine.pause_pilot(False)
         return srv.FlyMissionResponse(True, "")
 
     def _goal(self, goal: LocationMsg) -> None:

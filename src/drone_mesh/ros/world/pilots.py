@@ -8,6 +8,7 @@ from typing import Mapping, Sequence
 
 from drone_mesh.configuration import FactoryConfiguration
 from drone_mesh.drone.roles import Role
+from drone_mesh.errors import ConfigurationError, GoalRefused
 from drone_mesh.formations.missions import Mission
 from drone_mesh.mobility import Area, Mobility, tracks_of
 from drone_mesh.mobility.pilot import TrackPilot
@@ -26,7 +27,8 @@ def start_pilots(
 ) -> None:
     """Give each drone that moves its pilot; `missions` name drones of the fleet only.
 
-    The models move the routers in a square around the fleet, all at one height.
+    The models move the routers in a square around the fleet, all at one height. Raises
+    ConfigurationError for a mission outside the fence.
     """
     if configuration.flight == "dynamic" and configuration.mobility != "none":
         _log.warning(
@@ -46,7 +48,11 @@ def start_pilots(
         for node, track in tracks_of(mobility, places, gateways, area, configuration.seed).items():
             by_id[node].engine.fly_with(TrackPilot(track, speed_m_s))
     for node, mission in missions.items():
-        by_id[node].engine.fly_with(mission.pilot())
+        engine = by_id[node].engine
+        try:
+            engine.fly_with(mission.pilot(engine.fence, places[node]))
+        except GoalRefused as error:
+            raise ConfigurationError(f"missions: drone {node}: {error}") from None
 
 
 def area_around(places: Sequence[Sequence[float]], range_m: float) -> Area:

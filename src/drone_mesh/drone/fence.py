@@ -1,0 +1,296 @@
+"""Fences: areas that drones stay inside or out of, with heights. Pure geometry, in metres.
+
+In plain Python: most areas have few corners, for which numpy would be slower, and a Pi does without
+loading it. shapely knows no heights, and would bring GEOS for what is short here: whether a point
+is inside, and where a line meets an edge.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import Iterable, Iterator, Sequence, Tuple
+
+from drone_mesh.drone.flight_path import Point, Vector, between
+from drone_mesh.errors import ConfigurationError
+
+Ring = Tuple[Point, ...]
+
+CLEAR_M = 0.5  # how far a way round keeps from a fence; as from a box (air/obstacles.py)
+CIRCLE_CORNERS = 64  # the polygon for a circle is off by 0.12 % of its radius, to the safe side
+CIRCLE_TURNS = 16  # of ways round a circle, which are up to 2 % longer so
+MOST_CORNERS = 500  # of one area; the search for a way round tries all of them
+_SHORT_M = 1e-6  # a shorter piece of a way is rounding
+_SHARPEST = 1.0 / 3.0  # at a sharper corner, ways round keep 3 * CLEAR_M from its tip
+
+
+@dataclass(frozen=True)
+class Zone:
+    """An area between two heights. A point within an odd number of its rings is inside."""
+
+    name: str
+    rings: tuple[Ring, ...]
+    lowest_m: float = -math.inf
+    highest_m: float = math.inf
+    turns: tuple[Point, ...] = ()  # where ways round it may turn; empty: outside each corner
+    edges: tuple[tuple[Point, Point], ...] = field(init=False, repr=False, compare=False)
+    beside: tuple[Point, ...] = field(init=False, repr=False, compare=False)
+    """Points at CLEAR_M from each corner, on either side: first where it is the tip."""
+
+    def __post_init__(self) -> None:
+        """Raise ConfigurationError, which does not name the zone, for what is no area."""
+        if not self.lowest_m < self.highest_m:
+            raise ConfigurationError("its least height is not below its greatest")
+        edges: list[tuple[Point, Point]] = []
+        beside: list[Point] = []
+        for ring in self.rings:
+            # Programs close a ring with its first corner, or do not.
+            corners = [p for p, before in zip(ring, (*ring[-1:], *ring)) if p != before]
+            if len(corners) < 3:
+                raise ConfigurationError(f"{len(corners)} different corners: an area needs 3")
+            edges += _closed(corners)
+            beside += _beside(corners)
+        if len(edges) > MOST_CORNERS:
+            raise ConfigurationError(f"{len(edges)} corners: at most {MOST_CORNERS} are allowed")
+        object.__setattr__(self, "edges", tuple(edges))
+        object.__setattr__(self, "beside", tuple(beside))
+        object.__setattr__(self, "turns", self.turns or tuple(beside[::2]))
+        for number, (start, end) in enumerate(edges):
+            if any(True for _ in _meetings(start, end, edges[:number], inset=1e-9)):
+                raise ConfigurationError("its edges cross: which side is inside is not clear")
+        if abs(sum(p[0] * q[1] - p[1] * q[0] for p, q in edges)) < _SHORT_M:
+            raise ConfigurationError("its corners are in a line: they enclose nothing")
+
+    @classmethod
+    def circle(
+        cls,
+        name: str,
+        center: Point,
+        radius_m: float,
+        inside: bool,
+        heights: tuple[float, float] = (-math.inf, math.inf),
+    ) -> Zone:
+        """A circle to stay inside of, or out of, as the polygon on that side of it."""
+        if not radius_m > 0.0:
+            raise ConfigurationError(f"radius {radius_m:g} m: it has to be above 0")
+        reach_m = radius_m if inside else radius_m / math.cos(math.pi / CIRCLE_CORNERS)
+        turn_m = (reach_m + CLEAR_M) / math.cos(math.pi / CIRCLE_TURNS)
+        rings = (_around(center, reach_m, CIRCLE_CORNERS),)
+        return cls(name, rings, *heights, turns=_around(center, turn_m, CIRCLE_TURNS))
+
+    def surrounds(self, place: Vector) -> bool:
+        """Whether this place is inside, seen from above."""
+        x, y, _z = place
+        inside = False
+        for (x1, y1), (x2, y2) in self.edges:
+            if (y1 > y) != (y2 > y) and x < x1 + (y - y1) * (x2 - x1) / (y2 - y1):
+                inside = not inside
+        return inside
+
+    def contains(self, place: Vector) -> bool:
+        """Whether this place is inside, at its heights."""
+        return self.lowest_m <= place[2] <= self.highest_m and self.surrounds(place)
+
+    def cuts(self, a: Vector, b: Vector) -> Iterator[float]:
+        """Where the way from a to b passes its sides, floor or ceiling: shares of that way."""
+        yield from _meetings(a[:2], b[:2], self.edges)
+        if a[2] != b[2]:
+            for height_m in (self.lowest_m, self.highest_m):
+                yield (height_m - a[2]) / (b[2] - a[2])
+
+    def nearest(self, place: Vector) -> Iterator[Point]:
+        """The points of its edges nearest to a place, moved by CLEAR_M to either side."""
+        x, y, _z = place
+        for (x1, y1), (x2, y2) in self.edges:
+            dx, dy = x2 - x1, y2 - y1
+            length_m = math.hypot(dx, dy)
+            share = ((x - x1) * dx + (y - y1) * dy) / length_m**2
+            share = min(1.0, max(0.0, share))
+            for side_m in (CLEAR_M / length_m, -CLEAR_M / length_m):
+                yield x1 + share * dx - side_m * dy, y1 + share * dy + side_m * dx
+
+
+@dataclass(frozen=True)
+class Rule:
+    """Stay inside any of these zones, or out of all of them."""
+
+    zones: tuple[Zone, ...]
+    inside: bool
+    _turns: tuple[Point, ...] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        turns = [point for zone in self.zones for point in zone.turns]
+        if self.inside:
+            turns += self._passages()
+        object.__setattr__(self, "_turns", tuple(turns))
+
+    @property
+    def names(self) -> str:
+        """The names of its zones."""
+        return " or ".join(zone.name for zone in self.zones)
+
+    @property
+    def top_m(self) -> float:
+        """The height above which flights pass; infinity: none does."""
+        return math.inf if self.inside else max(zone.highest_m for zone in self.zones)
+
+    def allows(self, place: Vector) -> bool:
+        """Whether a drone may be there."""
+        return any(zone.contains(place) for zone in self.zones) is self.inside
+
+    def meets(self, a: Vector, b: Vector) -> bool:
+        """Whether the straight way from a to b breaks it anywhere."""
+        length_m = math.dist(a, b)
+        if length_m <= _SHORT_M:
+            return not self.allows(a)
+        inner = (share for zone in self.zones for share in zone.cuts(a, b) if 0.0 < share < 1.0)
+        shares = [0.0, *sorted(inner), 1.0]
+        return any(
+            (end - start) * length_m > _SHORT_M
+            and not self.allows(between(a, b, (start + end) / 2.0))
+            for start, end in zip(shares, shares[1:])
+        )
+
+    def turns(self, height_m: float) -> list[Point]:
+        """Where ways round it may turn, at this height."""
+        return [point for point in self._turns if self.allows((*point, height_m))]
+
+    def _passages(self) -> Iterator[Point]:
+        """Points around where two zones overlap or touch, through which ways lead."""
+        for zone in self.zones:
+            others = [other for other in self.zones if other is not zone]
+            for a, b in zone.edges:
+                met = (
+                    between((*a, 0.0), (*b, 0.0), s)
+                    for o in others
+                    for s in o.cuts((*a, 0.0), (*b, 0.0))
+                )
+                for x, y, _z in ((*a, 0.0), *met):
+                    around = [
+                        (x + dx, y + dy)
+                        for dx in (-CLEAR_M, 0.0, CLEAR_M)
+                        for dy in (-CLEAR_M, 0.0, CLEAR_M)
+                    ]
+                    if any(other.surrounds((*point, 0.0)) for other in others for point in around):
+                        yield from around
+
+    def why_not(self, place: Vector) -> str:
+        """Why a drone may not be there; empty if it may."""
+        if self.allows(place):
+            return ""
+        if not self.inside:
+            return f"inside fence {self.names}, which drones stay out of"
+        x, y, height_m = place
+        for zone in self.zones:
+            if zone.surrounds(place):
+                high = height_m > zone.highest_m
+                side, end_m = ("above", zone.highest_m) if high else ("below", zone.lowest_m)
+                return f"{side} fence {zone.name}: {height_m:.4g} m, and it ends at {end_m:g} m"
+        return f"outside fence {self.names}"
+
+
+@dataclass(frozen=True)
+class Fence:
+    """All rules of a file or of an autopilot; without any, everything is allowed."""
+
+    rules: tuple[Rule, ...] = ()
+
+    def __bool__(self) -> bool:
+        return bool(self.rules)
+
+    @classmethod
+    def of(cls, inside: Iterable[Zone], outside: Iterable[Zone]) -> Fence:
+        """Stay in any of the first and out of all of the second."""
+        within = tuple(inside)
+        rules = [Rule(within, True)] if within else []
+        return cls((*rules, *(Rule((zone,), False) for zone in outside)))
+
+    @property
+    def zones(self) -> list[tuple[Zone, bool]]:
+        """Each zone, and whether drones stay inside."""
+        return [(zone, rule.inside) for rule in self.rules for zone in rule.zones]
+
+    @property
+    def names(self) -> str:
+        """The names of all zones."""
+        return ", ".join(zone.name for zone, _inside in self.zones)
+
+    def raised(self, metres: float) -> Fence:
+        """The same for points that are so much above the places that count, as a body's centre."""
+        rules = (
+            replace(r, zones=tuple(replace(z, highest_m=z.highest_m + metres) for z in r.zones))
+            if r.inside
+            else r
+            for r in self.rules
+        )
+        return Fence(tuple(rules))
+
+    @property
+    def ceilings(self) -> list[float]:
+        """Heights below which ways pass under a zone or stay in it, highest first."""
+        ends = {zone.highest_m if inside else zone.lowest_m for zone, inside in self.zones}
+        return sorted((height_m for height_m in ends if math.isfinite(height_m)), reverse=True)
+
+    def why_not(self, place: Vector) -> str:
+        """Why a drone may not be there, with the name of the fence; empty if it may."""
+        return next(filter(None, (rule.why_not(place) for rule in self.rules)), "")
+
+    def why_not_straight(self, places: Sequence[Vector]) -> str:
+        """Why a drone may not fly straight from each of these places to the next; empty: it may."""
+        for one, other in zip(places, places[1:]):
+            for rule in self.rules:
+                if rule.meets(one, other):
+                    return rule.why_not(other) or f"its way passes fence {rule.names}"
+        return ""
+
+    def nearest_inside(self, place: Vector) -> Vector | None:
+        """The nearest place at the same height that keeps all rules; None: there is none."""
+        found = (point for zone, _inside in self.zones for point in zone.nearest(place))
+        corners = (point for zone, _inside in self.zones for point in zone.beside)
+        points = sorted({*found, *corners}, key=lambda point: math.dist(point, place[:2]))
+        places = ((x, y, place[2]) for x, y in points)
+        return next((one for one in (place, *places) if not self.why_not(one)), None)
+
+
+def _closed(corners: Sequence[Point]) -> list[tuple[Point, Point]]:
+    return list(zip(corners, (*corners[1:], corners[0])))
+
+
+def _meetings(
+    a: Sequence[float], b: Sequence[float], edges: Iterable[tuple[Point, Point]], inset: float = 0.0
+) -> Iterator[float]:
+    """Where a..b meets these edges, as shares of a..b; not within `inset` of any of the ends."""
+    ax, ay = a
+    dx, dy = b[0] - ax, b[1] - ay
+    for (x1, y1), (x2, y2) in edges:
+        ex, ey = x2 - x1, y2 - y1
+        spread = dx * ey - dy * ex
+        if spread:  # not parallel
+            gx, gy = x1 - ax, y1 - ay
+            share = (gx * ey - gy * ex) / spread
+            if inset <= (gx * dy - gy * dx) / spread <= 1.0 - inset and inset <= share <= 1 - inset:
+                yield share
+
+
+def _around(center: Point, radius_m: float, corners: int) -> Ring:
+    turns = (math.tau * n / corners for n in range(corners))
+    return tuple(
+        (center[0] + radius_m * math.cos(turn), center[1] + radius_m * math.sin(turn))
+        for turn in turns
+    )
+
+
+def _beside(corners: Sequence[Point]) -> Iterator[Point]:
+    """Each corner, moved by CLEAR_M from both edges there: to where it is the tip, and away."""
+    others = zip((corners[-1], *corners), corners, (*corners[1:], corners[0]))
+    for (x0, y0), (x, y), (x2, y2) in others:
+        before_m, after_m = math.dist((x0, y0), (x, y)), math.dist((x, y), (x2, y2))
+        ux, uy = (x - x0) / before_m, (y - y0) / before_m
+        vx, vy = (x2 - x) / after_m, (y2 - y) / after_m
+        length = math.hypot(ux + vx, uy + vy)  # twice the cosine of half the turn
+        nx, ny = (-(uy + vy) / length, (ux + vx) / length) if length > 1e-9 else (ux, uy)
+        away_m = CLEAR_M / max(length / 2.0, _SHARPEST)
+        if ux * vy - uy * vx > 0.0:  # it turns left: the tip is on the right
+            away_m = -away_m
+        yield x + away_m * nx, y + away_m * ny
+        yield x - away_m * nx, y - away_m * ny

@@ -1,0 +1,101 @@
+"""The shortest way round what is in the way of a flight, at one height."""
+
+from __future__ import annotations
+
+import heapq
+import math
+from typing import Protocol, Sequence
+
+from drone_mesh.drone.fence import Fence
+from drone_mesh.drone.flight_path import Point, Vector
+
+MOST_MET = 10  # on one path; the search time grows with the cube
+
+
+class InTheWay(Protocol):
+    """A box, or a rule of a fence."""
+
+    def meets(self, a: Vector, b: Vector) -> bool:
+        """Whether it is in the way from a to b."""
+
+    def turns(self, height_m: float) -> Sequence[Point]:
+        """Where ways round it may turn."""
+
+
+def way_across(
+    fence: Fence, boxes: Sequence[InTheWay], start: Vector, goal: Vector, height_m: float
+) -> tuple[Point, ...] | None:
+    """The corners of a way from above `start` to above `goal`, at this height.
+
+    None: there is no way, or the climb or the descent would break a rule. A drone that is outside
+    first flies to the nearest place inside, at this height; its climb may begin outside.
+    """
+    above, entry = (*start[:2], height_m), (*start[:2], height_m)
+    kept = [rule for rule in fence.rules if rule.allows(start)]
+    if any(rule.meets(start, above) for rule in kept) or any(
+        rule.meets((*goal[:2], height_m), goal) for rule in fence.rules
+    ):
+        return None
+    begin: tuple[Point, ...] = ()
+    if fence.why_not(above):
+        inside = fence.nearest_inside(above)
+        if inside is None or any(one.meets(above, inside) for one in (*boxes, *kept)):
+            return None
+        entry, begin = inside, (inside[:2],)
+    corners = way_round([*boxes, *fence.rules], entry[:2], goal[:2], height_m)
+    return None if corners is None else (*begin, *corners)
+
+
+def way_round(
+    obstacles: Sequence[InTheWay], start: Point, goal: Point, height_m: float
+) -> tuple[Point, ...] | None:
+    """The corners (x, y in metres) of the shortest path from start to goal at this height.
+
+    None: there is no path, or it passes more than MOST_MET obstacles. Only those that the path
+    meets count: each search adds what the previous path met.
+    """
+    met: list[InTheWay] = []
+    while len(met) <= MOST_MET:
+        way = _shortest(met, start, goal, height_m)
+        if way is None:
+            return None
+        new = [
+            one
+            for one in obstacles
+            if one not in met and any(_is_met(one, *leg, height_m) for leg in zip(way, way[1:]))
+        ]
+        if not new:
+            return way[1:-1]
+        met += new
+    return None
+
+
+def _shortest(
+    obstacles: Sequence[InTheWay], start: Point, goal: Point, height_m: float
+) -> tuple[Point, ...] | None:
+    """A* over their corners; two see each other if nothing is between them."""
+    points = [start, goal, *(c for one in obstacles for c in one.turns(height_m))]
+    came_from: dict[int, int] = {}
+    waiting = [(0.0, 0.0, 0, 0)]  # least total length, length so far, point, previous point
+    while waiting:
+        _least, metres, here, before = heapq.heappop(waiting)
+        if here in came_from:
+            continue
+        came_from[here] = before
+        if here == 1:
+            way = [1]
+            while way[-1] != 0:
+                way.append(came_from[way[-1]])
+            return tuple(points[index] for index in reversed(way))
+        for other, point in enumerate(points):
+            if other in came_from or any(
+                _is_met(one, points[here], point, height_m) for one in obstacles
+            ):
+                continue
+            until = metres + math.dist(points[here], point)
+            heapq.heappush(waiting, (until + math.dist(point, goal), until, other, here))
+    return None
+
+
+def _is_met(one: InTheWay, a: Point, b: Point, height_m: float) -> bool:
+    return one.meets((*a, height_m), (*b, height_m))

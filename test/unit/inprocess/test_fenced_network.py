@@ -1,0 +1,151 @@
+"""A fence wherever a goal is accepted: orders, repairs, formations, missions, other engines."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from drone_mesh.air.obstacles import Obstacles
+from drone_mesh.communication.events.observer import MeshEventKind
+from drone_mesh.communication.interfaces import OrderState
+from drone_mesh.drone.engines import FlightOptions, create_engine
+from drone_mesh.drone.fence import Fence, Zone
+from drone_mesh.drone.fleet import StartPlace
+from drone_mesh.drone.location import Location
+from drone_mesh.drone.roles import Role
+from drone_mesh.errors import GoalRefused
+from drone_mesh.formations.departures import FlightRules
+from drone_mesh.formations.missions import Mission
+from drone_mesh.formations.preview import preview
+from drone_mesh.inprocess import Network
+from drone_mesh.inprocess.drone import PositionErrors
+from drone_mesh.world.factory import DroneFactory
+from drone_mesh.world.worlds import World
+
+YARD = Zone("yard", (((-10, -10), (30, -10), (30, 10), (-10, 10)),), highest_m=8.0)
+POND = Zone.circle("pond", (8.0, 0.0), 1.5, inside=False)
+FENCE = Fence.of([YARD], [POND])
+
+
+def fenced(places=((0.0, 0.0), (4.0, 0.0)), fence=FENCE, **options):
+    network = Network(seed=1, fence=fence, **options)
+    network.add_gateway(0, *places[0])
+    for node, place in enumerate(places[1:], start=1):
+        network.add_router(node, *place)
+    network.run_for(20.0)
+    return network
+
+
+@pytest.mark.parametrize(
+    ("goal", "words"),
+    [
+        ((31.0, 0.0, 0), "outside fence yard"),
+        ((4.0, 0.0, 9), "above fence yard: 9 m, and it ends at 8 m"),
+        ((8.0, 1.0, 0), "inside fence pond, which drones stay out of"),
+    ],
+)
+def test_an_order_outside_is_refused_by_the_gateway_and_by_a_drone_whose_gateway_has_no_fence(
+    goal, words
+):
+    network = fenced()
+    with pytest.raises(GoalRefused, match=words):
+        network.order(1, *goal)
+    network.nodes[0].drone.fence = Fence()
+    network.order(1, *goal)
+    network.run_for(5.0)
+    (order,) = network.nodes[0].component.get_orders()
+    assert (order.state, order.reason) == (OrderState.REFUSED, words)
+    assert MeshEventKind.FLIGHT_ORDERED not in [event.kind for event in network.events]
+
+
+def test_a_drone_with_a_receiver_keeps_the_fence_of_its_network():
+    network = fenced(positions=PositionErrors(sigma_m=0.1))
+    network.nodes[0].drone.fence = Fence()
+    with pytest.raises(GoalRefused, match="pond"):
+        network.order(1, 8.0, 0.0)
+
+
+def test_an_ordered_flight_goes_round():
+    network = fenced(((0.0, 0.0), (4.0, 0.0)))
+    network.order(1, 12.0, 0.0)
+    places = []
+    for _ in range(200):
+        network.run_for(0.1)
+        places.append(network.location(1).to_vector())
+    assert places[-1] == (12.0, 0.0, 0.0)
+    assert not any(FENCE.why_not(place) for place in places)
+
+
+@pytest.mark.parametrize("repair", ["thesis", "inward", "named_backup", "virtual_spring"])
+def test_a_repair_ends_at_the_nearest_place_inside(repair):
+    """Its relay dies above the pond, where it may not fly."""
+    network = fenced(((0.0, 0.0), (8.0, 0.0), (16.0, 0.0)), fence=Fence(), repair=repair)
+    assert network.all_connected()
+    for node in network.nodes.values():
+        node.drone.fence = FENCE
+        node.drone.plan_flight = Obstacles((), fence=FENCE).plan_flight
+    network.power(1, False)
+    for _ in range(600):
+        network.run_for(0.25)
+        assert not FENCE.why_not(network.location(2).to_vector())
+    assert network.connected(2)
+    assert math.dist(network.location(2)[:2], (0.0, 8.0)) > 1.5
+
+
+def test_a_drone_that_would_have_to_leave_for_a_repair_stays():
+    home = Fence.of([Zone("home", (((15, -1), (17, -1), (17, 1), (15, 1)),))], [])
+    network = fenced(((0.0, 0.0), (8.0, 0.0), (16.0, 0.0)))
+    network.nodes[2].drone.fence = home
+    network.power(1, False)
+    network.run_for(150.0)
+    assert not home.why_not(network.location(2).to_vector())
+
+
+@pytest.mark.parametrize(
+    ("waypoints", "here", "loop", "words"),
+    [
+        ([(0, 0, 3), (20, 5, 3)], (0, 5, 0), False, ""),
+        ([(0, 0, 3), (40, 0, 3)], None, False, "outside fence yard"),
+        ([(0, 0, 3), (16, 0, 3)], None, False, "its way passes fence pond"),
+        ([(0, 0, 3), (16, 8, 3), (16, 0, 3)], None, True, "its way passes fence pond"),
+        ([(0, 0, 3)], (16, 0, 0), False, "its way passes fence pond"),
+        ([(0, 0, 9)], None, False, "above fence yard"),
+    ],
+)
+def test_a_mission_whose_ways_leave_the_fence_is_refused(waypoints, here, loop, words):
+    mission = Mission(waypoints, 1.0, loop)
+    if not words:
+        mission.pilot(FENCE, here)
+        return
+    with pytest.raises(GoalRefused, match=words):
+        mission.pilot(FENCE, here)
+
+
+def test_the_preview_of_a_formation_names_the_fence():
+    network = fenced(((0.0, 0.0), (4.0, 0.0), (0.0, 4.0)))
+    rules = FlightRules(Obstacles((), fence=FENCE).plan_flight, fence=FENCE)
+    goals = {1: Location(0.0, 8.0, 0.0), 2: Location(4.0, 4.0, 0.0)}
+    found = preview(network.status(), goals, rules)
+    assert found.stays == {1: "inside fence pond, which drones stay out of"}
+
+
+def test_a_drone_of_the_world_refuses_a_goal_outside_and_flies_lower_than_usual():
+    world = World()
+    fence = Fence.of([YARD], [])
+    place = StartPlace(0, Role.ROUTER, -9.0, 0.0)
+    engine = DroneFactory(world, [place], obstacles=Obstacles((), fence=fence)).drones[0].engine
+    with pytest.raises(GoalRefused, match="outside fence yard"):
+        engine.set_goal(0.0, 31.0, 0.0)
+    engine.set_goal(0.0, 29.0, 8.0)  # as high as the fence, and its body is higher
+    heights = []
+    while not heights or engine.state.is_flying:
+        world.step()
+        heights.append(engine.get_location().height)
+    assert engine.get_location().distance_m(Location(0.0, 29.0, 8.0)) < 0.01
+    assert max(heights) < 8.0 + 1e-6
+
+
+def test_the_engine_of_a_pi_has_the_fence_of_its_options():
+    engine = create_engine(1, None, FlightOptions(fence=FENCE))
+    assert engine.fences().why_not((31.0, 0.0, 0.0)) == "outside fence yard"

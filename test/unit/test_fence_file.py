@@ -1,0 +1,165 @@
+"""Files of fences: YAML in metres, GeoJSON, and plans of QGroundControl."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from drone_mesh.drone.geodesy import EarthPlace, Origin
+from drone_mesh.errors import ConfigurationError
+from drone_mesh.fence_file import fence_of, read_fence
+
+ORIGIN = Origin(52.0907, 5.1214, 3.0)
+DATE_LINE = Origin(-17.0, 179.9999, 0.0)
+YARD = """areas:
+- {name: yard, polygon: [[0, 0], [20, 0], [20, 20], [0, 20]], max_height: 8}
+- {name: tower, inclusion: false, center: [10, 10], radius: 2}
+"""
+
+
+def degrees(x, y, origin=ORIGIN):
+    place = origin.to_earth(
+        origin.to_frame(EarthPlace(*_origin(origin)))._replace(latitude=y, longitude=x)
+    )
+    return [place.latitude_deg, place.longitude_deg]
+
+
+def _origin(origin):
+    return origin.latitude_deg, origin.longitude_deg, origin.altitude_m
+
+
+def plan(origin=ORIGIN, rally=(), **changes):
+    square = [degrees(*corner, origin) for corner in ((-20, -20), (20, -20), (20, 20), (-20, 20))]
+    fence = {
+        "version": 2,
+        "polygons": [{"polygon": square, "inclusion": True, "version": 1}],
+        "circles": [
+            {
+                "circle": {"center": degrees(10, 10, origin), "radius": 2.0},
+                "inclusion": False,
+                "version": 1,
+            }
+        ],
+        **changes,
+    }
+    return {
+        "fileType": "Plan",
+        "geoFence": fence,
+        "groundStation": "QGroundControl",
+        "mission": {"items": []},
+        "rallyPoints": {"points": [[*degrees(*one, origin), 10.0] for one in rally], "version": 2},
+        "version": 1,
+    }
+
+
+def geojson(origin=ORIGIN):
+    ring = [
+        degrees(*corner, origin)[::-1] for corner in ((-20, -20), (20, -20), (20, 20), (-20, 20))
+    ]
+    hole = [degrees(*corner, origin)[::-1] for corner in ((8, 8), (12, 8), (12, 12), (8, 12))]
+    return {
+        "type": "FeatureCollection",
+        "features": [
+            {
+                "type": "Feature",
+                "properties": {"name": "yard", "max_height": 8, "stroke": "red"},
+                "geometry": {
+                    "type": "Polygon",
+                    "coordinates": [[*ring, ring[0]], [*hole, hole[0]]],
+                },
+            },
+            {
+                "type": "Feature",
+                "properties": {"name": "mast", "inclusion": False, "radius": 2},
+                "geometry": {"type": "Point", "coordinates": degrees(-10, 0, origin)[::-1]},
+            },
+            {
+                "type": "Feature",
+                "properties": None,
+                "geometry": {"type": "LineString", "coordinates": [ring[0], ring[1]]},
+            },
+        ],
+    }
+
+
+def written(tmp_path, name, content):
+    path = tmp_path / name
+    path.write_text(content if isinstance(content, str) else json.dumps(content), "utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "origin", "why_not"),
+    [
+        ("yard.yaml", YARD, None, {(1, 1, 0): "", (10, 9, 0): "inside fence tower",
+         (1, 1, 9): "above"}),
+        ("yard.plan", plan(), ORIGIN, {(1, 1, 0): "", (10, 9, 90): "inside fence circle 1",
+         (21, 1, 0): "outside fence polygon 1"}),
+        ("yard.plan", plan(DATE_LINE), DATE_LINE, {(15, 1, 0): "", (-15, 1, 0): "",
+         (25, 1, 0): "outside"}),
+        ("yard.plan", plan(rally=[(1, 1)]), ORIGIN, {(1, 1, 0): ""}),
+        ("yard.geojson", geojson(), ORIGIN, {(1, 1, 0): "", (10, 10, 0): "outside fence yard",
+         (-10, 1, 0): "inside fence mast", (1, 1, 9): "above"}),
+    ],
+)  # fmt: skip
+def test_the_areas_of_each_kind_of_file_are_in_the_metres_of_the_mesh(
+    tmp_path, name, content, origin, why_not
+):
+    fence = read_fence(written(tmp_path, name, content), origin)
+    for place, begin in why_not.items():
+        assert fence.why_not(place).startswith(begin), place
+        assert bool(fence.why_not(place)) == bool(begin), place
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("a.plan", plan(version=1), "version 2"),
+        ("a.plan", plan(polygons=[], circles=[]), "0 areas"),
+        ("a.plan", plan(polygons=[{"polygon": [[52, 5]]}]), "has no inclusion"),
+        (
+            "a.plan",
+            plan(polygons=[{"polygon": [[5, 95]] * 3, "inclusion": True}]),
+            "km from the origin",
+        ),
+        ("a.plan", plan(circles=[{"circle": {"center": [52, 5]}, "inclusion": True}]), "radius"),
+        ("a.plan", plan(rally=[(30, 0)]), "rally point 1 is outside fence polygon 1"),
+        ("a.plan", plan(rally=[(10, 10)]), "rally point 1 is inside fence circle 1"),
+        ("a.plan", "{", "not JSON"),
+        ("a.geojson", {"type": "FeatureCollection", "features": []}, "0 areas"),
+        ("a.yaml", "areas: 3", "line 1: expected 'areas:'"),
+        (
+            "a.yaml",
+            "areas: [{name: x, polygon: [[0, 0], [9, 9], [9, 0], [0, 9]]}]",
+            "area 1: its edges",
+        ),
+        ("a.yaml", "areas: [{polygon: [[0, 0], [9, .nan], [9, 0]]}]", "y nan is not"),
+        ("a.yaml", "areas: [{polygon: [[0, 0], [9, 1], [9, 0]], inclusion: 1}]", "true or false"),
+        (
+            "a.yaml",
+            "areas: [{polygon: [[0, 0], [9, 1], [9, 0]], radius: 1}]",
+            "a center and a radius",
+        ),
+        ("a.yaml", "areas: [{points: []}]", "expected keys name"),
+    ],
+)
+def test_a_file_that_is_no_fence_is_refused_with_one_line_that_names_it(
+    tmp_path, name, content, words
+):
+    path = written(tmp_path, name, content)
+    with pytest.raises(ConfigurationError) as refused:
+        read_fence(path, ORIGIN)
+    assert words in str(refused.value)
+    assert str(refused.value).startswith(str(path))
+    assert "\n" not in str(refused.value)
+
+
+def test_degrees_need_an_origin(tmp_path):
+    with pytest.raises(ConfigurationError, match="needs an origin"):
+        read_fence(written(tmp_path, "a.plan", plan()))
+
+
+def test_an_area_without_a_name_has_its_number():
+    rows = [{"polygon": [[0, 0], [9, 0], [9, 9]]}]
+    assert fence_of(rows).why_not((20, 0, 0)) == "outside fence area 1"
