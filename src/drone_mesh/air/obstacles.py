@@ -144,8 +144,8 @@ class Obstacles:
         return replace(self, boxes=boxes, fence=self.fence.raised(half_height_m))
 
     def is_free(self, place: Vector) -> bool:
-        """Whether a drone can be at this position."""
-        return not any(box.contains(place) for box in self.boxes)
+        """Whether a drone can be at this position, and may."""
+        return not (any(box.contains(place) for box in self.boxes) or self.fence.why_not(place))
 
     def plan_flight(
         self, start: Vector, goal: Vector, start_s: float, speed_m_s: float
@@ -157,7 +157,7 @@ class Obstacles:
         crosses lower than usual if only that is within the fence; from outside it first flies to
         the nearest place inside.
         """
-        if not self.is_free(goal) or self.fence.why_not(goal):
+        if not self.is_free(goal):
             return None
         usual = FlightPath(start, goal, start_s, speed_m_s, ceiling_m=self.cruise_m)
         lower = (height_m - CLEAR_M for height_m in self.fence.ceilings)

@@ -237,11 +237,22 @@ class Fence:
 
     def why_not_straight(self, places: Sequence[Vector]) -> str:
         """Why a drone may not fly straight from each of these places to the next; empty: it may."""
-        for one, other in zip(places, places[1:]):
+        for one, other in zip(places, places[1:] or places):
             for rule in self.rules:
                 if rule.meets(one, other):
                     return rule.why_not(other) or f"its way passes fence {rule.names}"
         return ""
+
+    def outside_share(self, a: Vector, b: Vector) -> float:
+        """The share of the straight way from a to b that breaks any rule."""
+        cuts = (share for zone, _inside in self.zones for share in zone.cuts(a, b))
+        shares = [0.0, *sorted(share for share in cuts if 0.0 < share < 1.0), 1.0]
+        return sum(
+            end - start
+            for start, end in zip(shares, shares[1:])
+            if (end - start) * math.dist(a, b) > _SHORT_M or a == b
+            if self.why_not(between(a, b, (start + end) / 2.0))
+        )
 
     def nearest_inside(self, place: Vector) -> Vector | None:
         """The nearest place at the same height that keeps all rules; None: there is none."""

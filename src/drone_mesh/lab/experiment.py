@@ -1,6 +1,7 @@
 """An experiment file: read, overridden from the command line, checked, expanded; or begun."""
 
 import copy
+import functools
 import hashlib
 import itertools
 import json
@@ -12,7 +13,9 @@ from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Optional, Seq
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from typing_extensions import Annotated, Literal
 
+from drone_mesh import fence_file
 from drone_mesh.air import obstacle_file
+from drone_mesh.drone.geodesy import Origin
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.lab import extensions, formations, places
 from drone_mesh.lab.expectations import Expectation
@@ -288,6 +291,7 @@ def _read_files(content: Dict[str, Any], source: Source) -> None:
     for part, key, read in (
         ("layout", "places", places.rows_of_file),
         ("obstacles", "boxes", obstacle_file.rows_of_file),
+        ("fence", "areas", functools.partial(_areas, content)),
         ("mobility", "knots", formations.rows_of_file),
     ):
         holder = content.get(part)
@@ -297,6 +301,11 @@ def _read_files(content: Dict[str, Any], source: Source) -> None:
             holder[key] = read(source.folder / holder["path"])
         except ConfigurationError as error:
             raise source.error(("base", part, "path"), f"{part}.path: {error}") from None
+
+
+def _areas(content: Dict[str, Any], path: Path) -> List[fence_file.Row]:
+    origin = content["fence"].get("origin")
+    return fence_file.rows_of_file(path, None if origin is None else Origin.parse(str(origin)))
 
 
 def _check_metrics(experiment: Experiment, source: Source) -> None:

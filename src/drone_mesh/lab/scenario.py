@@ -2,7 +2,7 @@
 
 # Pydantic reads these annotations when the module is loaded, and Python 3.8 has no list[int].
 import random
-from typing import ClassVar, Dict, FrozenSet, List, Optional, Tuple, Union
+from typing import Any, ClassVar, Dict, FrozenSet, List, Optional, Tuple, Union
 
 from pydantic import Field, field_validator, model_validator
 from typing_extensions import Annotated, Literal
@@ -13,10 +13,12 @@ from drone_mesh.communication.node.node_configuration import DEFAULT_ROUTING
 from drone_mesh.communication.repair.options import DEFAULT_REPAIR, RANGE_M, RepairOptions
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.battery import PowerModel
+from drone_mesh.drone.fence import Fence
 from drone_mesh.drone.fleet import MAX_DRONES
 from drone_mesh.drone.flight_path import SPEED_M_S
 from drone_mesh.drone.goal import MAX_HEIGHT_M
 from drone_mesh.errors import ConfigurationError
+from drone_mesh.fence_file import fence_of
 from drone_mesh.formations.relief import ReliefRules
 from drone_mesh.lab.scenario_parts import (
     Above0,
@@ -235,6 +237,26 @@ class Endurance(Part):
     relief: Literal["none", "spare_first", "named_backup", "rotate"] = "spare_first"
 
 
+class FenceSettings(Part):
+    """Areas that drones stay inside or out of."""
+
+    path: Optional[str] = None  # a file of them, beside the experiment
+    origin: Optional[str] = None  # LAT,LON,ALT of x 0, y 0, for files in degrees
+    areas: List[Dict[str, Any]] = []
+
+    @field_validator("areas")
+    @classmethod
+    def _are_areas(cls, rows: List[Dict[str, Any]]) -> List[Dict[str, Any]]:
+        try:
+            return rows if not rows or fence_of(rows) else []
+        except ConfigurationError as error:
+            raise ValueError(str(error)) from None
+
+    def fence(self) -> Fence:
+        """The fence, which may be none."""
+        return fence_of(self.areas) if self.areas else Fence()
+
+
 class Sequence(Part):
     """A few random faults over a random mesh, all drawn from the seed; the run ends at rest.
 
@@ -276,6 +298,7 @@ class Scenario(Part):
     repair_options: Repair = Repair()
     timing: Timing = Timing()
     obstacles: ObstacleSettings = ObstacleSettings()
+    fence: FenceSettings = FenceSettings()
     mobility: MotionSettings = MotionSettings()
     positions: Positions = Positions()
     probes: Probes = Probes()
@@ -302,6 +325,8 @@ class Scenario(Part):
             raise ValueError("endurance: its drones hover, so it needs model mesh and no mobility")
         if "load" in actions and actions.count("load") + actions.count("send") > 1:
             raise ValueError("a load says from when on messages count: no other load or send fits")
+        if self.fence.areas and (self.model == "ideal" or is_moved and not self.mobility.told):
+            raise ValueError("a fence is for flights that the mesh orders: model mesh, no mobility")
         is_piloted = is_moved and not self.mobility.told
         if is_piloted and any(f.battery and f.battery.fly_m is not None for f in self.faults):
             raise ValueError("battery.fly_m counts no flights of pilots (mobility): use live_min")

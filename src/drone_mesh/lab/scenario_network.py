@@ -17,7 +17,7 @@ from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.drone import PositionErrors
 from drone_mesh.lab.impairments import Impairments, OneWay
 from drone_mesh.lab.places import StartPoint, draw_places
-from drone_mesh.lab.scenario import ObstacleSettings, Scenario, Streams
+from drone_mesh.lab.scenario import Scenario, Streams
 from drone_mesh.lab.scenario_parts import Jam
 from drone_mesh.nrf24.emulator.links import IdealDisc, LinkModel, LogDistance, ScriptedLoss
 from drone_mesh.nrf24.emulator.space import Noise, Space
@@ -28,10 +28,18 @@ from drone_mesh.settings import with_settings
 MARGIN_STEP_DB = 0.1  # of the fading table
 
 
-def obstacles_of(part: ObstacleSettings) -> Obstacles:
-    """The boxes of a scenario. A material is one of CUT_DB; `cut_db` is the loss of brick."""
+def obstacles_of(scenario: Scenario) -> Obstacles:
+    """Its boxes and its fence. A material is one of CUT_DB; `cut_db` is the loss of brick."""
+    part = scenario.obstacles
     boxes = [box.to_box(part.cut_db) for box in part.boxes]
-    return Obstacles(boxes, part.radio == "block", part.metre_db, part.exponent, part.ceiling_m)
+    return Obstacles(
+        boxes,
+        part.radio == "block",
+        part.metre_db,
+        part.exponent,
+        part.ceiling_m,
+        fence=scenario.fence.fence(),
+    )
 
 
 def success(margin_db: float, fading: str, k_db: float) -> float:
@@ -59,14 +67,14 @@ def _faded(steps: int, fading: str, k_db: float) -> float:
 
 
 def put_obstacles(network: Network, impairments: Impairments, scenario: Scenario) -> Planner | None:
-    """Apply the boxes to links and flights; None if the scenario has neither boxes nor fading.
+    """Apply boxes and fence to links and flights; None if there are none of them and no fading.
 
     Call this before the nodes start.
     """
     part = scenario.obstacles
-    if not part.boxes and part.fading == "none":
+    if not (part.boxes or scenario.fence.areas) and part.fading == "none":
         return None
-    obstacles = obstacles_of(part)
+    obstacles = obstacles_of(scenario)
     range_m = scenario.range_m
     if scenario.radio.kind != "disc":
         if part.boxes:  # its fading is the network's
@@ -148,6 +156,7 @@ def network_of(
         ),
         key=key_of if scenario.key else None,
         positions=PositionErrors(**scenario.positions.model_dump()),
+        fence=scenario.fence.fence(),
         **_radio(scenario, streams, one_way),
     )
     grounded = streams.generator("grounded")
@@ -162,7 +171,8 @@ def network_of(
 
 
 def places_of(scenario: Scenario, streams: Streams) -> list[StartPoint]:
-    obstacles = obstacles_of(scenario.obstacles) if scenario.obstacles.boxes else None
+    has_any = scenario.obstacles.boxes or scenario.fence.areas
+    obstacles = obstacles_of(scenario) if has_any else None
     return draw_places(scenario.layout, scenario.range_m, streams.generator("layout"), obstacles)
 
 

@@ -113,10 +113,11 @@ class SequenceRun(Simulation):
         network, rng = self.network, self._rng
         here = network.location(GATEWAY)
         taken = [network.location(node)[:2] for node in network.nodes if node != GATEWAY]
-        while True:
+        drone, path = network.nodes[GATEWAY].drone, None
+        while path is None:
             x, y = here.longitude + rng.uniform(-15, 15), here.latitude + rng.uniform(-15, 15)
             if all(math.dist((y, x), other) > LEAST_DISTANCE_M for other in taken):
-                break
+                path = drone.plan_flight(here.to_vector(), (x, y, 0.0), 0.0, drone.speed_m_s)
         network.power(GATEWAY, True)
         network.order(GATEWAY, x, y, allow_shared_place=True)  # checked against the true places
         yield from self._passing(math.dist((y, x), here[:2]) / self.scenario.speed_m_s + 2.0)

@@ -90,7 +90,7 @@ class Simulation:
 
     def run(self, on_status: OnStatus | None = None) -> RunRecord:
         """Run to the end. `on_status` gets the state after each sample, for pictures."""
-        boxes = describe_obstacles(obstacles_of(self.scenario.obstacles).boxes)
+        boxes = describe_obstacles(obstacles_of(self.scenario).boxes)
         for _now_s in self.samples():
             if on_status is not None:
                 on_status(replace(self.network.status(), obstacles=boxes))

@@ -165,6 +165,18 @@ def close_ones(run: RunRecord) -> tuple[float, float]:
     return len(found) - passed, passed
 
 
+@less("s", "all drones together were outside the fence, on flights of the mesh and at rest")
+def outside_s(run: RunRecord) -> float:
+    fence = run.scenario.fence.fence()
+    if not fence:
+        return 0.0
+    ways = (_way(run, node, place) for node, place in run.start.places.items())
+    return sum(
+        (piece.end_s - piece.start_s) * fence.outside_share(piece.start, piece.end)
+        for piece in itertools.chain.from_iterable(ways)
+    )
+
+
 @less("", "repair flights of drones that were connected")
 def flew_connected(run: RunRecord) -> float:
     connected: set[int] = set()
