@@ -125,6 +125,7 @@ class _Rehearsal:
         self._nodes = {n.id: replace(n) for n in mesh.nodes if position_is_known(n)}
         self._goals = {n: goal for n, goal in goals.items() if n in self._nodes}
         self._flights: dict[int, FlightPath] = {}
+        self._refused: dict[int, str] = {}  # who has no way to its goal: why
         self._ordered: set[int] = set()  # of those that set out together
         self._now_s = 0.0
         self._found = FormationPreview()
@@ -166,8 +167,9 @@ class _Rehearsal:
         for drone, node in self._nodes.items():
             node.hops, node.connected = hops.get(drone, NO_ROUTE), drone in hops
         departures = Departures(self._status(), self._goals, {}, self._rules, self._formation)
-        choice = departures.choose(hops.keys() & self._goals.keys())
-        self._found.stays = choice.blocked
+        free = (hops.keys() & self._goals.keys()) - self._refused.keys()
+        choice = departures.choose(free)
+        self._found.stays = {**choice.blocked, **self._refused}
         return choice.set_out
 
     def _status(self) -> MeshStatus:
@@ -179,7 +181,8 @@ class _Rehearsal:
         path = self._rules.plan_flight((x, y, z), goal.to_vector(), self._now_s, SPEED_M_S)
         if path is None:
             fence = self._rules.fence
-            self._found.stays[node.id] = fence.why_not(goal.to_vector()) or no_path(fence)
+            self._refused[node.id] = fence.why_not(goal.to_vector()) or no_path(fence)
+            self._found.stays[node.id] = self._refused[node.id]
             return
         self._flights[node.id] = path
         node.path = path_ahead(path, self._now_s)
