@@ -319,7 +319,7 @@ class MavlinkPilot:
     def _way(
         self, start: Location, goal: Location, home: Location
     ) -> tuple[float, tuple[Point, ...]]:
-        """Height and corners of the way across that keeps the fences. Raises GoalRefused."""
+        """Height and corners of the shortest way that keeps the fences. Raises GoalRefused."""
         fence, ceiling_m = self._fence, self._limits.ceiling_m(home)
         lowest_m = goal.height  # one that is too high goes down first
         if not fence.why_not(start.to_vector()):
@@ -328,10 +328,16 @@ class MavlinkPilot:
         below = (height_m - CLEAR_M for height_m in fence.ceilings)
         above = sorted(rule.top_m + CLEAR_M for rule in fence.rules)
         others = [*(h for h in below if h < usual_m), *(h for h in above if h > usual_m)]
+        ways: list[tuple[float, float, tuple[Point, ...]]] = []  # by their length
         for height_m in (usual_m, *(h for h in others if lowest_m <= h <= ceiling_m)):
             around = way_across(fence, (), start.to_vector(), goal.to_vector(), height_m)
             if around is not None:
-                return height_m, around
+                level = [start.to_vector()[:2], *around, goal.to_vector()[:2]]
+                ways.append(
+                    (2.0 * height_m + sum(map(math.dist, level, level[1:])), height_m, around)
+                )
+        if ways:
+            return min(ways)[1:]
         raise GoalRefused(
             fence.why_not(goal.to_vector()) or f"no path that keeps fence {fence.names}"
         )
