@@ -101,6 +101,7 @@ class Neighbours:
         self._hops: dict[int, int] = {}
         self.places: dict[int, HeardPlace] = {}  # reported, by node; changes only here
         self._goals_s: dict[int, float] = {}  # when those in flight told their goal, their place
+        self._rested_m: dict[int, float] = {}  # how high each was when it was seen at rest last
         self._seen: dict[int, HeardPlace] = {}  # where these were seen since, perhaps for good
         self.silent = False  # all neighbours (2 or more) fell silent together; none heard since
 
@@ -234,6 +235,12 @@ class Neighbours:
             self.set_place(node, place, heard_s)
         elif node in self._goals_s and heard_s > self._goals_s[node]:
             self._seen[node] = HeardPlace(place, heard_s)
+
+    def at_rest(self, node: int, place: Location, flies: bool) -> Location:
+        """Where to look for `node`, seen at `place`: in flight, as high as it was at rest last."""
+        if not flies:
+            self._rested_m[node] = place.height
+        return place._replace(height=self._rested_m.get(node, place.height))
 
     def place_of(self, node: int) -> HeardPlace | None:
         """The last reported place of `node`."""

@@ -23,6 +23,15 @@ def between(start: Vector, end: Vector, share: float) -> Vector:
     )
 
 
+def nearest_share(start: Sequence[float], end: Sequence[float]) -> float:
+    """How far along this line the point nearest to the origin lies, 0 to 1."""
+    way = [b - a for a, b in zip(start, end)]
+    length_2 = sum(step * step for step in way)
+    if length_2 == 0.0:
+        return 0.0
+    return min(1.0, max(0.0, -sum(a * step for a, step in zip(start, way)) / length_2))
+
+
 @dataclass(frozen=True)
 class FlightPath:
     """One flight in straight lines: up, across, down.
@@ -100,6 +109,15 @@ class FlightPath:
         flown_m = share * _length(self.across)
         passed = (_length(self.across[:count]) <= flown_m for count in range(1, len(self.across)))
         return self.across[sum(passed) :]
+
+    def passes_m(self, place: Vector, now_s: float) -> float:
+        """How near it comes to `place` from this time on, in metres."""
+        corners = [self.position_at(now_s), *self.ahead(now_s)]
+        away = [(x - place[0], y - place[1], z - place[2]) for x, y, z in corners]
+        return min(
+            math.hypot(*between(one, other, nearest_share(one, other)))
+            for one, other in zip(away, away[1:])
+        )
 
     @staticmethod
     def _share_across(share: float) -> float:

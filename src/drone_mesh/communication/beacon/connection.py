@@ -81,9 +81,8 @@ class Connection:
         is_good = self._unproven is None and self._routes.is_proved
         if parent != NO_ROUTE and not flies and (is_good or places.good is None):
             neighbour = self._routes.neighbours[parent]
-            if neighbour.motion is not None:
-                place, seen_s = neighbour.motion.place, neighbour.reported_s
-                places.update_next_hop(parent, place, seen_s)
+            if neighbour.at_rest is not None:
+                places.update_next_hop(parent, neighbour.at_rest, neighbour.reported_s)
         if connected == self._was_connected:
             return False
         self._was_connected = connected

@@ -90,6 +90,7 @@ class Neighbour:
     until_s: float = -math.inf  # it counts as a neighbour without a further sign of life
     motion: Motion | None = None  # the last one that it reported
     reported_s: float = -math.inf
+    at_rest: Location | None = None  # where to look for it when it is lost, not up in the air
     apart_m: float = 0.0  # then
     loss: float = 0.0  # of its link, in hops
 

@@ -32,6 +32,7 @@ BIDS_WITHIN_S = 3.0  # routers that lose one parent notice it within two interva
 WITHOUT_BEACONS_S = 5.0  # 2.5 of the longest intervals, and more
 MOVED = 0.05  # of the range: a drone that is further from where it stood flies; from where the
 # others expect it, it has turned
+FLIES_M_S = 0.3  # faster than the place of a drone at rest drifts
 DEAF_AGAIN_S = 10.0  # a neighbour that does not hear this node is asked so often
 DRIVER_TRIES = 4  # per hop: more delay the packet, which another neighbour may take at once
 
@@ -306,14 +307,17 @@ class BeaconPlane(IControlPlane):
         neighbours = self._neighbours
         neighbours.set_hops(node, beacon.hops)
         if beacon.motion is not None:
-            neighbours.passes(node, beacon.motion.place, self._routes.now_s)
+            place, velocity = beacon.motion
+            neighbours.passes(node, place, self._routes.now_s)
+            flies = math.hypot(*velocity) > FLIES_M_S
+            self._routes.neighbours[node].at_rest = neighbours.at_rest(node, place, flies)
 
     def _take_gateway_place(self, node: int, beacon: Beacon) -> None:
         """Store the gateway's place from its own beacon or the parent's."""
         places, now_s, place = self._places, self._routes.now_s, beacon.gateway_place
         is_gateway = node == self._routes.gateway
         if is_gateway:
-            place = None if beacon.motion is None else beacon.motion.place
+            place = None if beacon.motion is None else self._routes.neighbours[node].at_rest
         elif node != self._routes.parent:
             return
         if place is None or not self._claims.may_be_at(place, gateway=True, says_so=is_gateway):

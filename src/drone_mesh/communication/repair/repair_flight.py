@@ -18,10 +18,12 @@ from drone_mesh.communication.repair.spots import (
     free_spot,
 )
 from drone_mesh.communication.timing import LANDED_WITHIN_M
+from drone_mesh.drone.flight_path import FlightPath
 from drone_mesh.drone.location import Location
 
 ASK_AGAIN_S = 0.3  # an answer takes some milliseconds
 ASKS_ON_GROUND = 2  # a lossy medium loses a question now and then
+MOST_ASIDES = 5  # of one flight
 LEG = 2.0 / 3.0  # of the range: at half that height it hears nodes below
 
 
@@ -54,6 +56,10 @@ class RepairFlight:
         self._diversions = 0
         self._leg_from: Location | None = None
         self._leg_end = self.goal
+        self._way: FlightPath | None = None  # to there
+        self._asides = 0  # because another drone was in the way
+        stands = self._pilot.place()
+        self._highest_m = max(self.goal.height, stands.height if stands else 0.0)
 
     @property
     def on_ground(self) -> bool:
@@ -105,6 +111,10 @@ class RepairFlight:
         elif not self.on_ground and self._is_taken_by(place, self._leg_end):
             self._diversions += 1
             self.fly_on()
+        elif not self.on_ground and self._way and self._asides < MOST_ASIDES:
+            taken, way = self._taken, self._way
+            if not (taken.is_clear(way, [above_ground(place)]) or taken.is_clear(way)):
+                self.fly_on()
 
     def _is_taken_by(self, place: Location, spot: Location) -> bool:
         near = above_ground(place).distance_m(spot) < self._options.clearance_m
@@ -142,20 +152,24 @@ class RepairFlight:
 
         A flight that may end where the drone is connected consists of legs. The drone climbs by
         half the length of a leg; from higher up it would hear no node on the ground. Each leg ends
-        clear of others, like the flight, and none just before the goal. The others are told where
-        it ends at once: this drone may fall silent within a second.
+        clear of others, like the flight, none just before the goal, and none up in the air. The
+        others are told where it ends at once: this drone may fall silent within a second. If
+        another drone is in the way, a leg leads aside first.
         """
         here = self._pilot.location()
-        self._leg_from, self._leg_end = here, above_ground(self.goal)
-        longest_m = self._leg_m + LANDED_WITHIN_M
-        if (
-            self.stops_when_connected
-            and here is not None
-            and here.distance_m(self.goal) > longest_m
-        ):
-            end = at_whole_metres(here.towards(self.goal, self._leg_m))
-            free = self._taken.is_free(end)
-            self._leg_end = end if free else self._beside(end, Landing(self.goal))
+        self._leg_from, self._leg_end, self._way = here, above_ground(self.goal), None
+        if here is not None:
+            longest_m = self._leg_m + LANDED_WITHIN_M
+            if self.stops_when_connected and here.distance_m(self.goal) > longest_m:
+                end = here.towards(self.goal, self._leg_m)
+                end = at_whole_metres(end._replace(height=min(end.height, self._highest_m)))
+                free = self._taken.is_free(end)
+                self._leg_end = end if free else self._beside(end, Landing(self.goal))
+            self._way = self._taken.way(here, self._leg_end)
+            if self._asides < MOST_ASIDES and not self._taken.is_clear(self._way):
+                self._asides += 1
+                self._leg_end = self._taken.aside(here, self._leg_end)
+                self._way = self._taken.way(here, self._leg_end)
         self._pilot.step_back_to(self._leg_end)
         self._requests.ask_all()
 

@@ -14,6 +14,7 @@ from drone_mesh.communication.control.places import KnownPlaces
 from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.repair.options import LostPlace, RepairOptions
 from drone_mesh.communication.timing import Deadlines
+from drone_mesh.drone.flight_path import FlightPath
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused
@@ -61,7 +62,7 @@ FLOORS = 4  # BLOCK * BLOCK * FLOORS spots: one for each of the 256 ids
 WITHIN_REACH = 0.9  # of the range: how far behind a node that moved a drone stays
 PITCH = 1.1  # distance of spots in clearances, with a margin for rounding
 NEAR = 1.5  # in clearances: a drone so near to a place has taken it
-DIRECTIONS = 24  # of the spots that are compared for the links that they keep
+DIRECTIONS = 24  # that are compared for spots, and for ways round others
 
 
 class Landing(NamedTuple):
@@ -220,6 +221,8 @@ def _at(place: Location, distance_m: float, bearing: float) -> Location:
 
 
 ROUNDING_M = 0.09  # a place in a beacon has tenths of a metre, on three axes
+TOUCH_M = 1e-3  # of sums
+ASIDE = 3.0  # clearances: half of that is how high it climbs, over drones on the ground
 FRESH_S = 5.0  # with EXACT, a drone that was silent for longer takes no place
 
 
@@ -252,6 +255,37 @@ class TakenPlaces:
         return self.allows(spot) and all(
             spot.distance_m(other) >= clearance_m for other in [*self.all(), *tried]
         )
+
+    def is_clear(self, way: FlightPath, of: Sequence[Location] = ()) -> bool:
+        """Whether the rest of this way is clear of these places, or of all.
+
+        Where it begins or ends nearer to one than the clearance, it comes no nearer on the way.
+        """
+        now_s, clearance_m = self._deadlines.now_s, self._options.clearance_m + ROUNDING_M
+        here, goal = (Location.from_vector(end) for end in (way.position_at(now_s), way.goal))
+        return all(
+            way.passes_m(place.to_vector(), now_s)
+            > min(clearance_m, here.distance_m(place), goal.distance_m(place)) - TOUCH_M
+            for place in of or self.all()
+        )
+
+    def way(self, start: Location, end: Location) -> FlightPath:
+        """How a drone that sets out now flies: up, across and down."""
+        return FlightPath(start.to_vector(), end.to_vector(), self._deadlines.now_s)
+
+    def aside(self, here: Location, end: Location) -> Location:
+        """A free place from where no other is in the way to `end`, nor on the way there, or `end`.
+
+        With small turns first, to both sides.
+        """
+        away_m = max(here.distance_m(end), ASIDE * self._options.clearance_m)
+        for turn in range(1, DIRECTIONS):
+            bearing = _bearing(here, end) + (-1) ** turn * (turn // 2) * math.tau / DIRECTIONS
+            spot = _at(here, away_m, bearing)._replace(height=end.height)
+            ways = self.way(here, spot), self.way(spot, end)
+            if self.is_free(spot) and all(map(self.is_clear, ways)):
+                return spot
+        return end
 
     def at_or_beside(
         self, place: Location, landing: Landing, tried: Sequence[Location] = ()

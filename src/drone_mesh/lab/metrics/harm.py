@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import Iterator, NamedTuple, Sequence
+from typing import Iterator, NamedTuple
 
 from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.communication.repair.options import CLEARANCE_M
-from drone_mesh.drone.flight_path import CLIMB_ENDS_AT, DESCENT_STARTS_AT, between
+from drone_mesh.drone.flight_path import (
+    CLIMB_ENDS_AT,
+    DESCENT_STARTS_AT,
+    between,
+    nearest_share,
+)
 from drone_mesh.lab.flights import Leg
 from drone_mesh.lab.metrics.registry import NAN, less, metric, metrics, more
 from drone_mesh.lab.record import Place, RunRecord
@@ -97,7 +102,7 @@ def _moment(piece: _Piece, other: _Piece) -> tuple[float, float]:
     """Metres and time of the nearest moment of two pieces that overlap in time."""
     start_s, end_s = max(piece.start_s, other.start_s), min(piece.end_s, other.end_s)
     apart = _apart(piece, other, start_s), _apart(piece, other, end_s)
-    share = _nearest_share(*apart)
+    share = nearest_share(*apart)
     return math.hypot(*between(*apart, share)), start_s + share * (end_s - start_s)
 
 
@@ -109,15 +114,6 @@ def _apart(one: _Piece, other: _Piece, now_s: float) -> Place:
 def _at(piece: _Piece, now_s: float) -> Place:
     length_s = piece.end_s - piece.start_s
     return between(piece.start, piece.end, (now_s - piece.start_s) / length_s if length_s else 1.0)
-
-
-def _nearest_share(start: Sequence[float], end: Sequence[float]) -> float:
-    """How far along this line the point nearest to the origin lies, 0 to 1."""
-    way = [b - a for a, b in zip(start, end)]
-    length_2 = sum(step * step for step in way)
-    if length_2 == 0.0:
-        return 0.0
-    return min(1.0, max(0.0, -sum(a * step for a, step in zip(start, way)) / length_2))
 
 
 ROUNDING_M = 1e-6

@@ -1551,6 +1551,7 @@ def test_no_leg_ends_on_a_drone_whose_place_is_known_or_told_on_the_way():
     rig.hear(f"06 06 01 01 01 {told}")
     assert len(rig.engine.goals) == flown + 1
     assert rig.engine.goals[-1].distance_m(first) >= 0.9
+    assert rig.engine.goals[-1].height == 0.0
 
 
 def test_the_last_leg_ends_at_the_goal_and_not_just_before_it():
