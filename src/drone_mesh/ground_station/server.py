@@ -148,11 +148,6 @@ class GroundStationServer:
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name="ground stations")
 
-    @property
-    def listens_at(self) -> list[tuple[str, int]]:
-        """Where it listens over TCP."""
-        return [listener.getsockname()[:2] for listener in self._listeners]
-
     def start(self) -> None:
         """Start its thread."""
         self._thread.start()

@@ -14,6 +14,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.ground_station.server import MOST_STATIONS, GroundStationServer
 from drone_mesh.ground_station.settings import Address, GroundStationSettings, signing_key
+from drone_mesh.state.model import EventRecord
 
 WITHIN_S = 20.0
 PASSPHRASE = "a passphrase of the field"
@@ -91,6 +92,10 @@ def serve():
     assert not [t for t in threading.enumerate() if t.name == "ground stations"]
 
 
+def listens_at(server):
+    return server._listeners[0].getsockname()
+
+
 def asks_for_missions():
     return mavlink.MAVLink_mission_request_list_message(4, 1, 0)
 
@@ -106,7 +111,7 @@ def test_two_stations_see_the_same_and_only_who_asks_is_answered(serve):
 
 
 def test_a_station_over_tcp_is_served_and_one_too_many_is_not(serve):
-    (address,) = serve(Address("tcp", "127.0.0.1", 0)).listens_at
+    address = listens_at(serve(Address("tcp", "127.0.0.1", 0)))
     stations = [Station(tcp=address) for _ in range(MOST_STATIONS)]
     stations[-1].hear("HEARTBEAT")
     assert Station(tcp=address).socket.recv(1) == b""
@@ -118,7 +123,7 @@ def test_a_station_over_tcp_is_served_and_one_too_many_is_not(serve):
 def test_noise_and_floods_stop_nobody(serve):
     one, stranger = Station(), Station()
     server = serve(one.address, Address("tcp", "127.0.0.1", 0))
-    noisy = Station(tcp=server.listens_at[0])
+    noisy = Station(tcp=listens_at(server))
     one.hear("HEARTBEAT")
     question = asks_for_missions().pack(one.codec)
     for _ in range(300):
@@ -137,7 +142,7 @@ def test_noise_and_floods_stop_nobody(serve):
 def test_a_station_that_does_not_read_is_left(serve):
     server = serve(Address("tcp", "127.0.0.1", 0))
     server._listeners[0].setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
-    station = Station(tcp=server.listens_at[0])
+    station = Station(tcp=listens_at(server))
     station.hear("HEARTBEAT")
     for _ in range(100_000):
         server._post(0, mavlink.MAVLink_statustext_message(6, b"x" * 50), None)
@@ -207,3 +212,51 @@ def test_without_an_origin_there_is_no_cursor_on_target():
     settings = GroundStationSettings.parse([], ["udp:127.0.0.1:6969"], False, "")
     with pytest.raises(ConfigurationError, match="needs an origin"):
         GroundStationServer(settings, None, 10.0, lambda *_: None)
+
+
+@pytest.mark.slow
+def test_mavsdk_as_the_station_sees_two_vehicles_and_orders_one(serve):
+    mavsdk = pytest.importorskip("mavsdk", reason="the binary in its wheel does not load here")
+    from mavsdk.plugins.action import action
+    from mavsdk.plugins.mission import mission
+    from mavsdk.plugins.param import param
+    from mavsdk.plugins.telemetry import telemetry
+
+    free, ordered = Station(), []
+    free.socket.close()
+
+    def order(node, goal, answer):
+        ordered.append(goal)
+        answer("")
+        for kind in ("order sent", "order accepted"):
+            server.tell(EventRecord(200.0, 0, kind, (node,), "", 7, goal))
+
+    def wait_for(condition):
+        deadline_s = time.monotonic() + WITHIN_S
+        while not condition():
+            assert time.monotonic() < deadline_s
+            at = {"flying": bool(ordered), "place": (ordered or [HERE])[-1]}
+            server.show([drone(0), drone(3, battery_percent=80.0, **at)], 100.0)
+            time.sleep(0.2)
+
+    server = serve(free.address, may_order=True, order=order)
+    kind = mavsdk.ComponentType.GROUND_STATION
+    station = mavsdk.Mavsdk(mavsdk.Configuration.create_with_component_type(kind))
+    try:
+        station.add_any_connection(f"udpin://127.0.0.1:{free.address.port}")
+        wait_for(lambda: station.system_count() >= 2)
+        (system,) = (one for one in station.get_systems() if one.get_system_id() == 4)
+        reports, orders = telemetry.Telemetry(system), action.Action(system)
+        wait_for(lambda: abs(reports.position().absolute_altitude_m - 7.0) < 0.01)
+        wait_for(lambda: reports.battery().remaining_percent == pytest.approx(80))
+        orders.goto_location(52.0 + 100 / 111_267, 5.0, 13.0, 0.0)
+        assert tuple(ordered[-1]) == pytest.approx((100.0, 0.0, 10.0), abs=0.1)
+        wait_for(lambda: reports.armed() and reports.in_air())
+        orders.land()
+        assert ordered[-1].height == 0.0
+        with pytest.raises(Exception, match="UNSUPPORTED"):
+            orders.arm()
+        assert mission.Mission(system).download_mission().mission_items == []
+        assert param.Param(system).get_param_float("MESH_NODE_ID") == 3.0
+    finally:
+        station.destroy()

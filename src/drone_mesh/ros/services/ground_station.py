@@ -41,7 +41,7 @@ class GroundStationNode:
     # Threads of rospy convert what comes in; orders wait for the service in a thread of their own.
 
     def __init__(self, settings: GroundStationSettings, on_other_run: Callable[[], None]) -> None:
-        """Open the sockets. `on_other_run` is called when the world was replaced."""
+        """Serve until `stop`. `on_other_run` is called when the world was replaced."""
         timing = get_fleet_parameter().node.timing
         self._orders = ThreadPoolExecutor(1, "orders of ground stations")
         self._server = GroundStationServer(
@@ -51,9 +51,6 @@ class GroundStationNode:
         self._on_other_run = on_other_run
         self._vehicles: list[Vehicle] = []
         self._lock = threading.Lock()  # rospy may have a thread per publisher
-
-    def start(self) -> None:
-        """Serve until `stop`."""
         self._server.start()
         rospy.Subscriber(names.STATE_TOPIC, MeshState, self._show, queue_size=1)
         rospy.Subscriber(
@@ -87,28 +84,17 @@ class GroundStationNode:
         self._orders.submit(order)
 
 
-def _settings() -> GroundStationSettings:
-    return GroundStationSettings.parse(
-        str(rospy.get_param("~addresses", "")).split(),
-        str(rospy.get_param("~cot", "")).split(),
-        bool(rospy.get_param("~may_order", False)),
-        str(rospy.get_param("~key_file", "")),
-    )
-
-
 def main() -> None:
     """Run the node."""
     start_node(GroundStationNode.__doc__, "ground_station", disable_signals=True)
     show_library_logs_on_rosout()
     with OrderlyStop() as stop:
-        settings = or_exit(_settings)
-        fleet_is_there = comes_true(
-            lambda: rospy.has_param(names.FLEET_PARAM), WAIT_S, stop.requested
-        )
-        if not fleet_is_there:
+        stations, cot = (str(rospy.get_param(name, "")).split() for name in ("~addresses", "~cot"))
+        may_order, key = rospy.get_param("~may_order", False), str(rospy.get_param("~key_file", ""))
+        settings = or_exit(lambda: GroundStationSettings.parse(stations, cot, may_order, key))
+        if not comes_true(lambda: rospy.has_param(names.FLEET_PARAM), WAIT_S, stop.requested):
             return
         node = or_exit(lambda: GroundStationNode(settings, stop.begin_anew))
-        node.start()
         MasterWatch().start()
         try:
             stop.wait()
