@@ -13,7 +13,7 @@ from rostest_support import MeshWatch, call, wait_for
 from drone_mesh.msg import Location, MeshState
 from drone_mesh.srv import OrderFormation
 
-POSTS = {3: (5.0, 4.0, 4.0), 4: (5.0, 8.0, 4.0)}  # x, y, z
+POSTS = {3: (5.0, 4.0, 4), 4: (5.0, 8.0, 4)}  # x, y, z
 POSTS_KEPT_S = 420.0  # simulated; a battery lasts for 180 s
 HOLDS_M = 2.2  # of the place or the one beside it
 

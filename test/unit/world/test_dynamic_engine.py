@@ -8,7 +8,7 @@ from typing import Iterator
 import pytest
 
 from drone_mesh.communication.events.observer import MeshEventKind
-from drone_mesh.drone.battery import LAND_AT_PERCENT, PowerModel
+from drone_mesh.drone.battery import LAND_AT_PERCENT, Crews, PowerModel
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused
 from drone_mesh.world.bullet_world import BulletWorld
@@ -137,6 +137,19 @@ def test_a_drone_that_runs_empty_lands_where_it_is_and_does_not_fly_again(world)
     assert not engine.crashed
     with pytest.raises(GoalRefused, match="battery"):
         engine.set_goal(1.0, 1.0, 1)
+
+
+def test_a_drone_that_runs_low_flies_home_where_there_are_crews_and_flies_again(world):
+    engine = drone(world, limits=BodyLimits(power=PowerModel(hover_s=60.0)), crews=Crews(5.0))
+    engine.set_goal(0.0, 6.0, 4)
+    run(world, 70.0)
+    place = engine.get_location()
+    assert math.hypot(place.latitude, place.longitude) < 0.3
+    assert place.height < 0.05
+    assert engine.battery_percent() > 95.0
+    engine.set_goal(0.0, 3.0, 2)
+    run(world, 10.0)
+    assert engine.get_location().height > 1.9
 
 
 def test_a_drone_is_flat_when_standing_has_used_the_rest_and_this_is_reported_once(world):
