@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from drone_mesh.drone.fence import Fence
+from drone_mesh.drone.flight_path import FlightPath
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.lab.experiment import load_experiment
 from drone_mesh.lab.metrics.harm import (
@@ -13,6 +15,7 @@ from drone_mesh.lab.metrics.harm import (
     harm,
     left_able,
     left_placeless,
+    outside_s,
     resting_close,
 )
 from drone_mesh.lab.plan import Plan
@@ -109,3 +112,17 @@ def test_mute_and_deaf_radios_cut_off_nobody_else_and_make_no_connected_drone_fl
     assert flew_connected(record) == left_able(record) == 0
     broken = {node for item in record.happened for node in item.nodes}
     assert set(record.left_behind) <= broken  # nobody else is cut off for that
+
+
+@pytest.mark.parametrize("keeps", [True, False])
+def test_repairs_within_a_fence_never_leave_it_and_would_without_one(keeps):
+    small = ["base.sequence.drones=[14, 20]", "sweep.repair=[thesis]"]
+    spec = next(iter(Plan(load_experiment(SUITE.with_name("fences.yaml"), small)))).spec
+    scenario = Scenario.model_validate_json(spec.scenario)
+    total_s = 0.0
+    for number in (3, 4, 5):
+        run = SequenceRun(scenario, Streams(0, number))
+        for node in run.network.nodes.values() if not keeps else ():
+            node.drone.fence, node.drone.plan_flight = Fence(), FlightPath
+        total_s += outside_s(run.run())
+    assert (total_s == 0.0) is keeps
