@@ -77,6 +77,24 @@ def test_an_ordered_flight_goes_round():
     assert not any(FENCE.why_not(place) for place in places)
 
 
+def test_a_drone_outside_is_told_and_flies_inside_only():
+    network = fenced(((0.0, 0.0), (4.0, 0.0), (0.0, 12.0)), max_distance_m=20.0)
+    told = {
+        node: [words for words in one.component.complaints.counts if "may not be" in words]
+        for node, one in network.nodes.items()
+    }
+    assert told == {0: [], 1: [], 2: ["the drone is where it may not be"]}
+    with pytest.raises(GoalRefused, match="outside fence yard"):
+        network.order(2, 0.0, 11.0)
+    network.order(2, 0.0, 4.0)
+    outside = []
+    for _ in range(100):
+        network.run_for(0.1)
+        outside.append(bool(FENCE.why_not(network.location(2).to_vector())))
+    assert outside == sorted(outside, reverse=True)  # until it is inside, and never again
+    assert network.location(2) == Location(4.0, 0.0, 0.0)
+
+
 @pytest.mark.parametrize("repair", ["thesis", "inward", "named_backup", "virtual_spring"])
 def test_a_repair_ends_at_the_nearest_place_inside(repair):
     """Its relay dies above the pond, where it may not fly."""
