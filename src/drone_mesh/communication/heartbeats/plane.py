@@ -353,8 +353,8 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         self._delivery.send_own_to_each(self._heartbeat(), others)
 
     def _heartbeat(self) -> bytes:
-        me = self._node_id
-        return self._introduction.heartbeat(me, me, self.connected, self.gateway)
+        me, way = self._node_id, self._connection
+        return self._introduction.heartbeat(me, me, way.connected, way.gateway)
 
     def now_s(self) -> float:
         return self._deadlines.now_s
