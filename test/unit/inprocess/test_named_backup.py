@@ -5,6 +5,14 @@ from __future__ import annotations
 import pytest
 from scenarios import events, flown, outage, placed
 
+from drone_mesh.communication.repair.election import BACKUP
+from drone_mesh.communication.wire.messages import (
+    GatewayPlace,
+    MovementNegotiationMessage,
+    addressed,
+)
+from drone_mesh.drone.location import Location
+
 GROUP = ((0, 0), (8, 0), (14, 5), (16, -2), (22, 4), (22, -6), (29, 0))  # only 1 leads to 0
 LEAF = ((0, 0), (8, 0), (16, 0), (5, 5))  # 2 hears 1 and nobody else
 
@@ -64,6 +72,17 @@ def test_a_node_whose_beacons_show_that_it_flies_away_is_not_dead():
     network.run_for(9.0)  # without a backup nobody waits any shorter
     assert not network.connected(2)
     assert flown(network) == set()
+
+
+def test_a_name_from_a_node_that_is_no_neighbour_sends_nobody():
+    network = named(GROUP)
+    name = MovementNegotiationMessage(9, 9, 9, 9, BACKUP).to_payload()
+    beside_5 = GatewayPlace(0, Location(-12.0, 22.0, 0.0), 0.0)
+    packet = addressed(beside_5.appended_to(name), 5)
+    network.nodes[5].component.on_msg(packet, network.now_s())
+    network.power(1, False)
+    network.run_for(8.0)
+    assert flown(network) == {2}
 
 
 @pytest.mark.parametrize(("places", "leaves"), [(GROUP, {5, 6}), (LEAF, {2})])

@@ -170,7 +170,7 @@ class NamedBackup(Nearest):
         """A neighbour names this one its backup, bids, or takes off."""
         mesh = self.mesh
         if score == BACKUP:
-            if node == from_ and about is not None:
+            if node == from_ and node in mesh.neighbours() and about is not None:
                 self._named[node] = about, mesh.now_s
             return
         super().on_bid(node, score, from_, about)
