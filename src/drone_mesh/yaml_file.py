@@ -101,15 +101,15 @@ def read_value(text: str) -> Any:
     return read_mapping_text(f"value: {text}", "value").content["value"]
 
 
-def read_text(path: str | Path, pipe: bool = False) -> str:
+def read_text(path: str | Path, pipe: bool = False, most_bytes: int = MAX_FILE_BYTES) -> str:
     """Raises ConfigurationError, also for a large file, a device and, unless allowed, a `pipe`."""
     try:
         if not pipe:
             _check_kind(Path(path))
         with Path(path).open("rb") as file:
-            content = file.read(MAX_FILE_BYTES + 1)
-        if len(content) > MAX_FILE_BYTES:
-            raise ConfigurationError(f"{path}: larger than {MAX_FILE_BYTES} bytes")
+            content = file.read(most_bytes + 1)
+        if len(content) > most_bytes:
+            raise ConfigurationError(f"{path}: larger than {most_bytes} bytes")
         return content.decode("utf-8-sig")
     except OSError as error:
         raise ConfigurationError(f"{path}: {error.strerror or error}") from error

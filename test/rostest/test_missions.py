@@ -1,14 +1,15 @@
 #!/usr/bin/env python3
-"""Missions: a pilot flies a drone, the mesh follows, and an order pauses the mission."""
+"""Missions: a pilot flies a drone, the mesh follows, and an order pauses the mission; files."""
 
 from __future__ import annotations
 
 import math
 import unittest
+from pathlib import Path
 
 import rospy
 import rostest
-from rostest_support import WALL_LIMIT_S, LogWatch, call, wait_for
+from rostest_support import WALL_LIMIT_S, LogWatch, call, run_program, wait_for
 
 from drone_mesh.msg import Location, MeshEvent, MeshState
 from drone_mesh.srv import FlyMission, FlyMissionRequest, RequestDroneFlight
@@ -41,6 +42,32 @@ class MissionsTest(unittest.TestCase):
             WALL_LIMIT_S,
             lambda: math.dist(self.place(node_id), waypoint) < 1.2,
         )
+
+    def test_a_mission_of_a_ground_station_is_flown_and_seen(self) -> None:
+        """(5, 5, 4), then (0, 5, 4), at 2 m/s; drone 4 began it with the simulation."""
+        file = Path(__file__).with_name("missions.waypoints")
+        self.passes(4, (0.0, 5.0, 4.0))
+        command = run_program("mission", "3", str(file), "--height", "6")
+        self.assertEqual((command.returncode, command.stderr), (0, ""))
+        begun, *shown, end = command.stdout.splitlines()
+        self.assertIn("missions.waypoints: 2 waypoints; heights above home are", begun)
+        self.assertIn("drone 3 flies it at 2 m/s", shown)
+        self.assertTrue(any("waypoint 1 of 2" in line for line in shown), shown)
+        self.assertEqual(end, "the mission is flown")
+        self.assertLess(math.dist(self.place(3), (0.0, 5.0, 6.0)), 0.5)
+        seen = {node.mission for mesh in self.states for node in mesh.nodes if node.id == 3}
+        self.assertTrue(any(words.startswith("mission, waypoint 2 of 2") for words in seen), seen)
+        wait_for("the end in the state", WALL_LIMIT_S, lambda: self.node(3).mission == "")
+
+        run_program("mission", "1", "--pause")
+        wait_for("a pause", WALL_LIMIT_S, lambda: self.node(1).mission.endswith("loop; paused"))
+        self.assertEqual(run_program("mission", "1", "--resume").returncode, 0)
+        gone = run_program("mission", "3", "--stop")
+        self.assertEqual(gone.returncode, 2)
+        self.assertIn("drone 3 has no mission", gone.stderr)
+        nobody = run_program("mission", "77", str(file), "--loop", "--speed", "1")
+        self.assertEqual(nobody.returncode, 2)
+        self.assertIn("is there a drone 77 in a running simulation?", nobody.stderr)
 
     def test_the_mesh_follows_a_mission_and_an_order_pauses_it(self) -> None:
         log = LogWatch()

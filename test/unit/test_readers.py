@@ -19,10 +19,11 @@ from drone_mesh.configuration import load_configuration
 from drone_mesh.console import tiles
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.earth_files import read_placemarks
-from drone_mesh.errors import ConfigurationError
+from drone_mesh.errors import ConfigurationError, GoalRefused
 from drone_mesh.fence_file import read_fence
 from drone_mesh.formations.layouts import Layouts
-from drone_mesh.formations.missions import read_missions
+from drone_mesh.formations.mission_files import read_mission_file
+from drone_mesh.formations.missions import Mission, read_missions
 from drone_mesh.lab.experiment import load_experiment
 from drone_mesh.lab.places import rows_of_file
 from drone_mesh.mobility import Mobility
@@ -87,6 +88,13 @@ def earth(path: Path) -> object:
     return found.goals({n: place for n, (_drone, place) in enumerate(found.points)})
 
 
+def drawn(path: Path) -> object:
+    try:
+        return Mission.drawn(read_mission_file(path, ORIGIN), None, 5.0, True).pilot()
+    except GoalRefused as error:  # too fast, say
+        raise ConfigurationError(str(error)) from error
+
+
 def trace(path: Path) -> object:
     return check(Mobility("trace", knots=read_trace(path)))
 
@@ -125,6 +133,17 @@ KML = (
     "</coordinates></LineString><gx:Track><when>2026-05-01</when><gx:coord>5.1214 52.0907 3"
     "</gx:coord><gx:coord>5.1215 52.0907 3</gx:coord></gx:Track></Placemark></kml>"
 )
+ITEM = {"type": "SimpleItem", "command": 16, "frame": 3, "params": [0, 0, 0, None, 52.09, 5.12, 9]}
+SURVEY = {"type": "ComplexItem", "TransectStyleComplexItem": {"Items": [ITEM, ITEM]}}
+HOME = [52.09, 5.12, None]
+SURVEY_PLAN = {
+    "fileType": "Plan",
+    "mission": {"items": [ITEM, SURVEY], "plannedHomePosition": HOME, "hoverSpeed": 5},
+}
+WPL = (
+    "QGC WPL 110\n0\t1\t0\t16\t0\t0\t0\t0\t52.09\t5.12\t3\t1\n"
+    "1 0 3 22 0 0 0 0 0 0 9 1\n2 0 3 16 0 0 0 nan 52.09 5.12 9 1\n3 0 2 20 0 0 0 0 0 0 0 1\n"
+)
 NS2 = (
     "set god_ [God instance]\n$node_(0) set X_ 0.1\n"
     '$ns_ at 1.0 "$node_(0) setdest 0.3 0.0 0.1" # fly\n$ns_ at 1.0 "$node_(0) set X_ 9"\n'
@@ -157,6 +176,8 @@ READERS: list[tuple[str, Callable[[Path], object], str]] = [
     ("a.kml", earth, KML),
     ("layout.yaml", Layouts.load, "cases:\n  5:\n    1: [0, 1.5, 0]\n    10: [0, 1.0e+1, 0]\n"),
     ("missions.yaml", read_missions, MISSIONS),
+    ("a.plan", drawn, json.dumps(SURVEY_PLAN)),
+    ("a.waypoints", drawn, WPL),
     ("boxes.yaml", read_obstacles, BOXES),
     ("fence.yaml", lambda path: read_fence(path, ORIGIN), FENCE),
     ("fence.geojson", lambda path: read_fence(path, ORIGIN), json.dumps(AREAS)),

@@ -343,6 +343,7 @@ def _fields(node: NodeStatus, trouble: Trouble | None) -> dict[str, Any]:
         "path": _centimetres(node.path),
         "heading": _centimetres(node.heading),
         "repair": node.repair,
+        "mission": node.mission,
         "battery": round(node.battery) if math.isfinite(node.battery) else None,
         "why_not_fly": node.why_not_fly,
         "channel": channel_in_words(node),

@@ -15,10 +15,12 @@ from drone_mesh.drone.flight_path import Vector
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.goal import MAX_COORDINATE_M, MAX_HEIGHT_M
 from drone_mesh.drone.location import Location
-from drone_mesh.earth_files import MAX_CHARACTERS, Placemarks, is_earth_file, read_placemarks
+from drone_mesh.earth_files import Placemarks, is_earth_file, read_placemarks
+from drone_mesh.earth_files.plan import MAX_PLAN_CHARACTERS
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.formations.layouts import MAX_CASE, MAX_NAME, Order, read_layout
-from drone_mesh.formations.missions import MAX_SPEED_M_S, MOST_WAYPOINTS, Mission
+from drone_mesh.formations.mission_files import MOST_WAYPOINTS, is_mission_file, read_mission
+from drone_mesh.formations.missions import MAX_SPEED_M_S, Mission
 from drone_mesh.formations.preview import LostRoutes, lost_routes
 from drone_mesh.state.model import MeshStatus
 
@@ -28,6 +30,7 @@ LIMITS = {  # for the page's forms; metres, and the largest id
     "coordinate": MAX_COORDINATE_M,
     "height": MAX_HEIGHT_M,
     "id": MAX_NODE_ID,
+    "characters": MAX_PLAN_CHARACTERS,  # of a file
 }
 
 NodeId = Annotated[int, Field(ge=0, le=MAX_NODE_ID)]
@@ -37,7 +40,7 @@ Height = Annotated[float, Field(ge=0, le=MAX_HEIGHT_M, allow_inf_nan=False)]
 NodeIds = Annotated[List[NodeId], Field(min_length=1, max_length=MAX_DRONES)]
 Gateways = Annotated[List[NodeId], Field(max_length=MAX_DRONES)]
 Waypoints = Annotated[
-    List[Tuple[Coordinate, Coordinate]], Field(min_length=1, max_length=MOST_WAYPOINTS)
+    List[Tuple[Coordinate, Coordinate, Height]], Field(min_length=1, max_length=MOST_WAYPOINTS)
 ]
 Places = Annotated[
     List[Tuple[NodeId, Coordinate, Coordinate, Height]],
@@ -78,6 +81,8 @@ class FileContent(NamedTuple):
 
     places: Sequence[AnyPlace]
     ways: Sequence[Sequence[Vector]]
+    speed: float | None = None  # m/s, of the mission that it is; None: it says nothing
+    notes: Sequence[str] = ()  # what is told of that mission
 
 
 class _Request(BaseModel):
@@ -175,13 +180,11 @@ class _Mission(PageOrder):
     do: Literal["mission"]
     nodes: NodeIds
     waypoints: Waypoints
-    z: Height
     speed: float = Field(gt=0, le=MAX_SPEED_M_S, allow_inf_nan=False)
     loop: bool
 
     def carry_out(self, controls: MeshControls) -> str:
-        places = [(x, y, self.z) for x, y in self.waypoints]
-        return controls.mission(self.nodes, Mission(places, self.speed, self.loop))
+        return controls.mission(self.nodes, Mission(self.waypoints, self.speed, self.loop))
 
 
 class _Pilots(PageOrder):
@@ -196,11 +199,14 @@ class ReadPlaces(_Answered):
 
     do: Literal["places"]
     name: str = Field("the file", max_length=300)
-    text: str = Field(max_length=MAX_CHARACTERS)
+    text: str = Field(max_length=MAX_PLAN_CHARACTERS)
 
     def content(self, origin: Origin | None) -> FileContent:
         """Parse the file. Raises OrderRefused, which says what is wrong where."""
         try:
+            if is_mission_file(self.name):
+                drawn = read_mission(self.text, self.name, origin)
+                return FileContent([], [drawn.waypoints], drawn.speed_m_s, drawn.notes)
             if is_earth_file(self.name):
                 return _content_of(read_placemarks(self.text, self.name, origin))
             if len(self.text) > MAX_LAYOUT_CHARACTERS:

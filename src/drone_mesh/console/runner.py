@@ -10,7 +10,7 @@ from drone_mesh.console.server import ConsoleServer
 from drone_mesh.web.access import Access, access_for, is_loopback
 from drone_mesh.web.server_thread import ServerThread
 
-LARGEST_REQUEST_BYTES = 1_000_000  # a file of places with escaped characters
+LARGEST_REQUEST_BYTES = 4_000_000  # a plan with escaped characters
 PING_PERIOD_S = 10.0  # a page that disappeared silently is noticed after two of these
 _TOKEN_BYTES = 18
 _EVERYWHERE = ("0.0.0.0", "::")  # addresses that mean all addresses of this machine

@@ -25,10 +25,11 @@ __all__ = [
 MAX_CHARACTERS = 300_000  # 254 places of a program that writes a style for each
 WRITERS = {"geojson": geojson_of, "kml": kml_of}
 _READERS = {".geojson": read_geojson, ".json": read_geojson, ".kml": read_kml}
+_MISSION = "a mission of one drone, and no layout: rosrun drone_mesh mission flies it"
 _OTHERS = {  # what drone programs save beside these
     ".kmz": "a compressed file: unzip it, and give the KML in it",
-    ".plan": "a plan of QGroundControl, not GeoJSON or KML: export it there as KML",
-    ".waypoints": "a waypoint file of Mission Planner (QGC WPL), not GeoJSON or KML",
+    ".plan": _MISSION,
+    ".waypoints": _MISSION,
 }
 
 

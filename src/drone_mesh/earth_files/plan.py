@@ -12,7 +12,6 @@ import reprlib
 from typing import Any, Mapping, NamedTuple, Sequence
 
 from drone_mesh.arguments import MOST, finite, is_up_to
-from drone_mesh.drone.geodesy import EarthPlace
 from drone_mesh.earth_files.geojson import read_json
 from drone_mesh.errors import ConfigurationError
 
@@ -37,7 +36,7 @@ class Plan(NamedTuple):
 
     items: Sequence[PlanItem]
     unread: Sequence[str] = ()  # what it has beside them, in words
-    home: EarthPlace | None = None  # where its author planned the start; altitude nan: not given
+    home: Sequence[float] | None = None  # latitude and longitude of the planned start
     speed_m_s: float | None = None
     geo_fence: Mapping[str, Any] = {}  # as in the file; of a .plan only
     rally_points: Mapping[str, Any] = {}
@@ -52,30 +51,27 @@ def read_plan(text: str) -> Plan:
     if content.get("fileType") != "Plan":
         raise ConfigurationError("not a plan of QGroundControl: its fileType is not Plan")
     mission = _section(content, "mission")
-    if mission.get("version", 2) != 2:
-        version = reprlib.repr(mission["version"])
-        raise ConfigurationError(
-            f"a mission of version {version}, not 2: save it with a newer QGroundControl"
-        )
+    speed = mission.get("hoverSpeed")
     items: list[PlanItem] = []
     unread: list[str] = []
     for row in _list(mission.get("items", []), "items"):
-        kind = _mapping(row, f"item {len(items) + 1}").get("type")
-        if kind == "SimpleItem":
-            items.append(_simple(row, len(items) + 1))
-            continue
-        survey = row.get("TransectStyleComplexItem")
-        parts = survey.get("Items") if isinstance(survey, dict) else None
-        if not isinstance(parts, list):
-            name = row.get("complexItemType") or kind
-            unread.append(f"{reprlib.repr(name)} after item {len(items)}")
-        for part in parts if isinstance(parts, list) else ():
-            items.append(_simple(_mapping(part, f"item {len(items) + 1}"), len(items) + 1))
+        item = _mapping(row, f"item {len(items) + 1}")
+        parts = [item]
+        if item.get("type") != "SimpleItem":
+            survey = item.get("TransectStyleComplexItem")
+            parts = survey.get("Items") if isinstance(survey, dict) else None
+            if not isinstance(parts, list):
+                unread.append(
+                    f"{reprlib.repr(item.get('complexItemType'))} after item {len(items)}"
+                )
+                continue
+        for part in parts:
+            items.append(_simple(part, f"item {len(items) + 1}"))
     return Plan(
         items,
         unread,
         _home(mission.get("plannedHomePosition")),
-        _speed(mission.get("hoverSpeed")),
+        float(speed) if _is_number(speed) and speed > 0 else None,
         _section(content, "geoFence"),
         _section(content, "rallyPoints"),
     )
@@ -87,54 +83,42 @@ def read_waypoints(text: str) -> Plan:
     version = _HEADING.fullmatch(heading.strip())
     if version is None:
         raise ConfigurationError("line 1: expected QGC WPL 110")
-    items = []
-    for number, line in enumerate(lines, start=2):
-        columns = line.split()
-        if columns and not columns[0].startswith("#"):
-            items.append(_item_of(columns, f"line {number}"))
-    home = None
-    if version[1] == "110" and items:
-        home = EarthPlace(*items.pop(0).values[4:])
-    return Plan(items, home=home)
+    rows = [(f"line {number}", line.split()) for number, line in enumerate(lines, start=2)]
+    items = [_item_of(row, where) for where, row in rows if row and not row[0].startswith("#")]
+    has_home = version[1] == "110" and items
+    return Plan(items[1:], home=_home(items[0].values[4:])) if has_home else Plan(items)
 
 
 def _item_of(columns: Sequence[str], where: str) -> PlanItem:
-    if len(columns) != _COLUMNS:
-        raise ConfigurationError(f"{where}: {len(columns)} values, expected {_COLUMNS}")
-    numbers = [column for column in columns[2:4] if is_up_to(column, MOST)]
-    if len(numbers) != 2:
-        raise ConfigurationError(f"{where}: frame and command are not whole numbers")
+    if len(columns) != _COLUMNS or not all(is_up_to(column, MOST) for column in columns[2:4]):
+        raise ConfigurationError(
+            f"{where}: expected {_COLUMNS} numbers, of which the third and fourth are whole"
+        )
     try:
         values = [math.nan if text.lower() == "nan" else finite(text) for text in columns[4:11]]
     except ValueError as error:
         raise ConfigurationError(f"{where}: {error}") from error
-    return PlanItem(where, int(numbers[1]), int(numbers[0]), values)
+    return PlanItem(where, int(columns[3]), int(columns[2]), values)
 
 
-def _simple(row: Mapping[str, Any], number: int) -> PlanItem:
-    where = f"item {number}"
-    values = _list(row.get("params"), f"{where}: its params")
-    if len(values) == 4 and "coordinate" in row:  # as in 2017
-        values = values + _list(row["coordinate"], f"{where}: its coordinate")
-    if len(values) != _VALUES or not all(value is None or _is_number(value) for value in values):
+def _simple(part: Any, where: str) -> PlanItem:
+    row = _mapping(part, where)
+    values, command, frame = row.get("params"), row.get("command"), row.get("frame")
+    is_list = isinstance(values, list) and len(values) == _VALUES
+    if not is_list or not all(value is None or _is_number(value) for value in values):
         raise ConfigurationError(
-            f"{where}: its params are not {_VALUES} numbers: {reprlib.repr(values)}"
+            f"{where}: params {reprlib.repr(values)} are not {_VALUES} numbers"
         )
-    command, frame = row.get("command"), row.get("frame")
-    if not (type(command) is int and type(frame) is int and 0 <= command <= MOST):
+    if type(command) is not int or type(frame) is not int:
         raise ConfigurationError(f"{where}: needs a command and a frame, whole numbers")
     return PlanItem(where, command, frame, [math.nan if v is None else float(v) for v in values])
 
 
-def _home(place: Any) -> EarthPlace | None:
-    values = [*place, None][:3] if isinstance(place, list) else []
-    if len(values) < 3 or not all(map(_is_number, values[:2])):
-        return None
-    return EarthPlace(values[0], values[1], values[2] if _is_number(values[2]) else math.nan)
-
-
-def _speed(value: Any) -> float | None:
-    return float(value) if _is_number(value) and value > 0 else None
+def _home(place: Any) -> Sequence[float] | None:
+    """None for a home that is not set, as 0, 0."""
+    values = place[:2] if isinstance(place, list) else []
+    is_set = len(values) == 2 and all(map(_is_number, values)) and any(values)
+    return values if is_set else None
 
 
 def _section(content: Mapping[str, Any], key: str) -> Mapping[str, Any]:

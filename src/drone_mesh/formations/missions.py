@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import reprlib
 from pathlib import Path
 from typing import Any, Callable, NamedTuple, Sequence
@@ -9,14 +10,20 @@ from typing import Any, Callable, NamedTuple, Sequence
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.drone.fence import Fence
 from drone_mesh.drone.flight_path import Vector
+from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.goal import check_goal
+from drone_mesh.earth_files import is_earth_file
 from drone_mesh.errors import ConfigurationError, GoalRefused
-from drone_mesh.mobility.pilot import TrackPilot, along
+from drone_mesh.formations.mission_files import MOST_WAYPOINTS, DrawnMission, read_mission_file
+from drone_mesh.mobility.pilot import TrackPilot, along, stops_along
 from drone_mesh.yaml_file import YamlFile, is_number, is_whole_up_to, read_mapping
 
-MOST_WAYPOINTS = 1000
 MAX_SPEED_M_S = 20.0
-KEYS = ("drones", "waypoints", "height", "speed", "loop")
+DEFAULT_SPEED_M_S = 0.5  # of a file that says none
+KEYS = ("drones", "waypoints", "file", "height", "speed", "loop")
+
+
+_log = logging.getLogger(__name__)
 
 
 class Mission(NamedTuple):
@@ -25,6 +32,23 @@ class Mission(NamedTuple):
     waypoints: Sequence[Vector]  # m, of the underside
     speed_m_s: float
     loop: bool  # from the last to the first again, and so on
+
+    @classmethod
+    def drawn(
+        cls, drawn: DrawnMission, speed_m_s: float | None, height_m: float | None, loop: bool
+    ) -> Mission:
+        """The mission in a file, at this speed and height instead of its own.
+
+        Raises GoalRefused for one that lies on the ground.
+        """
+        places = drawn.waypoints
+        if height_m is not None:
+            is_flat = not any(z for _x, _y, z in places)  # otherwise it lands at 0
+            places = [(x, y, height_m if z or is_flat else 0.0) for x, y, z in places]
+        elif not any(z for _x, _y, z in places):
+            raise GoalRefused("its waypoints have no height: say at which height to fly it")
+        speeds = (speed_m_s, drawn.speed_m_s, DEFAULT_SPEED_M_S)
+        return cls(places, next(speed for speed in speeds if speed is not None), loop)
 
     def pilot(
         self,
@@ -43,7 +67,8 @@ class Mission(NamedTuple):
             )
         for x, y, height in self.waypoints:
             check_goal(y, x, height)
-        pilot = TrackPilot(along(self.waypoints, self.speed_m_s, self.loop), self.speed_m_s)
+        way = (self.waypoints, self.speed_m_s, self.loop)
+        pilot = TrackPilot(along(*way), self.speed_m_s, stops_along(*way))
         begin = [] if here is None else [here, *pilot.way_back(here)]
         end = self.waypoints[:1] if self.loop else ()
         why_not = fence.why_not_straight([*begin, *self.waypoints, *end])
@@ -52,18 +77,25 @@ class Mission(NamedTuple):
         return pilot
 
 
-def read_missions(path: str | Path) -> dict[int, Mission]:
+def read_missions(path: str | Path, origin: Origin | None = None) -> dict[int, Mission]:
     """The missions in a file, by drone. Raises ConfigurationError: file, line and what is wrong.
 
-    missions: [{drones: [1, 2], waypoints: [[x, y], ...], height: 3, speed: 0.5, loop: true}, ...]
+    missions: [{drones: [1, 2], waypoints: [[x, y], ...], height: 3, speed: 0.5, loop: true},
+    {drones: [3], file: survey.plan}, ...], where `file` lies beside it and may have its own height
+    and speed. Logs what is told of such a file.
     """
+    if is_earth_file(str(path)):
+        raise ConfigurationError(
+            f"{path}: says not which drone flies it: name both in a file of missions, such as "
+            f"'missions: [{{drones: [3], file: {Path(path).name}}}]'"
+        )
     file = read_mapping(path)
     rows = file.content.get("missions")
     if set(file.content) != {"missions"} or not isinstance(rows, list):
         raise ConfigurationError(f"{file.where('missions')}: expected 'missions:' with a list")
     missions: dict[int, Mission] = {}
     for index, row in enumerate(rows):
-        drones, mission = _read(file, index, row)
+        drones, mission = _read(file, index, row, origin)
         for drone in drones:
             if drone in missions:
                 raise ConfigurationError(
@@ -73,7 +105,7 @@ def read_missions(path: str | Path) -> dict[int, Mission]:
     return missions
 
 
-def _read(file: YamlFile, index: int, row: Any) -> tuple[list[int], Mission]:
+def _read(file: YamlFile, index: int, row: Any, origin: Origin | None) -> tuple[list[int], Mission]:
     if not isinstance(row, dict) or not set(row) <= set(KEYS):
         raise ConfigurationError(
             f"{file.where('missions', index)}: expected a mission with {', '.join(KEYS)}, "
@@ -90,13 +122,19 @@ def _read(file: YamlFile, index: int, row: Any) -> tuple[list[int], Mission]:
         return found
 
     drones = value("drones", "a list of ids", lambda v: _is_list(v, _is_id))
-    places = value("waypoints", "a list of [x, y] in metres", lambda v: _is_list(v, _is_point))
-    height = value("height", "a number of metres", is_number, 3.0)
-    speed = value("speed", "a number of metres per second", is_number, 0.5)
-    loop = value("loop", "true or false", lambda v: isinstance(v, bool), True)
-    waypoints = [(float(x), float(y), float(height)) for x, y in places]
-    mission = Mission(waypoints, float(speed), loop)
+    is_drawn = "file" in row and "waypoints" not in row
+    height = value("height", "a number of metres", _is_number_or_none, None if is_drawn else 3.0)
+    speed = value("speed", "a number of metres per second", _is_number_or_none)
+    loop = value("loop", "true or false", lambda v: isinstance(v, bool), not is_drawn)
+    if is_drawn:
+        name = value("file", "the name of a file", lambda v: isinstance(v, str))
+        drawn = read_mission_file(Path(file.path).parent / name, origin)
+        _log.warning("%s: %s", name, drawn.in_words())
+    else:
+        places = value("waypoints", "a list of [x, y] in metres", lambda v: _is_list(v, _is_point))
+        drawn = DrawnMission([(float(x), float(y), 0.0) for x, y in places], None, [])
     try:
+        mission = Mission.drawn(drawn, speed, height, loop)
         mission.pilot()
     except GoalRefused as error:
         raise ConfigurationError(f"{file.where('missions', index)}: {error}") from None
@@ -105,6 +143,10 @@ def _read(file: YamlFile, index: int, row: Any) -> tuple[list[int], Mission]:
 
 def _is_id(value: object) -> bool:
     return is_whole_up_to(value, MAX_NODE_ID)
+
+
+def _is_number_or_none(value: object) -> bool:
+    return value is None or is_number(value)
 
 
 def _is_point(value: object) -> bool:

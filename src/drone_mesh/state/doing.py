@@ -12,7 +12,7 @@ from drone_mesh.state.model import NodeStatus, position_is_known, waypoints
 
 
 def doings(nodes: Iterable[NodeStatus]) -> dict[int, str]:
-    """By node: its flight, its repair, or whose packets it forwards; empty: none of these."""
+    """By node: its flight, repair, mission, or whose packets it forwards; empty: nothing."""
     nodes = tuple(nodes)
     others = Counter(on_route for node in nodes for on_route in node.route[1:])
     return {node.id: _doing(node, others[node.id]) for node in nodes}
@@ -32,6 +32,8 @@ def _doing(node: NodeStatus, others: int) -> str:
         end, here = Location.from_vector(corners[-1]), Location.from_vector(node.position)
         place = f"x {end.longitude:.1f}, y {end.latitude:.1f}"
         return f"flies to {place}: {here.distance_m(end):.0f} m left"
+    if node.mission:
+        return node.mission
     if len(node.heading):
         return "flies with its pilot"
     if condition is not Condition.CONNECTED:

@@ -64,6 +64,7 @@ class NodeStatus:
     shares_id: bool = False  # another radio with its id was heard lately
     jammed: bool = False  # it hears nobody, and measures power in its channel
     why_not_fly: str = ""  # why its drone cannot fly now; empty: it can, or unknown
+    mission: str = ""  # what its pilot flies, and how far it is, in words; empty: none
     repair: str = ""  # what the node does about a lost connection, and why; empty: nothing
     repair_reason: str = ""  # that why alone: of a node that does not fly or bid, or lands early
 

@@ -89,6 +89,7 @@ class DroneView:
     battery: float = math.nan  # percent; NaN: it has none
     crashed: bool = False
     why_not_fly: str = ""  # empty: it can fly
+    mission: str = ""  # in words; empty: none
 
 
 class MeshRoster:
@@ -132,7 +133,7 @@ class MeshRoster:
             node.heading = view.heading if view else ()
             if view is not None:
                 node.battery, node.crashed = view.battery, view.crashed
-                node.why_not_fly = view.why_not_fly
+                node.why_not_fly, node.mission = view.why_not_fly, view.mission
                 node.on = node.on and view.battery != 0.0
             node.route = route_to_gateway(node.id, self._nodes)
             node.report_age = wall_s - self._heard_at_s[node.id]

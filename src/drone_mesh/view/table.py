@@ -56,7 +56,7 @@ def _row(node: NodeStatus, trouble: Trouble | None) -> tuple[str, ...]:
         str(node.total_messages),
         _position(node),
         _route(node.route),
-        "; ".join(filter(None, (trouble.text if trouble else "", node.repair))),
+        "; ".join(filter(None, (trouble.text if trouble else "", node.repair, node.mission))),
     )
 
 

@@ -64,7 +64,7 @@ class Notebook:
         return "done"
 
 
-FLIGHT = {"nodes": [3, 4], "waypoints": [[0, 1], [2, 3]], "z": 2, "speed": 1.5, "loop": True}
+FLIGHT = {"nodes": [3, 4], "waypoints": [[0, 1, 2], [2, 3, 4]], "speed": 1.5, "loop": True}
 
 
 def test_a_mission_reaches_the_pilots_of_its_drones() -> None:
@@ -73,7 +73,7 @@ def test_a_mission_reaches_the_pilots_of_its_drones() -> None:
         order = parse_request(json.dumps({"number": 1, **request}))
         assert isinstance(order, PageOrder)
         order.carry_out(notebook)
-    mission = Mission([(0.0, 1.0, 2.0), (2.0, 3.0, 2.0)], 1.5, True)
+    mission = Mission([(0.0, 1.0, 2.0), (2.0, 3.0, 4.0)], 1.5, True)
     assert notebook.done == [("mission", 3, 4, mission), ("pilots", "stop")]
 
 
@@ -82,10 +82,10 @@ def test_a_mission_reaches_the_pilots_of_its_drones() -> None:
     [
         {"nodes": []},
         {"waypoints": []},
-        {"waypoints": [[0, 9000]]},
+        {"waypoints": [[0, 9000, 1]]},
+        {"waypoints": [[0, 9, -1]]},
         {"speed": 0},
         {"speed": 21},
-        {"z": -1},
         {"loop": 1},
     ],
 )
@@ -192,3 +192,19 @@ def test_of_a_mission_only_the_way_is_offered_and_of_a_layout_only_the_places():
         assert isinstance(request, ReadPlaces)
         found = request.content(Origin(52.0907, 5.1214, 3.0))
         assert (len(found.places), len(found.ways)) == (0 if ways else 2, ways)
+
+
+def test_a_mission_file_is_offered_with_its_heights_speed_and_notes():
+    item = {"type": "SimpleItem", "command": 16, "frame": 3}
+    places = ([52.0907, 5.1214, 8], [52.0907, 5.1214, 9])
+    items = [{**item, "params": [1, 0, 0, None, *place]} for place in places]
+    plan = json.dumps({"fileType": "Plan", "mission": {"items": items, "hoverSpeed": 4}})
+    request = parse_request(
+        json.dumps({"do": "places", "number": 1, "name": "survey.plan", "text": plan})
+    )
+    assert isinstance(request, ReadPlaces)
+    found = request.content(Origin(52.0907, 5.1214, 3.0))
+    assert (found.ways, found.speed) == ([[(0.0, 0.0, 8.0), (0.0, 0.0, 9.0)]], 4.0)
+    assert "passed without a stop: item 1, item 2" in found.notes
+    with pytest.raises(OrderRefused, match=r"survey\.plan: its places are in degrees"):
+        request.content(None)

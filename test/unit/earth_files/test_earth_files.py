@@ -219,8 +219,7 @@ def test_what_is_missing_is_said():
         "a.json: its places are in degrees: that needs an origin"
     )
     assert refusal("PK", "a.kmz") == "a.kmz: a compressed file: unzip it, and give the KML in it"
-    assert refusal("{}", "a.plan").startswith("a.plan: a plan of QGroundControl, not GeoJSON or")
-    assert "(QGC WPL)" in refusal("QGC WPL 110", "a.waypoints")
+    assert refusal("{}", "a.plan").startswith("a.plan: a mission of one drone, and no layout: ")
 
 
 def test_placemarks_inside_each_other_are_refused_however_many_there_are():

@@ -8,8 +8,7 @@ from typing import Any
 
 import pytest
 
-from drone_mesh.drone.geodesy import EarthPlace
-from drone_mesh.earth_files.plan import Plan, PlanItem, read_plan, read_waypoints
+from drone_mesh.earth_files.plan import Plan, read_plan, read_waypoints
 from drone_mesh.errors import ConfigurationError
 
 # As QGroundControl 4.3 saves it, shorter: take-off, a survey with two items, a landing, a fence.
@@ -66,9 +65,7 @@ def test_a_plan_gives_its_simple_items_those_of_surveys_too_and_names_the_others
     ]
     assert math.isnan(plan.items[0].values[3])
     assert plan.unread == ["'StructureScan' after item 3"]
-    assert plan.home is not None
-    assert plan.home[:2] == (52.0907, 5.1214)
-    assert math.isnan(plan.home.altitude_m)  # null
+    assert plan.home == [52.0907, 5.1214]
     assert plan.speed_m_s == 5.0
     assert [fence["inclusion"] for fence in plan.geo_fence["polygons"]] == [True]
     assert plan.rally_points["points"] == [[52.09, 5.12, 10]]
@@ -79,16 +76,9 @@ def test_a_plan_of_a_fence_alone_has_no_items():
     assert (plan.items, plan.geo_fence, plan.rally_points) == ([], {"circles": [1]}, {})
 
 
-def test_an_item_of_2017_has_its_place_beside_its_params():
-    item = {"type": "SimpleItem", "command": 16, "frame": 0, "params": [1, 2, 3, 4]}
-    items = [{**item, "coordinate": [52.0, 5.0, 9.5]}]
-    plan = read_plan(json.dumps({"fileType": "Plan", "mission": {"items": items}}))
-    assert plan.items == [PlanItem("item 1", 16, 0, [1, 2, 3, 4, 52.0, 5.0, 9.5])]
-
-
 def test_the_first_item_of_wpl_110_is_the_home_and_of_120_a_waypoint():
     plan = read_waypoints(WAYPOINTS)
-    assert plan.home == EarthPlace(52.0907, 5.1214, 3.0)
+    assert plan.home == [52.0907, 5.1214]
     assert items_of(plan) == [
         ("line 3", 22, 3, 0.0, 0.0, 30.0),
         ("line 6", 16, 10, 52.0908, 5.1216, 20.5),
@@ -116,13 +106,11 @@ def simple(**changes: Any) -> str:
         ('{"type": "FeatureCollection"}', "not a plan of QGroundControl"),
         ('{"fileType": "Plan", "geoFence": 3}', "geoFence is not an object: 3"),
         (plan_with(items=7), "items 7 are not a list"),
-        (plan_with(version=1), "a mission of version 1, not 2: save it with a newer"),
         (plan_with(items=["x"]), "item 1 is not an object: 'x'"),
         (plan_with(items=[{"TransectStyleComplexItem": {"Items": [3]}}]), "item 1 is not an obj"),
-        (simple(params=[0] * 6), "item 1: its params are not 7 numbers"),
-        (simple(params=[*[0] * 6, "3"]), "item 1: its params are not 7 numbers"),
-        (simple(params=[*[0] * 6, math.nan]), "item 1: its params are not 7 numbers"),
-        (simple(params=[*[0] * 6, 1e300]), "item 1: its params are not 7 numbers"),
+        (simple(params=[0] * 6), r"item 1: params \[.* are not 7 numbers"),
+        (simple(params=[*[0] * 6, math.nan]), r"item 1: params \[.* are not 7 numbers"),
+        (simple(params=[*[0] * 6, 1e300]), r"item 1: params \[.* are not 7 numbers"),
         (simple(command=True), "item 1: needs a command and a frame"),
         (simple(frame=None), "item 1: needs a command and a frame"),
     ],
@@ -138,9 +126,9 @@ def test_a_bad_plan_is_refused_in_one_line(text, why):
     [
         ("", "line 1: expected QGC WPL 110"),
         ("QGC WPL 100\n", "line 1: expected QGC WPL 110"),
-        ("QGC WPL 110\n0,1,0,16,0,0,0,0,52,5,3,1\n", "line 2: 1 values, expected 12"),
+        ("QGC WPL 110\n0,1,0,16,0,0,0,0,52,5,3,1\n", "line 2: expected 12 numbers"),
         ("QGC WPL 110\n0 1 0 16 0 0 0 0 52,09 5 3 1\n", "line 2: '52,09' is not a number"),
-        ("QGC WPL 110\n0 1 3.0 16 0 0 0 0 52 5 3 1\n", "line 2: frame and command are not whole"),
+        ("QGC WPL 110\n0 1 3.0 16 0 0 0 0 52 5 3 1\n", "line 2: expected 12 numbers, of which"),
     ],
 )
 def test_bad_waypoints_are_refused_in_one_line(text, why):

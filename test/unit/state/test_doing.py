@@ -25,6 +25,10 @@ def router(**fields: object) -> NodeStatus:
         (router(path=HERE), "flies"),  # a real one does not report its goal
         (router(path=(4.0, 6.0, 0.0), position=(float("nan"),) * 3), "flies"),
         (router(heading=(4.0, 6.0, 0.0)), "flies with its pilot"),
+        (
+            router(heading=(4.0, 6.0, 0.0), mission="mission, waypoint 1 of 2"),
+            "mission, waypoint 1 of 2",
+        ),
         (router(on=False, path=(4.0, 6.0, 0.0)), ""),
         (router(report_age=9.0), ""),
         (router(crashed=True), ""),

@@ -76,3 +76,6 @@ def test_a_remark_ends_with_what_the_repair_does_and_why():
     node = NodeStatus(3, repair="does not fly: the place of 2 is occupied by 4")
     row = mesh_table(MeshStatus(1.0, [node]), colours=False).splitlines()[2]
     assert row.endswith("not connected to a gateway; does not fly: the place of 2 is occupied by 4")
+    node = NodeStatus(3, connected=True, gateway=0, mission="mission, waypoint 3 of 12, 41 s left")
+    row = mesh_table(MeshStatus(1.0, [node]), colours=False).splitlines()[2]
+    assert row.endswith("mission, waypoint 3 of 12, 41 s left")

@@ -9,7 +9,10 @@ import pytest
 from drone_mesh.drone.battery import PowerModel
 from drone_mesh.drone.fleet import StartPlace
 from drone_mesh.drone.flight_path import FlightPath
+from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.roles import Role
+from drone_mesh.formations.mission_files import read_mission
+from drone_mesh.formations.missions import Mission
 from drone_mesh.mobility.pilot import TrackPilot, along
 from drone_mesh.world.bullet_world import BulletWorld
 from drone_mesh.world.dynamic_engine import BodyLimits, DynamicEngine
@@ -117,6 +120,51 @@ def test_a_ceiling_lowers_a_flight_but_takes_no_longer():
     assert low.duration_s == free.duration_s
     high = FlightPath((0.0, 0.0, 5.0), (20.0, 0.0, 0.0), 0.0, ceiling_m=3.0)
     assert high.above_start[2] == 5.0
+
+
+WAYPOINTS = """QGC WPL 110
+0 1 0 16 0 0 0 0 52.0907 5.1214 3 1
+1 0 3 22 0 0 0 0 0 0 5 1
+2 0 2 178 1 2 0 0 0 0 0 1
+3 0 3 16 0 0 0 0 52.0907 5.1215460 4 1
+4 0 3 16 0 0 0 0 52.0907898 5.1215460 4 1
+5 0 2 20 0 0 0 0 0 0 0 1
+"""
+
+
+def test_a_mission_of_a_file_is_flown_whole_and_says_how_far_it_is(world):
+    """Up 4 m and 10 m east at 2 m/s; 10 m north, back over the home in 14.1 m, and down 4 m."""
+    found = read_mission(WAYPOINTS, "a.waypoints", Origin(52.0907, 5.1214, 3.0))
+    engine, flown = drone(world), Mission.drawn(found, None, None, False).pilot()
+    engine.fly_with(flown)
+
+    def after(seconds: float) -> str:
+        run(world, seconds)
+        return flown.mission_in_words(engine.get_location().to_vector())
+
+    assert after(1.0) == "mission, waypoint 1 of 4, 20 s left"
+    assert after(8.0) == "mission, waypoint 2 of 4, 12 s left"
+    engine.pause_pilot(True)
+    assert after(20.0) == "mission, waypoint 2 of 4, 12 s left; paused"
+    engine.set_goal(4.0, 10.0, 4)  # an order, 4 m along the leg
+    assert "waypoint 2 of 4" in after(20.0)
+    assert engine.pilot is flown  # and it is not over
+    engine.pause_pilot(False)
+    assert after(0.5).startswith("mission, waypoint 2 of 4")
+    run(world, 7.0)
+    assert after(0.1).startswith("mission, waypoint 3 of 4")
+    run(world, 15.0)
+    assert engine.pilot is None
+    assert engine.get_location().to_vector() == pytest.approx((0.0, 0.0, 0.0), abs=0.01)
+
+
+def test_a_loop_has_no_end_and_a_model_no_mission():
+    loop = Mission(SQUARE, 1.0, True).pilot()
+    place = SQUARE[0]
+    for tenth in range(1, 175):  # 16 m round, and 1.3 m
+        place = loop.move(place, tenth / 10)
+    assert loop.mission_in_words(place) == "mission, waypoint 2 of 4, in a loop"
+    assert pilot().mission_in_words(place) == ""
 
 
 def test_a_mission_that_has_ended_is_gone_and_one_that_an_order_ended_early_is_not(world, engine):

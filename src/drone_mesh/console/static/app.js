@@ -252,11 +252,13 @@ byId("load-places").addEventListener("change", async (event) => {
   event.target.value = "";
   if (!file) return;
   byId("files").close();
+  const most = mesh.limits.characters;
+  if (file.size > most) return toast(`${file.name}: longer than ${most} characters`, true);
   try {
     const request = { do: "places", name: file.name, text: await file.text() };
-    const { places, ways } = await connection.request(request);
+    const { places, ways, speed, notes } = await connection.request(request);
     if (places.length) await flyTo(file.name, places);
-    else flyAlong(file.name, ways);
+    else flyAlong(file.name, ways, speed, notes);
   } catch (error) {
     toast(error.message, true);
   }
@@ -276,16 +278,15 @@ async function flyTo(name, places) {
   await flights.hold(moves, namesIn(name, moves, places));
 }
 
-/** Offers the only one of these ways [[x, y, z]] as a mission. */
-function flyAlong(name, ways) {
+/** Offers the only one of these ways [[x, y, z]] as a mission, at this speed if the file has one. */
+function flyAlong(name, ways, speed, notes) {
   if (ways.length > 1) return toast(`${name} has ${ways.length} lines: keep the one to fly`, true);
   const mission = `${name} is a mission of one drone: a line, whose points are its waypoints`;
   if (!mesh.actions.includes("mission"))
     return toast(`${mission}. Missions cannot be flown from here`, true);
   toast(mission, false);
   fleet.close();
-  missions.open(ways[0].map(([x, y]) => [x, y]));
-  byId("mission-height").value = String(Math.round(Math.max(...ways[0].map((place) => place[2]))));
+  missions.open(ways[0], speed, notes);
 }
 
 // Several drones

@@ -60,6 +60,7 @@ export class NodePanel {
     const earth = this.#earth(node);
     const facts = [
       ...(node.repair ? [["Repair", node.repair, { wide: true }]] : []),
+      ...(node.mission ? [["Mission", node.mission, { wide: true }]] : []),
       ...(node.order ? [["Latest order", node.order, { wide: true }]] : []),
       ...(node.since ? [["Since then", node.since, { wide: true }]] : []),
       [node.condition === "connected" ? "Gateway" : "Last gateway", orDash(node.gateway)],

@@ -14,7 +14,7 @@ const COLUMNS = [
   },
   {
     name: "Does now",
-    title: "What it does: its flight, its repair, or for whom it relays",
+    title: "What it does: its flight, its repair, its mission, or for whom it relays",
     sort: (n) => n.does,
     text: (n) => n.does || "–",
     long: true,

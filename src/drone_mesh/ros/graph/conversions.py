@@ -12,11 +12,12 @@ from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.drone.flight_path import Vector
 from drone_mesh.drone.location import Location
 from drone_mesh.formations.layouts import Order
+from drone_mesh.formations.missions import Mission
 from drone_mesh.msg import Location as LocationMsg
 from drone_mesh.msg import MeshEvent as MeshEventMsg
 from drone_mesh.msg import MeshState, NodeState, Obstacle
 from drone_mesh.ros.graph import names
-from drone_mesh.srv import OrderFormationRequest
+from drone_mesh.srv import FlyMissionRequest, OrderFormationRequest
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus, ObstacleStatus
 
 _CODES = {kind.value: number for number, kind in enumerate(MeshEventKind)}  # as in MeshEvent.msg
@@ -50,6 +51,12 @@ def formation_request(
     places = [location_msg(*goal) for _drone, goal in orders]
     drones = [drone for drone, _goal in orders]
     return OrderFormationRequest(name, drones, places, at_once, gateways)
+
+
+def mission_request(mission: Mission) -> FlyMissionRequest:
+    """Asks the pilot of a drone to fly this mission, at heights of whole metres."""
+    places = [location_msg(y, x, height) for x, y, height in mission.waypoints]
+    return FlyMissionRequest(FlyMissionRequest.FLY, places, mission.speed_m_s, mission.loop)
 
 
 def location_msg(latitude: float, longitude: float, height: float) -> LocationMsg:

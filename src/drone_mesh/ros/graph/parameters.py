@@ -63,7 +63,14 @@ def configured_obstacles(configuration: FactoryConfiguration) -> Obstacles | Non
 
 def configured_missions(configuration: FactoryConfiguration) -> dict[int, Mission]:
     """The missions that the configuration names, by drone. Raises ConfigurationError."""
-    return _read_named_file("missions", configuration.missions, read_missions) or {}
+    return (
+        _read_named_file(
+            "missions",
+            configuration.missions,
+            lambda path: read_missions(path, earth_origin("")),
+        )
+        or {}
+    )
 
 
 def _read_named_file(key: str, given: str, read: Callable[[Path], Result]) -> Result | None:

@@ -13,9 +13,8 @@ from drone_mesh.drone.location import Location as Place
 from drone_mesh.formations.layouts import Order
 from drone_mesh.formations.missions import Mission
 from drone_mesh.formations.preview import FormationPreview
-from drone_mesh.msg import Location
 from drone_mesh.ros.graph import names
-from drone_mesh.ros.graph.conversions import formation_request
+from drone_mesh.ros.graph.conversions import formation_request, mission_request
 from drone_mesh.ros.graph.fleet_parameter import drones_if_known
 from drone_mesh.ros.graph.persistent_service import (
     Request,
@@ -83,12 +82,7 @@ class RosControls(MeshControls):
         return _done(_call(names.REMOVE_DRONE_SERVICE, srv.RemoveDrone, id=node))
 
     def mission(self, nodes: Sequence[int], mission: Mission) -> str:
-        waypoints = [
-            Location(latitude=y, longitude=x, height=round(z)) for x, y, z in mission.waypoints
-        ]
-        request = srv.FlyMissionRequest(
-            srv.FlyMissionRequest.FLY, waypoints, mission.speed_m_s, mission.loop
-        )
+        request = mission_request(mission)
         for node in nodes:
             _done(_ask(names.mission_service(node), srv.FlyMission, request))
         who = f"drone {nodes[0]}" if len(nodes) == 1 else f"{len(nodes)} drones"

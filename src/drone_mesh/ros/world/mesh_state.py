@@ -158,12 +158,14 @@ def drone_views(drones: Iterable[VirtualDrone], now_s: float) -> list[DroneView]
 def _view(drone: VirtualDrone, now_s: float) -> DroneView:
     engine = drone.engine
     state, pilot, battery = engine.state, engine.pilot, engine.battery_percent()
+    place = engine.get_location().to_vector()
     return replace(
         describe_drone(drone.node_id, drone.role, state.position, state.path, now_s),
         heading=() if pilot is None or state.path else pilot.heading or (),
         battery=math.nan if battery is None else battery,
         crashed=engine.crashed,
         why_not_fly=engine.why_not_fly(),
+        mission="" if pilot is None else pilot.mission_in_words(place),
     )
 
 
