@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from typing import Any
 
@@ -9,9 +10,11 @@ import pytest
 
 from drone_mesh.air.graph import Graph
 from drone_mesh.errors import ConfigurationError
+from drone_mesh.lab.experiment import load_experiment
 from drone_mesh.lab.metrics import METRICS, measure_all
 from drone_mesh.lab.metrics.traffic import jain_index
 from drone_mesh.lab.places import draw_places
+from drone_mesh.lab.plan import Plan
 from drone_mesh.lab.record import RunRecord
 from drone_mesh.lab.scenario import Layout, Scenario, Streams
 from drone_mesh.lab.scenario_network import success
@@ -525,3 +528,19 @@ def test_packets_arrive_as_often_as_the_fading_says(
     margin_db: float, fading: str, k_db: float, expected: float
 ) -> None:
     assert success(margin_db, fading, k_db) == pytest.approx(expected, abs=0.002)
+
+
+def test_the_fence_of_an_experiment_may_be_a_plan_of_a_ground_station(tmp_path):
+    corners = [[52.0, 5.0], [52.001, 5.0], [52.001, 5.001]]
+    polygon = {"polygon": corners, "inclusion": True}
+    plan = {"geoFence": {"version": 2, "polygons": [polygon], "circles": []}}
+    (tmp_path / "field.plan").write_text(json.dumps(plan), "utf-8")
+    path = tmp_path / "x.yaml"
+    path.write_text('name: x\nbase:\n  fence: {path: field.plan, origin: "52,5,0"}\n', "utf-8")
+    entry = next(iter(Plan(load_experiment(path))))
+    fence = Scenario.model_validate_json(entry.spec.scenario).fence.fence()
+    assert fence.why_not((10.0, 50.0, 0.0)) == ""
+    assert fence.why_not((50.0, 10.0, 0.0)) == "outside fence polygon 1"
+    path.write_text("name: x\nbase:\n  fence: {path: field.plan}\n", "utf-8")
+    with pytest.raises(ConfigurationError, match=r"line 3: fence.path: .*needs an origin"):
+        load_experiment(path)

@@ -259,3 +259,14 @@ def test_a_gateway_may_have_no_internet_while_nobody_asks_over_http():
     assert parse_gateway(["--silence", "5"], {}).silence_s is None
     assert parse_gateway(["--internet", "http"], {}).silence_s == 60.0
     assert parse_gateway(["--internet", "http", "--silence", "5"], {}).silence_s == 5.0
+
+
+def test_a_node_gets_the_fence_in_its_file(tmp_path, capsys):
+    path = tmp_path / "yard.yaml"
+    path.write_text("areas: [{name: yard, center: [0, 0], radius: 9}]", "utf-8")
+    fence = parse_router(["--id", "3", "--fence", str(path)], {}).flight.fence
+    assert fence.why_not((10.0, 0.0, 0.0)) == "outside fence yard"
+    path.write_text("areas: []", "utf-8")
+    with pytest.raises(SystemExit):
+        parse_gateway(["--fence", str(path)], {})
+    assert f"--fence {path}: 0 areas" in capsys.readouterr().err
