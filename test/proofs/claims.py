@@ -32,7 +32,6 @@ CLAIMS_PER_S = 24
 ORDERED = (24, 19, 14, 9, 4, 3, 2, 1)  # drones, those far from the gateway first
 ORDERED_M = 3.5  # to the west, where each keeps its neighbours
 ORDER_PERIOD_S = 15.0
-MESSAGE_PERIOD_S = 1.0
 AHEAD = 10  # numbers of beacons
 LIE_M = 8.0  # less than the range
 MOST_AHEAD = 127  # of them; one more would be an old one
@@ -94,18 +93,18 @@ def beacons_ahead(stranger: Stranger) -> None:
 
 
 def beacons_of_all(stranger: Stranger) -> None:
-    """Claim in beacons to lead to every drone, anew each time, while the owner uses them all.
+    """Claim in beacons to lead to every drone, anew each time, while the owner orders eight away.
 
     The newest announcement of a drone counts. The stranger forwards nothing.
     """
-    _use_in_turn(stranger)
+    _order_in_turn(stranger)
     drones = tuple(node for node in stranger.network.nodes if node)
     _beacons(stranger, ahead=0, lists=(NONE_BELOW, Below(0, drones)))
 
 
 def beacons_near_all(stranger: Stranger) -> None:
-    """Claim in beacons to hear every drone, while the owner uses them all."""
-    _use_in_turn(stranger)
+    """Claim in beacons to hear every drone, while the owner orders eight away."""
+    _order_in_turn(stranger)
     drones = [node for node in stranger.network.nodes if node]
     for newest, first in zip(_newest_numbers(stranger), itertools.cycle(range(0, 24, 8))):
         near = tuple(drones[first : first + 8])
@@ -214,19 +213,12 @@ def _order_away(stranger: Stranger, drone: int) -> None:
     network.order(drone, goal.longitude, goal.latitude, allow_shared_place=True)
 
 
-def _use_in_turn(stranger: Stranger) -> None:
-    """The owner sends eight drones away, and every second a message to another drone."""
+def _order_in_turn(stranger: Stranger) -> None:
+    """The owner sends eight drones away, and no message, which would find the stranger out."""
     network = stranger.network
     for turn, drone in enumerate(ORDERED, 1):
         at_s = network.now_s() + turn * CLAIMING_S / 10
         network.clock.call_at(at_s, functools.partial(_order_away, stranger), drone)
-    for turn, drone in enumerate(sorted(set(network.nodes) - {0}), 1):
-        at_s = network.now_s() + turn * MESSAGE_PERIOD_S
-        network.clock.call_at(at_s, functools.partial(_send_message, stranger), drone)
-
-
-def _send_message(stranger: Stranger, drone: int) -> None:
-    stranger.network.send(0, drone, b"hello")
 
 
 def _to_all(stranger: Stranger, name: int, beacon: Beacon) -> None:

@@ -10,6 +10,8 @@ import pytest
 from proofs import attacks, claims, damage
 
 from drone_mesh.communication.beacon.connection import AGAIN_S, PERIOD_S
+from drone_mesh.communication.beacon.disputes import REMEMBERED_S
+from drone_mesh.communication.beacon.routes import STALE
 from drone_mesh.communication.beacon.times import JITTER
 from drone_mesh.communication.data import packets as data
 from drone_mesh.communication.events import complaints
@@ -76,8 +78,10 @@ SENTENCES = [
     f"*Frames in neighbours' names*: {attacks.FRAMES_PER_S} a second",
     f"are {claims.MOST_AHEAD} ahead, the most that counts as newer",
     f"at that one of {('four', 'five')[len(damage.PLACES) - 4]} places",
-    f"Meanwhile the owner orders {len(claims.ORDERED)} drones away by {claims.ORDERED_M:g} m and "
-    f"sends each drone a message, one in {claims.MESSAGE_PERIOD_S:g} s.",
+    f"Meanwhile the owner orders {len(claims.ORDERED)} drones away by {claims.ORDERED_M:g} m; "
+    "lured",
+    f"it on for {'five' if STALE == 5 else '?'} intervals, both claims are disputed for "
+    f"{'a minute' if REMEMBERED_S == 60 else '?'}",
     f"a heartbeat within {AGAIN_S:g} s after it connects",
     f"again after {AGAIN_S:g} to {2 * AGAIN_S:g} s until the gateway",
     f"every {PERIOD_S * (1 - JITTER):g} to {PERIOD_S:g} s. After a restart",
@@ -135,8 +139,6 @@ figures of 2026-11-24 (the attacks by beacons but that of far places, and frames
 neighbours' names: seeds 0 and 1, figures of 2026-11-26)
 
 *A counter far ahead*: once in 2 s
-
-With the orders alone it is 33 % without a key and 74 % for a captured node
 
 Four times as many cut off 70 %, ten times as many 76 % (seeds 0 to 2, from the middle
 

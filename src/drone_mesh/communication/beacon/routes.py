@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from operator import attrgetter, itemgetter
 from typing import Callable, Iterator, NamedTuple, Tuple
 
+from drone_mesh.communication.beacon.disputes import Disputes
 from drone_mesh.communication.beacon.neighbour import WRONG, Losses, Neighbour
 from drone_mesh.communication.beacon.packets import (
     ANCESTORS,
@@ -94,6 +95,7 @@ class BeaconRoutes(IRoutes):
         self._offline: dict[int, tuple[int, float]] = {}
         self._hints: dict[int, tuple[int, float]] = {}  # by node: a neighbour that led to it, when
         self._losses = Losses(self._range_m)
+        self._disputes = Disputes()
 
     @property
     def now_s(self) -> float:
@@ -110,6 +112,8 @@ class BeaconRoutes(IRoutes):
             neighbour = Neighbour(node, beacon)
             self.neighbours[node] = neighbour
         neighbour.heard(beacon, self.motion, self.clock.now_s)
+        if beacon.parent == self._node_id and neighbour.announced_s:
+            self._compare(neighbour)
         if beacon.shows_that_it_hears(self._node_id, as_child=node == self.parent):
             self._proved(neighbour)
         if self.motion is not None and neighbour.motion is not None:  # maybe of an earlier beacon
@@ -124,6 +128,13 @@ class BeaconRoutes(IRoutes):
                 elif not self._is_offline(beacon):
                     self._offline.pop(beacon.gateway, None)
         return is_new
+
+    def _compare(self, child: Neighbour) -> None:
+        """Compare what a child has listed with what the other children list."""
+        settles_s = STALE * self._slowest_s()
+        for other in self.neighbours.values():
+            if other.beacon.parent == self._node_id and other is not child:
+                self._disputes.compare(child, other, settles_s, self.clock.now_s)
 
     def _take_number(self, node: int, beacon: Beacon) -> None:
         """Note whether a neighbour stands on a newer beacon of the gateway than before."""
@@ -405,11 +416,17 @@ class BeaconRoutes(IRoutes):
         is_doubtful = direct is None or not direct.usable or self.risk(direct) >= GONE
         if direct is not None and not is_doubtful:
             yield Way(node, direct.alive_s)
-        yield from self._next_to(node)
         hint, at_s = self._hints.get(node, (NO_ROUTE, -math.inf))
         if hint in self.neighbours and self.clock.now_s - at_s < HINT_S:
             yield Way(hint, at_s)
-        for _rank, way in sorted(self._announcements(node)):
+        announcements = sorted(self._announcements(node))
+        for (is_other, *_rest), way in announcements:
+            if not is_other:
+                yield way
+        yield from self._next_to(
+            node
+        )  # who hears it may be anybody; a child has it from its beacon
+        for _rank, way in announcements:
             yield way
         parent, before = self.neighbours.get(self.parent), self.neighbours.get(came_from)
         comes_from_below = before is not None and before.beacon.parent == self._node_id
@@ -429,17 +446,22 @@ class BeaconRoutes(IRoutes):
                 shown.append((age_s + self.risk(neighbour), Way(neighbour.node, at_s)))
         return [way for _rank, way in sorted(shown)]
 
-    def _announcements(self, node: int) -> Iterator[tuple[tuple[bool, float], Way]]:
-        """The neighbours that announce `node` below them; a child, and the latest, first."""
+    def _announcements(self, node: int) -> Iterator[tuple[tuple[bool, int, float], Way]]:
+        """The neighbours that announce `node` below them; a child, and the latest, first.
+
+        Among children that dispute it, the one with the fewest such claims, and the first.
+        """
+        now_s = self.clock.now_s
         for neighbour in filter(lambda one: one.usable, self._all()):
             at_s = neighbour.announced_s.get(node)
             if at_s is not None:
                 is_child = neighbour.beacon.parent == self._node_id
-                age_s = self.clock.now_s - at_s + self.risk(neighbour)
+                claims = self._disputes.about(neighbour.node, node, now_s) if is_child else 0
+                age_s = at_s if claims else now_s - at_s + self.risk(neighbour)
                 listed_s = neighbour.listed_s.get(node, at_s)
-                yield (not is_child, age_s), Way(neighbour.node, listed_s)
+                yield (not is_child, claims, age_s), Way(neighbour.node, listed_s)
             elif node == neighbour.beacon.parent or node in neighbour.beacon.ancestors:
-                yield (True, math.inf), Way(neighbour.node, neighbour.heard_s)
+                yield (True, 0, math.inf), Way(neighbour.node, neighbour.heard_s)
 
     def _nearer(self, node: int) -> list[Way]:
         """The neighbours that are nearer to the last known place of `node`, the nearest first."""

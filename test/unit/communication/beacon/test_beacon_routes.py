@@ -214,7 +214,7 @@ def test_a_node_that_came_back_to_an_earlier_relay_is_looked_for_there(routes):
 
 
 def test_a_neighbour_that_hears_a_node_leads_to_it_until_that_is_two_intervals_old(routes):
-    routes.heard(1, beacon(hops=3, parent=9, below=Below(50, (50,))))
+    routes.heard(1, beacon(hops=3, parent=7, below=Below(50, (50,))))
     routes.heard(2, beacon(hops=4, parent=7, near=(50,)))
     assert ways(routes, 50) == [2, 1]
     routes.clock.now_s = 2.1
