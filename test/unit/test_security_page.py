@@ -136,7 +136,8 @@ it costs only 2 bytes per message more
 256 messages earlier
 
 figures of 2026-11-24 (the attacks by beacons but that of far places, and frames in
-neighbours' names: seeds 0 and 1, figures of 2026-11-26)
+neighbours' names: seeds 0 and 1, figures of 2026-11-26, those that list or hear all drones of
+2026-11-27)
 
 *A counter far ahead*: once in 2 s
 
