@@ -26,7 +26,7 @@ from drone_mesh.srv import Casus, PowerSwitch, RequestGPS, WirelessMessage
 
 PAYLOAD_BYTES = 32
 STANDSTILL_S = 20.0  # wall; if simulated time stands still for longer, the world has died
-POLL_PERIOD_S = 0.01
+POLL_PERIOD_S = 0.05  # many conditions call a service, which takes both sides milliseconds
 WALL_LIMIT_S = 60.0  # for what takes a moment on an idle machine
 NODES = Path(rospkg.RosPack().get_path("drone_mesh")) / "nodes"
 FORKS = multiprocessing.get_context("forkserver")

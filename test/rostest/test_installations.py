@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 from pathlib import Path
 
@@ -22,6 +23,7 @@ from fenced_blocks import blocks  # noqa: E402
 CHECKOUT = Path(__file__).resolve().parents[2]
 LEFT_OUT = (".*", "build", "logs", "__pycache__")
 CONNECTED = "2 of 2 routers connected"
+LOOK_AGAIN_AFTER_S = 3.0  # each look costs seconds of processor time
 
 
 class InstallationsTest(unittest.TestCase):
@@ -52,15 +54,18 @@ class InstallationsTest(unittest.TestCase):
     def run_until_connected(self, simulation: str, setup: str, cwd: Path, also: str = "") -> None:
         """Start a simulation, and look at it in another terminal, until it shows `also` too."""
         run = self.start(f"{simulation} routers:=2 spacing:=6", cwd)
-        status = f"{setup} && rosrun drone_mesh status"
+        shown = ""
+
+        def connected() -> bool:
+            nonlocal shown
+            time.sleep(LOOK_AGAIN_AFTER_S)
+            shown = self.output(f"{setup} && rosrun drone_mesh status", cwd)
+            return CONNECTED in shown or run.poll() is not None
+
         try:
-            wait_for(
-                CONNECTED,
-                4 * WALL_LIMIT_S,
-                lambda: CONNECTED in self.output(status, cwd) or run.poll() is not None,
-            )
+            wait_for(CONNECTED, 4 * WALL_LIMIT_S, connected)
             self.assertIsNone(run.poll(), "it ended")
-            self.assertIn(also, self.output(status, cwd))
+            self.assertIn(also, shown)
         finally:
             if run.poll() is None:
                 os.killpg(run.pid, signal.SIGINT)
@@ -70,12 +75,10 @@ class InstallationsTest(unittest.TestCase):
         root = self.folder / "with space" / "drone mesh"
         shutil.copytree(CHECKOUT, root, ignore=shutil.ignore_patterns(*LEFT_OUT))
         (root / ".venv").symlink_to((CHECKOUT / ".venv").resolve())
-        setup = ". scripts/env.bash"
-        self.run_until_connected("exec scripts/run", setup, root)
-        started = [block for block in blocks("bash") if block.test == "clone"]
-        for command in (command for block in started for command in block.commands()):
-            chosen = command.rpartition(":")[2]  # as in repair:=own_repair:LowestId
-            self.run_until_connected(command, setup, root, chosen)
+        (documented,) = (block for block in blocks("bash") if block.test == "clone")
+        (command,) = documented.commands()
+        chosen = command.rpartition(":")[2]  # as in repair:=own_repair:LowestId
+        self.run_until_connected(command, ". scripts/env.bash", root, chosen)
 
     def test_the_installed_package_needs_its_setup_and_nothing_else(self) -> None:
         # Not into the checkout: rospack would find the package twice.
