@@ -7,6 +7,7 @@ venv="$root/.venv"
 python=/usr/bin/python3
 javascript="$venv/javascript"
 noetic=/opt/ros/noetic/setup.bash
+pip_options=()
 simulation_requirements=(requirements/{console,http,mqtt,report,simulation}.txt)
 
 if [ -e "$noetic" ]; then
@@ -85,7 +86,7 @@ pip_install() {
     cmp -s "$root/$file" "$stamp" && continue
     say "installing Python packages into ${venv##*/}: $file"
     "$venv/bin/python" -m pip install --disable-pip-version-check --no-input --prefer-binary \
-      --progress-bar off "${options[@]}" -r "$root/$file" </dev/null ||
+      --progress-bar off "${pip_options[@]}" "${options[@]}" -r "$root/$file" </dev/null ||
       fail "pip could not install $file"
     cp "$root/$file" "$stamp"
   done
@@ -168,24 +169,42 @@ prepare_physics() {
   pip_install requirements/physics.txt
 }
 
+can_compile() { "$venv/bin/python" -c 'import sys; exit(sys.version_info < (3, 10))'; }
+
 # prepare_compiler: mypyc, in a folder of its own, because the checks need an older mypy.
 prepare_compiler() {
   local at="$root/build/compiled/mypyc"
   make_venv
   pip_install requirements/base.txt
-  "$venv/bin/python" -c 'import sys; exit(sys.version_info < (3, 10))' || fail "mypyc needs Python 3.10"
+  can_compile || fail "mypyc needs Python 3.10"
   local headers
   headers=$("$venv/bin/python" -c 'import sysconfig; print(sysconfig.get_paths()["include"])') || exit
   if [ ! -e "$headers/Python.h" ] || ! command -v cc >/dev/null; then apt_install g++ python3-dev; fi
   cmp -s "$root/requirements/compile.txt" "$at/.installed" && return
   say "installing mypyc into build/compiled"
   "$venv/bin/python" -m pip install --disable-pip-version-check --no-input --progress-bar off --upgrade \
-    --target "$at" -r "$root/requirements/compile.txt" </dev/null || fail "pip could not install mypyc"
+    "${pip_options[@]}" --target "$at" -r "$root/requirements/compile.txt" </dev/null || fail "pip could not install mypyc"
   cp "$root/requirements/compile.txt" "$at/.installed"
 }
 
 # compiler ARGUMENTS...: Python with mypyc, so that setup.py compiles.
 compiler() { DRONE_MESH_COMPILE=yes PYTHONPATH="$root/build/compiled/mypyc" "$venv/bin/python" "$@"; }
+
+# compile_core: the mesh's hot path, into a folder whose name fits the sources.
+compile_core() {
+  local builds=build/compiled folder
+  prepare_compiler
+  folder=$(DRONE_MESH_CORE=python PYTHONPATH=src "$venv/bin/python" -c 'from drone_mesh.compiled import build; print(build())') || exit
+  say "compiling into ${folder#"$root/"}"
+  rm -rf "$builds"/{new,old,temp}
+  compiler setup.py -q build_ext --build-lib "$builds/new" --build-temp "$builds/temp" >"$builds/log" 2>&1 ||
+    { tail -n 30 "$builds/log" >&2; fail "mypyc failed; see $builds/log"; }
+  [ ! -d "$folder" ] || mv "$folder" "$builds/old"
+  mv "$builds/new" "$folder"
+  # Programs that run now still load from the latest ones.
+  find "$builds" -maxdepth 1 -name '????????????????' -mtime +1 ! -path "$folder" -exec rm -rf {} +
+  rm -rf "$builds"/{old,temp}
+}
 
 prepare_simulation() {
   apt_install "${ros_packages[@]}"
@@ -213,15 +232,7 @@ prepare_checks() {
   npm_install
 }
 
-# What all tests need. pip comes after apt-get, whose Python packages it finds in the environment.
-prepare_tests() {
-  apt_install "${ros_packages[@]}" "${screen_packages[@]}"
-  [ ${#browsers[@]} -eq 0 ] || apt_install "${browsers[@]}"
-  prepare_unit_tests
-  map_library
-}
-
-# What the checks and rostests need beside that.
+# What the checks and rostests need beside the unit tests.
 prepare_rest() {
   prepare_checks
   pip_install requirements/{browser,docs}.txt
