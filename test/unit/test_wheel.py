@@ -45,7 +45,7 @@ def installed(tmp_path):
     run(*pip, "wheel", *no_network, "--wheel-dir", checkout / "dist", checkout, cwd=checkout)
     (wheel,) = (checkout / "dist").glob("drone_mesh-*-py3-none-any.whl")
     run(sys.executable, "-m", "venv", venv, cwd=tmp_path)
-    run(venv / "bin/pip", "install", "--no-deps", "--no-index", wheel, cwd=venv)
+    run(venv / "bin/pip", "install", "--no-deps", "--no-index", "--no-compile", wheel, cwd=venv)
     return venv
 
 
