@@ -138,8 +138,8 @@ build() {
   # Python is all that runs here. In a catkin workspace messages are made for each language.
   export ROS_LANG_DISABLE=${ROS_LANG_DISABLE-gencpp:geneus:genlisp:gennodejs}
   if ! grep -qsxF "CMAKE_HOME_DIRECTORY:INTERNAL=$root" "$root/build/CMakeCache.txt"; then
-    # Nothing is built, or the checkout has been moved: CMake stores absolute paths.
-    find "$root/build" -mindepth 1 -maxdepth 1 ! -name .lock -exec rm -rf {} +
+    # Nothing is built, or the checkout has been moved: CMake stores absolute paths. Not ours.
+    find "$root/build" -mindepth 1 -maxdepth 1 ! -name .lock ! -name compiled -exec rm -rf {} +
   fi
   # catkin writes this into the first lines of scripts, which cannot name a path with a space.
   local python="$venv/bin/python"
