@@ -51,12 +51,12 @@ def read_plan(text: str) -> Plan:
     if content.get("fileType") != "Plan":
         raise ConfigurationError("not a plan of QGroundControl: its fileType is not Plan")
     mission = _section(content, "mission")
-    speed = mission.get("hoverSpeed")
+    speed: Any = mission.get("hoverSpeed")
     items: list[PlanItem] = []
     unread: list[str] = []
     for row in _list(mission.get("items", []), "items"):
         item = _mapping(row, f"item {len(items) + 1}")
-        parts = [item]
+        parts: Any = [item]
         if item.get("type") != "SimpleItem":
             survey = item.get("TransectStyleComplexItem")
             parts = survey.get("Items") if isinstance(survey, dict) else None
@@ -103,7 +103,8 @@ def _item_of(columns: Sequence[str], where: str) -> PlanItem:
 
 def _simple(part: Any, where: str) -> PlanItem:
     row = _mapping(part, where)
-    values, command, frame = row.get("params"), row.get("command"), row.get("frame")
+    values: Any = row.get("params")
+    command, frame = row.get("command"), row.get("frame")
     is_list = isinstance(values, list) and len(values) == _VALUES
     if not is_list or not all(value is None or _is_number(value) for value in values):
         raise ConfigurationError(

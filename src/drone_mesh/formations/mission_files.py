@@ -137,7 +137,8 @@ class _Way:
         elif command in _LANDINGS and (self._places or _has_place(item)):
             self._land(self._place(item))
         elif command == _RETURN and plan.home is not None and self._places:
-            home = place_on(self._origin, *plan.home, self._height_m)
+            latitude, longitude = plan.home
+            home = place_on(self._origin, latitude, longitude, self._height_m)
             self._land(home.to_vector())
             at = f"x {home.longitude:g}, y {home.latitude:g} m"
             self._told[f"returns to its planned home, {at}"].append(item.where)
@@ -157,7 +158,8 @@ class _Way:
         if item.command not in _LANDINGS or math.isnan(self._height_m):
             self._height_m = self._height(item)
         if _has_place(item):
-            return place_on(self._origin, *item.values[4:6], self._height_m).to_vector()
+            latitude, longitude = item.values[4:6]
+            return place_on(self._origin, latitude, longitude, self._height_m).to_vector()
         if not self._places:
             raise ConfigurationError("has no place, and no waypoint is before it")
         return (*self._places[-1][:2], self._height_m)
