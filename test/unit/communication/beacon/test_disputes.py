@@ -25,7 +25,7 @@ class Mesh:
 
     def __init__(self):
         self.routes = BeaconRoutes(
-            ME, True, 10.0, lambda _node: None, shared=False, clock=Deadlines()
+            ME, True, 10.0, lambda _node: None, one_loss_counts=True, clock=Deadlines()
         )
         self.lists = {child: Below(nodes[0] - 1, nodes) for child, nodes in NODES.items()}
 
