@@ -32,8 +32,8 @@ def requirements(name: str) -> list[str]:
 HOT = {
     "channel": "medium_access packet_queue statistics",
     "communication": "neighbours timing",
-    "communication/beacon": "connection courier neighbour own_beacons packets plane routes times"
-    " verdicts",
+    "communication/beacon": "connection courier disputes neighbour own_beacons packets plane routes"
+    " times verdicts",
     "communication/control": "delivery node_part pilot places",
     "communication/events": "complaints",
     "communication/heartbeats": "connection delivery forwarding gateway_plane introduction plane"
