@@ -35,8 +35,9 @@ def event_of(
     SubElement(detail, "contact", callsign=f"drone {vehicle.node}")
     if vehicle.battery_percent is not None:
         SubElement(detail, "status", battery=f"{vehicle.battery_percent:.0f}")
-    doing = {True: "in flight", False: "on the ground", None: ""}[vehicle.flying]
-    SubElement(detail, "remarks").text = vehicle.why_not_fly or doing
+    doing = {True: "in flight", False: "at rest", None: ""}[vehicle.flying]
+    words = "".join(one if one.isprintable() else "?" for one in vehicle.why_not_fly or doing)
+    SubElement(detail, "remarks").text = words  # in XML, other characters may be none
     return bytes(tostring(event, encoding="utf-8", xml_declaration=True))
 
 

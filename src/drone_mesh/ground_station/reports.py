@@ -20,6 +20,7 @@ Told = Tuple[int, Message]
 
 SLOW_S = 5  # period of what changes rarely; the rest is told once a second
 PARAMETER = "MESH_NODE_ID"
+AIRBORNE_M = 1.0  # above its home; a drone at rest is in the air from there on: it hovers
 COMPONENT = mavlink.MAV_COMP_ID_AUTOPILOT1
 HOLD, RETURN, LAND = px4_mode(4, 3), px4_mode(4, 5), px4_mode(4, 6)
 _TEXT_BYTES = 50  # of one STATUSTEXT; a longer one has parts
@@ -57,7 +58,7 @@ class Fleet:
         self._vehicles: dict[int, Vehicle] = {}
         self._before: dict[int, Vehicle] = {}  # with an earlier place
         self.now_s = -math.inf
-        self.homes: dict[int, Location] = {}  # where each was first seen on the ground
+        self.homes: dict[int, Location] = {}  # where each was first seen at rest
         self.modes: dict[int, int] = {}  # of those that return or land; all others hold
         self._texts = 0
 
@@ -117,13 +118,14 @@ class Fleet:
     # One message each; None: it is not known ---------------------------------------------------
 
     def heartbeat(self, vehicle: Vehicle) -> Message:
-        """Of a quadrocopter: armed means in flight."""
-        mode = mavlink.MAV_MODE_FLAG_SAFETY_ARMED * bool(vehicle.flying)
+        """Of a quadrocopter: armed means in the air."""
+        in_air = self._in_air(vehicle)
+        mode = mavlink.MAV_MODE_FLAG_SAFETY_ARMED * in_air
         autopilot, own_mode = mavlink.MAV_AUTOPILOT_GENERIC, 0
         if self.may_order:
             mode |= mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | mavlink.MAV_MODE_FLAG_GUIDED_ENABLED
             autopilot, own_mode = mavlink.MAV_AUTOPILOT_PX4, self.modes.get(vehicle.node, HOLD)
-        state = mavlink.MAV_STATE_ACTIVE if vehicle.flying else mavlink.MAV_STATE_STANDBY
+        state = mavlink.MAV_STATE_ACTIVE if in_air else mavlink.MAV_STATE_STANDBY
         if vehicle.crashed:
             state = mavlink.MAV_STATE_CRITICAL
         elif vehicle.flying is None:
@@ -132,12 +134,17 @@ class Fleet:
         return mavlink.MAVLink_heartbeat_message(kind, autopilot, mode, own_mode, state, version)
 
     def landed(self, vehicle: Vehicle) -> Message:
-        """Whether it flies."""
+        """Whether it is in the air."""
         state = mavlink.MAV_LANDED_STATE_UNDEFINED
         if vehicle.flying is not None:
             ground, air = mavlink.MAV_LANDED_STATE_ON_GROUND, mavlink.MAV_LANDED_STATE_IN_AIR
-            state = air if vehicle.flying else ground
+            state = air if self._in_air(vehicle) else ground
         return mavlink.MAVLink_extended_sys_state_message(0, state)
+
+    def _in_air(self, vehicle: Vehicle) -> bool:
+        if vehicle.flying or vehicle.flying is None or vehicle.place is None:
+            return bool(vehicle.flying)
+        return vehicle.place.height - self.home_height_m(vehicle.node) > AIRBORNE_M
 
     def place(self, vehicle: Vehicle) -> Message | None:
         """Where it was when it last reported: on the earth, or in the common frame."""
@@ -178,7 +185,7 @@ class Fleet:
         return mavlink.MAVLink_battery_status_message(0, 0, 0, *unknown, _percent(vehicle))
 
     def home(self, vehicle: Vehicle) -> Message | None:
-        """Where it was first seen on the ground."""
+        """Where it was first seen at rest."""
         home, nan = self.homes.get(vehicle.node), math.nan
         if home is None or self.origin is None:
             return None

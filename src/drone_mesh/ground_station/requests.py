@@ -14,9 +14,10 @@ from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.communication.interfaces import OrderState
 from drone_mesh.communication.timing import Throttle
 from drone_mesh.drone.geodesy import EarthPlace
+from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.autopilots import px4_mode
-from drone_mesh.errors import MeshError
+from drone_mesh.errors import GoalRefused, MeshError
 from drone_mesh.ground_station.reports import (
     COMPONENT,
     HOLD,
@@ -29,7 +30,7 @@ from drone_mesh.ground_station.reports import (
 )  # fmt: skip
 from drone_mesh.ground_station.vehicles import Vehicle
 from drone_mesh.state.model import EventRecord
-from drone_mesh.state.orders import OrderProgress
+from drone_mesh.state.orders import CLOCKS_DIFFER_S, OrderProgress
 from drone_mesh.web.access import Allowance
 
 SAY_PERIOD_S = 10.0  # of why a stream of targets is not followed
@@ -216,7 +217,7 @@ class Desk:
         place = self._fleet.homes.get(vehicle.node) if mode == RETURN else vehicle.place
         if place is None:
             raise _NotOrdered(f"its {'home' if mode == RETURN else 'place'} is not known")
-        return place if mode == HOLD else place._replace(height=0.0)
+        return place._replace(height=max(0.0, place.height) if mode == HOLD else 0.0)
 
     def _place(
         self, vehicle: Vehicle, frame: int, north_deg: float, east_deg: float, height_m: float
@@ -252,7 +253,8 @@ class Desk:
             goal, mode = self._goal(vehicle, message)
             if not self._fleet.may_order:
                 raise _NotOrdered("no orders are taken here (--ground-station-may-order)")
-            goal = goal._replace(height=max(0.0, goal.height)).as_ordered()
+            goal = goal.as_ordered()
+            check_goal(*goal)
             is_same = latest is not None and latest.mode == mode  # it may fly on meanwhile
             if latest is not None and is_same and (mode != HOLD or latest.goal == goal):
                 is_open = latest.progress.state.is_open
@@ -261,15 +263,16 @@ class Desk:
                     return
             if self._limit.is_over():
                 raise _NotOrdered("too many orders at once")
-        except _NotOrdered as error:
-            acknowledge(error.result)
+        except (_NotOrdered, GoalRefused) as error:
+            acknowledge(getattr(error, "result", _DENIED))
             if str(error) and (not is_stream or self._said.count(str(node), now_s)):
                 self._say(node, str(error))
             return
         self._limit.note()
         if latest is not None:
             latest.end(_CANCELLED)
-        order = _Order(goal, mode, acknowledge, OrderProgress(node, goal, now_s), now_s)
+        progress = OrderProgress(node, goal, now_s - CLOCKS_DIFFER_S)
+        order = _Order(goal, mode, acknowledge, progress, now_s)
         self._orders[node] = order
         acknowledge(_IN_PROGRESS)
         self._order(node, goal, functools.partial(self._answered, node, order))

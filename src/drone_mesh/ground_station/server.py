@@ -34,6 +34,7 @@ ROUND_S, IDLE_S = 0.02, 0.1  # between two readings at least, and at most
 MOST_BYTES = 4096  # of one station in a round; to read noise takes 1.2 ms then
 LEAST_BYTES = 128  # as which a shorter datagram counts
 LONGEST_BYTES = 280  # of a signed message, MAVLink 2
+MAGIC = b"\xfd", b"\xfe"  # of MAVLink 2 and 1; a page in a browser begins with HTTP
 MOST_NOISE = 2000  # pieces of a TCP connection that are no message; then it is closed
 MOST_STATIONS = 8  # over TCP
 MESSAGES = 3000, 0.01  # at once, which is what 254 vehicles are asked at first; then one per period
@@ -44,6 +45,7 @@ _SIGNING_BEGAN_S = 1420070400  # 2015-01-01, MAVLink 2 "Message Signing"
 _UNITS_PER_S = 100_000
 
 _log = logging.getLogger(__name__)
+logging.getLogger(mavlink.__name__).setLevel(logging.WARNING)  # it tells of each old signature
 
 
 class _Codec(mavlink.MAVLink):  # type: ignore[misc]
@@ -65,7 +67,7 @@ class _Station:
         if signing is not None:
             self._codec.signing = signing  # one for all: a packet counts once
         self._numbers: dict[int, int] = {}  # by node, of its next message
-        self._noise = 0
+        self._noise, self._begins = 0, True
         self._limit = Allowance(*MESSAGES)
 
     def send(self, node: int, message: Message) -> None:
@@ -85,6 +87,9 @@ class _Station:
         """What has come, up to the limits of one round. Raises OSError: a connection is over."""
         if self.peer is None:
             data = self.socket.recv(MOST_BYTES)
+            if self._begins and data and not data.startswith(MAGIC):
+                raise ConnectionError("it does not begin with MAVLink")
+            self._begins = False
             yield from self._read(data)
             if not data or self._noise > MOST_NOISE:
                 raise ConnectionError("it sends noise" if data else "it closed the connection")
@@ -209,6 +214,7 @@ class GroundStationServer:
         if self._signing is not None:  # its clock would stand still between two messages
             self._signing.timestamp = max(self._signing.timestamp, _signing_time())
         if time.monotonic() - self._seen_s > OLD_VIEW_S:
+            self._fleet.show((), self._fleet.now_s)  # answers and orders end, too
             return
         for told in self._fleet.every_second(self._second) if self._stations else ():
             self._post(*told, None)

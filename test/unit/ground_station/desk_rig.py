@@ -44,10 +44,10 @@ class DeskRig:
             self.desk.received(parsed, station)
         return self.answers()
 
-    def event(self, kind, number=7):
+    def event(self, kind, number=7, at_s=102.0):
         """What an event of the latest order brings."""
         node, goal, _answer = self.ordered[-1]
-        self.desk.event(EventRecord(102.0, 0, kind, (node,), "why", number, goal))
+        self.desk.event(EventRecord(at_s, 0, kind, (node,), "why", number, goal))
         return self.answers()
 
     def answers(self):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from xml.etree import ElementTree
+
 import pytest
 from desk_rig import HERE, ORIGIN, drone, text_of
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -47,6 +49,18 @@ def test_a_node_is_armed_in_flight_and_its_speed_is_the_mean_between_two_reports
     assert messages[3, "EXTENDED_SYS_STATE"].landed_state == mavlink.MAV_LANDED_STATE_IN_AIR
     place = messages[3, "GLOBAL_POSITION_INT"]
     assert (place.vx, place.vy, place.vz, place.relative_alt) == (150, 0, -150, 6000)
+
+
+def test_a_drone_that_hovers_is_in_the_air_though_no_flight_is_under_way():
+    shown = fleet(drone(3, place=HERE._replace(height=0.4)))
+    shown.show([drone(3, 101.0, place=HERE._replace(height=10.0))], 101.0)
+    messages = told(shown)
+    assert messages[3, "HEARTBEAT"].base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+    assert messages[3, "HEARTBEAT"].system_status == mavlink.MAV_STATE_ACTIVE
+    assert messages[3, "EXTENDED_SYS_STATE"].landed_state == mavlink.MAV_LANDED_STATE_IN_AIR
+    shown.show([drone(3, 102.0, place=HERE._replace(height=0.8))], 102.0)
+    landed = told(shown)[3, "EXTENDED_SYS_STATE"].landed_state
+    assert landed == mavlink.MAV_LANDED_STATE_ON_GROUND
 
 
 def test_signs_of_life_end_with_the_proof_of_it():
@@ -120,4 +134,11 @@ def test_cursor_on_target_is_stale_when_the_next_report_is_due():
     assert b'start="2023-11-14T22:13:18.000Z" stale="2023-11-14T22:13:48.000Z"' in event
     assert b'callsign="drone 3"' in event
     assert b'<status battery="80" />' in event
+    assert b"<remarks>at rest</remarks>" in event
     assert event_of(drone(3, place=None), ORIGIN, 100.0, 0.0, 30.0) == b""
+
+
+def test_cursor_on_target_is_xml_whatever_a_node_says():
+    hostile = drone(3, why_not_fly="no\x00 <fix>\x1b\ufffe")
+    event = ElementTree.fromstring(event_of(hostile, ORIGIN, 100.0, 1_700_000_000.0, 30.0))
+    assert event.findtext("detail/remarks") == "no? <fix>??"

@@ -115,6 +115,13 @@ def test_an_order_that_the_gateway_refuses_is_denied_with_its_words():
     ]
 
 
+def test_an_order_is_followed_though_the_clock_of_its_gateway_is_a_little_behind():
+    rig = DeskRig()
+    rig.ask(reposition(NORTH_DEG, 5.0, 15.0))
+    rig.event("order sent", at_s=100.95)
+    assert rig.event("order accepted") == [(3, "COMMAND_ACK", (GO_TO, ACCEPTED))]
+
+
 def test_the_same_command_again_is_the_same_order_and_another_one_replaces_it():
     rig = DeskRig()
     rig.ask(reposition(NORTH_DEG, 5.0, 15.0))
@@ -154,6 +161,8 @@ def test_each_way_to_order_leads_to_its_place(message, goal):
     [
         (reposition(NORTH_DEG, 5.0, 15.0, 10), "heights must be above sea level or above home"),
         (reposition(95.0, 5.0, 15.0), "95, 5 is no place on the earth"),
+        (reposition(NORTH_DEG, 5.0, -17.0), "height -20 m is outside 0..500 m"),  # not: to land
+        (reposition(NORTH_DEG, 5.0, 3e38), "m is outside 0..500 m"),
         (mavlink.MAVLink_set_mode_message(4, 129, 0x04040000), "only Hold, Return and Land"),
         (target(0, 0, mask=0b000111000111), "only places can be targets"),
     ],
