@@ -85,8 +85,9 @@ class Crews:
     def serve(self, drone: int, pad: int, now_s: float) -> bool:
         """This drone stands on its pad and wants a battery; returns whether it has one now."""
         ends_s = self._ends_s.setdefault(pad, {})
-        at_work = sum(end_s < math.inf for end_s in ends_s.values())
-        if ends_s.setdefault(drone, math.inf) == math.inf and at_work < self._at_once:
+        ends_s.setdefault(drone, math.inf)
+        waiting = [one for one, end_s in ends_s.items() if end_s == math.inf]
+        if waiting[:1] == [drone] and len(ends_s) - len(waiting) < self._at_once:
             ends_s[drone] = now_s + self._swap_s
         if now_s < ends_s[drone]:
             return False

@@ -162,6 +162,12 @@ class DynamicEngine(DroneEngine):
     def is_flying(self) -> bool:
         return self._route is not None or bool(self._goals)
 
+    def leave(self) -> None:
+        """Like DroneEngine.leave; the crews go on with others."""
+        super().leave()
+        if self._crews is not None:
+            self._crews.leave(self._box, ONE_PAD)
+
     def set_goal(self, latitude: float, longitude: float, height: float) -> None:
         """Like DroneEngine.set_goal. Also raises GoalRefused if the drone cannot fly."""
         why_not = self.why_not_fly()
@@ -185,7 +191,7 @@ class DynamicEngine(DroneEngine):
         else:
             self._pushed = None
             self._drain(passed_s, None)
-            self._ask_for_battery(position, now_s)
+        self._ask_for_battery(position, now_s)
         path = self._state.path if self._route is not None else None
         is_news = path is not self._state.path or self.is_flat is not self._was_flat
         self._was_flat = self.is_flat
@@ -284,10 +290,11 @@ class DynamicEngine(DroneEngine):
             self._route = self._route_of(path, here, self._home)
 
     def _ask_for_battery(self, position: Vector, now_s: float) -> None:
-        is_home = self._home.distance_m(Location.from_vector(position)) <= AT_HOME_M
-        if self._crews is None or self.crashed:
+        if self._crews is None:
             return
-        if not is_home or self._battery.percent >= READY_PERCENT:
+        stands = self._route is None and self._hover is None and not self.crashed
+        wants_one = stands and self._battery.percent < READY_PERCENT
+        if not wants_one or self._home.distance_m(Location.from_vector(position)) > AT_HOME_M:
             self._crews.leave(self._box, ONE_PAD)
         elif self._crews.serve(self._box, ONE_PAD, now_s):
             self._battery.swap()

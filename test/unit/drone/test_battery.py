@@ -43,6 +43,15 @@ def test_a_crew_swaps_one_after_the_other_and_each_pad_has_its_own():
     assert crews.swaps == 3
 
 
+def test_who_came_first_is_served_first_whoever_asks_first():
+    crews = Crews(swap_s=60.0)
+    for now_s, came in enumerate((2, 5, 3)):
+        served(crews, now_s, came)
+    assert served(crews, 60.0, 2, 3, 5) == [2]
+    assert served(crews, 60.0, 3, 5) == []
+    assert served(crews, 120.0, 3, 5) == [5]
+
+
 def test_a_crew_of_two_serves_two_at_once_and_who_flies_away_loses_its_turn():
     crews = Crews(swap_s=60.0, at_once=2)
     assert served(crews, 0.0, 3, 4, 5) == []

@@ -152,6 +152,24 @@ def test_a_drone_that_runs_low_flies_home_where_there_are_crews_and_flies_again(
     assert engine.get_location().height > 1.9
 
 
+@pytest.mark.parametrize(
+    "go",
+    [
+        lambda one: one.leave(),
+        lambda one: one.set_goal(0.0, 0.0, 2),
+        lambda one: setattr(one, "crashed", True),
+    ],
+    ids=["removed", "ordered away", "crashed"],
+)
+def test_a_crew_does_not_wait_for_a_drone_that_is_gone(world, go):
+    settings = {"limits": BodyLimits(power=PowerModel(hover_s=10.0)), "crews": Crews(5.0)}
+    one, two = drone(world, **settings), drone(world, x=3.0, **settings)
+    run(world, 16.0)  # on the ground, below 95 %
+    go(one)
+    run(world, 8.0)
+    assert two.battery_percent() > 95.0
+
+
 def test_a_drone_is_flat_when_standing_has_used_the_rest_and_this_is_reported_once(world):
     engine = drone(world, limits=BodyLimits(power=PowerModel(hover_s=0.16)))
     told, noted = [], []
