@@ -312,8 +312,8 @@ class Relief:
         return node.id in self._homes and _is_at(node, self._homes[node.id])
 
     def _send_home(self, drone: int, orders: StandingOrders, now_s: float) -> None:
+        self._homing.add(drone)  # without a known home too: it holds no post any more
         if drone in self._homes:
-            self._homing.add(drone)
             orders.give(f"drone {drone} goes home", {drone: self._homes[drone]}, now_s)
 
 

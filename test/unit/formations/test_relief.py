@@ -140,3 +140,18 @@ def test_where_a_drone_is_ordered_is_its_post_from_then_on():
     mesh.hover(mesh.holder, 26.0)
     ((_drone, place),) = mesh.sent().items()
     assert place.distance_m(Location(0.0, -6.0, 4.0)) < 1.6
+
+
+def test_a_drone_whose_home_is_unknown_holds_no_post_of_its_own_when_it_is_relieved():
+    mesh = Mesh()
+    mesh.relief = Relief(relief_policy("spare_first"), homes={2: HOME})  # as after a restart
+    mesh.sent()
+    mesh.hover(mesh.holder, 26.0)
+    ((_drone, place),) = mesh.sent().items()
+    mesh.spare.position = place.to_vector()
+    assert mesh.sent(7) == {}
+    assert mesh.relief.reliefs == 1
+    mesh.holder.position, mesh.holder.battery = OTHER.to_vector(), 20.0  # it came down by itself
+    mesh.sent()
+    mesh.holder.battery = 100.0
+    assert mesh.sent(5) == {}  # nobody fills a post that is held
