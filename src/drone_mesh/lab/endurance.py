@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import math
 from dataclasses import dataclass, field, replace
@@ -20,7 +21,7 @@ from drone_mesh.drone.battery import (
 from drone_mesh.drone.fleet import MAX_DRONES
 from drone_mesh.drone.flight_path import SPEED_M_S
 from drone_mesh.drone.location import Location
-from drone_mesh.errors import ConfigurationError
+from drone_mesh.errors import ConfigurationError, GoalRefused
 from drone_mesh.formations.relief import BESIDE_M, CARRIES_S, MARGIN_PERCENT, Relief, ReliefRules
 from drone_mesh.formations.relief_policies import relief_policy
 from drone_mesh.formations.standing_orders import StandingOrders
@@ -186,8 +187,17 @@ class EnduranceRun:
                     self._network.air.moved([n])
                 self.figures.fell.append(n)
             elif before > LAND_AT_PERCENT >= battery.percent:
-                drone.fly_to(self._homes[n])  # by itself, as an autopilot does
+                self._come_down(n)
         return battery.percent < READY_PERCENT and not in_air
+
+    def _come_down(self, n: int) -> None:
+        """By itself, as an autopilot does: home, or to the ground below if there is no way."""
+        drone = self._network.nodes[n].drone
+        try:
+            drone.fly_to(self._homes[n])
+        except GoalRefused:
+            with contextlib.suppress(GoalRefused):
+                drone.fly_to(drone.get_location()._replace(height=0.0))
 
     def look(self, sample: NetworkSample) -> None:
         """Note which posts are held by a served drone."""

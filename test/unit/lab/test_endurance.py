@@ -14,8 +14,11 @@ from drone_mesh.lab.scenario import Endurance, Scenario, Streams
 from drone_mesh.lab.simulation import Simulation
 
 
-def run(duration_s: float, **endurance: Any) -> dict[str, float]:
+def run(
+    duration_s: float, obstacles: dict[str, Any] | None = None, **endurance: Any
+) -> dict[str, float]:
     scenario = Scenario(
+        obstacles=obstacles or {},
         layout={"kind": "line", "drones": 5, "spacing_m": 6.0},
         routing="beacon",
         endurance={"hover_min": 4.0, "spares": 0.5, "swap_s": 20.0, **endurance},
@@ -35,6 +38,12 @@ def test_without_relief_the_mesh_goes_home_and_with_spares_its_posts_stay_held()
     assert held["least_charge"] > 20.0
     assert held["min_distance_m"] > 0.99
     assert held["reliefs"] > 10
+
+
+def test_drones_whose_way_home_is_closed_land_where_they_are():
+    shed = {"boxes": [{"center": [0.0, -30.0, 2.5], "size": [20.0, 20.0, 5.0]}]}
+    seen = run(300.0, shed, relief="none", pads=[[0.0, -30.0]])
+    assert (seen["fell"], seen["landed_astray"]) == (0, 4)
 
 
 def test_fewer_spares_than_the_bound_do_not_hold_the_posts():
