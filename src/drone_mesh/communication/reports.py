@@ -119,7 +119,7 @@ class NodeReporter:
 
     def __post_init__(self) -> None:
         self._words = ""  # the last ones sent
-        self._words_in = 0  # reports until they are repeated
+        self._words_in = 0  # regular reports until they are repeated
         self._regular_s = -math.inf  # when the next one is due, also if it stands
         self._sent_s = -math.inf
         self._has_moved = False  # since the last one
@@ -159,6 +159,7 @@ class NodeReporter:
         )
         control.delivery.send_own(report.packet(me, gateway))
         self._sent_s, self._has_moved = now_s, report.flying
+        self._words_in -= is_regular
         self._send_words(why_not, me, gateway)
 
     def _is_moving_report_due(self, now_s: float) -> bool:
@@ -174,7 +175,6 @@ class NodeReporter:
         return self._has_moved and is_due and antenna.data_room() > 0
 
     def _send_words(self, words: str, me: int, gateway: int) -> None:
-        self._words_in -= 1
         if words == self._words and (not words or self._words_in > 0):
             return
         self._words, self._words_in = words, WORDS_AGAIN_REPORTS

@@ -81,6 +81,16 @@ def test_why_it_cannot_fly_follows_in_words_when_it_changes_and_now_and_then():
     assert rig.sent(67) == [packet("01 01 43 00 00")]
 
 
+def test_in_flight_unchanged_words_are_repeated_no_more_often():
+    rig = router()
+    rig.engine.grounded = "battery low"
+    rig.wait(16.0)
+    rig.sent(67)
+    rig.mesh._pilot.goal = Location(9.0, 9.0, 9.0)
+    rig.wait(25.0)
+    assert rig.sent(67) == []
+
+
 def test_a_drone_without_a_place_says_so_and_logs_nothing(caplog):
     rig = router()
     rig.engine.place = None
