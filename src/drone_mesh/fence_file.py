@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import reprlib
 from pathlib import Path
@@ -11,7 +10,8 @@ from typing import Any, Iterator, Mapping, Sequence
 from drone_mesh.drone.fence import Fence, Zone
 from drone_mesh.drone.flight_path import Point
 from drone_mesh.drone.geodesy import EarthPlace, Origin
-from drone_mesh.earth_files.geojson import features_of
+from drone_mesh.earth_files.geojson import features_of, read_json
+from drone_mesh.earth_files.plan import MAX_PLAN_CHARACTERS, Plan, read_plan
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.yaml_file import is_number, read_mapping, read_text
 
@@ -42,14 +42,15 @@ def rows_of_file(path: str | Path, origin: Origin | None = None) -> list[Row]:
         return rows
     if origin is None:
         raise ConfigurationError(f"{path}: its places are in degrees: that needs an origin")
+    text = read_text(path, most_bytes=MAX_PLAN_CHARACTERS)
     try:
-        content = json.loads(read_text(path))
-        rows = list((_of_plan if kind == ".plan" else _of_geojson)(content, origin))
-        fence = fence_of(rows)
-        if kind == ".plan":
-            _check_rally_points(content, fence, origin)
-    except (ValueError, RecursionError) as error:
-        raise ConfigurationError(f"{path}: not JSON: {error}") from error
+        if kind != ".plan":
+            rows = list(_of_geojson(read_json(text), origin))
+            fence_of(rows)
+        else:
+            plan = read_plan(text)
+            rows = list(_of_plan(plan.geo_fence, origin))
+            _check_rally_points(plan, fence_of(rows), origin)
     except ConfigurationError as error:
         raise ConfigurationError(f"{path}: {error}") from error
     return rows
@@ -159,10 +160,9 @@ def _places(ring: Any, origin: Origin) -> list[list[float]]:
     return places
 
 
-def _of_plan(content: Any, origin: Origin) -> Iterator[Row]:
+def _of_plan(fence: Row, origin: Origin) -> Iterator[Row]:
     """The geofence of a plan, version 2. It has no names and no heights."""
-    fence = content.get("geoFence") if isinstance(content, dict) else None
-    if not isinstance(fence, dict) or fence.get("version") != 2:
+    if fence.get("version") != 2:
         raise ConfigurationError("not a plan with a geofence of version 2: save it in a newer QGC")
     for number, polygon in enumerate(_list(fence.get("polygons", [])), start=1):
         corners = [_metres(*_pair(place), origin) for place in _list(_key(polygon, "polygon"))]
@@ -175,11 +175,9 @@ def _of_plan(content: Any, origin: Origin) -> Iterator[Row]:
         yield {"name": name, "inclusion": side, "center": center, "radius": radius}
 
 
-def _check_rally_points(plan: Any, fence: Fence, origin: Origin) -> None:
+def _check_rally_points(plan: Plan, fence: Fence, origin: Origin) -> None:
     """An autopilot that flew to one outside would break the fence, and land where it is then."""
-    rally = plan.get("rallyPoints")
-    points = rally.get("points") if isinstance(rally, dict) else None
-    for number, place in enumerate(points or [], start=1):
+    for number, place in enumerate(_list(plan.rally_points.get("points", [])), start=1):
         x, y = _metres(*_pair(place), origin)
         why_not = fence.why_not((x, y, 0.0))
         if why_not:

@@ -126,7 +126,11 @@ def test_the_areas_of_each_kind_of_file_are_in_the_metres_of_the_mesh(
         ("a.plan", plan(circles=[{"circle": {"center": [52, 5]}, "inclusion": True}]), "radius"),
         ("a.plan", plan(rally=[(30, 0)]), "rally point 1 is outside fence polygon 1"),
         ("a.plan", plan(rally=[(10, 10)]), "rally point 1 is inside fence circle 1"),
+        ("a.plan", {**plan(), "rallyPoints": {"points": 3}}, "3 is not a list"),
+        ("a.plan", {**plan(), "fileType": "Mission"}, "its fileType is not Plan"),
         ("a.plan", "{", "not JSON"),
+        ("a.geojson", "[" * 100_000, "nested too deeply"),
+        ("a.geojson", " " * 2_000_000, "larger than"),
         ("a.geojson", {"type": "FeatureCollection", "features": []}, "0 areas"),
         ("a.yaml", "areas: 3", "line 1: expected 'areas:'"),
         (
@@ -152,6 +156,7 @@ def test_a_file_that_is_no_fence_is_refused_with_one_line_that_names_it(
         read_fence(path, ORIGIN)
     assert words in str(refused.value)
     assert str(refused.value).startswith(str(path))
+    assert str(refused.value).count(str(path)) == 1
     assert "\n" not in str(refused.value)
 
 

@@ -159,6 +159,7 @@ AREAS = {
     "geometry": {"type": "Polygon", "coordinates": [[[y, x] for x, y in CORNERS]]},
 }
 PLAN = {
+    "fileType": "Plan",
     "geoFence": {
         "version": 2,
         "polygons": [{"inclusion": True, "polygon": CORNERS}],
