@@ -131,6 +131,8 @@ def test_a_drone_that_its_pilot_flew_out_of_the_limits_is_not_led_further() -> N
 POND = Zone.circle("pond", (0.0, 20.0), 5.0, inside=False)
 SHED = Zone("shed", (((-50, 15), (50, 15), (50, 25), (-50, 25)),), highest_m=15.0)
 FAR = Zone("far", (((90, 0), (99, 0), (99, 9)),))
+WIRE = Zone("wire", (((30, -9), (31, -9), (31, 9), (30, 9)),), lowest_m=5.0)
+ROOF = Zone("roof", (((-9, -9), (9, -9), (9, 9), (-9, 9)),), lowest_m=2.0)
 LOW = Zone("low", (((-60, -60), (60, -60), (60, 60), (-60, 60)),), highest_m=6.0)
 
 
@@ -142,6 +144,8 @@ LOW = Zone("low", (((-60, -60), (60, -60), (60, 60), (-60, 60)),), highest_m=6.0
         (Fence.of([], [POND]), (40.0, 0.0, 5.0), "", 12.0),
         (Fence.of([], [SHED]), (40.0, 0.0, 5.0), "", 15.5),
         (Fence.of([LOW], [POND]), (40.0, 0.0, 5.0), "", 5.5),
+        (Fence.of([], [WIRE]), (40.0, 0.0, 2.0), "", 12.0),  # in its layer: it is not in the way
+        (Fence.of([], [ROOF]), (40.0, 0.0, 0.5), "no path", 0.0),  # it takes off to 3 m
         (Fence.of([LOW, FAR], []), (1.0, 98.0, 5.0), "no path", 0.0),
     ],
 )  # fmt: skip
@@ -159,3 +163,23 @@ def test_it_flies_round_over_or_under_what_the_fence_forbids_or_refuses(
         assert not fence.why_not(rig.place._replace(height=max(0.0, rig.place.height)).to_vector())
     assert rig.place.distance_m(Location(*goal)) < 1.0
     assert max(rig.heights) == pytest.approx(highest_m, abs=0.3)
+
+
+@pytest.mark.parametrize(
+    ("height_m", "top_m", "lowest_m"),
+    [(30.0, 50.0, 30.0), (30.0, 20.0, 12.0)],  # it goes down only if it is above the fence
+)
+def test_a_drone_that_is_outside_goes_down_there_only_if_it_has_to(
+    height_m: float, top_m: float, lowest_m: float
+) -> None:
+    yard = Zone("yard", (((-60, -60), (60, -60), (60, 60), (-60, 60)),), highest_m=top_m)
+    rig = Rig(fence=Fence.of([yard], []))
+    lift(rig.vehicle, height_m)
+    rig.vehicle.body.place = Location(70.0, 0.0, height_m)
+    rig.ready()
+    rig.vehicle.choose_mode(Mode.FOLLOW)
+    rig.run(2.0)
+    rig.heights.clear()
+    rig.goal(40.0, 0.0, 5.0)
+    rig.run_until("it is inside", lambda: rig.place.latitude < 60.0)
+    assert min(rig.heights) == pytest.approx(lowest_m, abs=0.3)

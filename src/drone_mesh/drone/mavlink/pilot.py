@@ -319,25 +319,33 @@ class MavlinkPilot:
     def _way(
         self, start: Location, goal: Location, home: Location
     ) -> tuple[float, tuple[Point, ...]]:
-        """Height and corners of the shortest way that keeps the fences. Raises GoalRefused."""
+        """Height and corners of a way that keeps the fences. Raises GoalRefused.
+
+        Straight in its layer, else the shortest; it never goes down first, unless it is outside and
+        there is no other way: what is below it there is not known.
+        """
         fence, ceiling_m = self._fence, self._limits.ceiling_m(home)
-        lowest_m = goal.height  # one that is too high goes down first
-        if not fence.why_not(start.to_vector()):
-            lowest_m = max(start.height, goal.height)
-        usual_m = max(min(self._cruise_m, ceiling_m), lowest_m)
+        one, other = start.to_vector(), goal.to_vector()
+        usual_m = max(min(self._cruise_m, ceiling_m), goal.height)
+        level_m = max(usual_m, start.height)
         below = (height_m - CLEAR_M for height_m in fence.ceilings)
-        above = sorted(rule.top_m + CLEAR_M for rule in fence.rules)
-        others = [*(h for h in below if h < usual_m), *(h for h in above if h > usual_m)]
-        ways: list[tuple[float, float, tuple[Point, ...]]] = []  # by their length
-        for height_m in (usual_m, *(h for h in others if lowest_m <= h <= ceiling_m)):
-            around = way_across(fence, (), start.to_vector(), goal.to_vector(), height_m)
+        above = (rule.top_m + CLEAR_M for rule in fence.rules)
+        lowest_m = max(goal.height, home.height + TAKE_OFF_M)
+        heights = {h for h in below if lowest_m <= h < usual_m}
+        heights |= {usual_m, *(h for h in above if usual_m < h <= ceiling_m)}
+        if not fence.why_not(one):
+            heights = {h for h in heights if h >= start.height}
+        ways: list[tuple[bool, float, float, tuple[Point, ...]]] = []  # by their length
+        for height_m in (level_m, *(heights - {level_m})):
+            around = way_across(fence, (), one, other, height_m)
+            if around == () and height_m == level_m:
+                return height_m, around
             if around is not None:
-                level = [start.to_vector()[:2], *around, goal.to_vector()[:2]]
-                ways.append(
-                    (2.0 * height_m + sum(map(math.dist, level, level[1:])), height_m, around)
-                )
+                level = [one[:2], *around, other[:2]]
+                length_m = 2.0 * height_m + sum(map(math.dist, level, level[1:]))
+                ways.append((height_m < start.height, length_m, height_m, around))
         if ways:
-            return min(ways)[1:]
+            return min(ways)[2:]
         raise GoalRefused(
             fence.why_not(goal.to_vector()) or f"no path that keeps fence {fence.names}"
         )
