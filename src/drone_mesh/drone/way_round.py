@@ -73,13 +73,17 @@ def way_round(
 def _shortest(
     obstacles: Sequence[InTheWay], start: Point, goal: Point, height_m: float
 ) -> tuple[Point, ...] | None:
-    """A* over their corners; two see each other if nothing is between them."""
+    """A* over their corners; two see each other if nothing is between them.
+
+    That is asked only of legs that the shortest way may have: it takes most of the time.
+    """
     points = [start, goal, *(c for one in obstacles for c in one.turns(height_m))]
     came_from: dict[int, int] = {}
     waiting = [(0.0, 0.0, 0, 0)]  # least total length, length so far, point, previous point
     while waiting:
         _least, metres, here, before = heapq.heappop(waiting)
-        if here in came_from:
+        leg = points[before], points[here]
+        if here in came_from or any(_is_met(one, *leg, height_m) for one in obstacles if here):
             continue
         came_from[here] = before
         if here == 1:
@@ -88,12 +92,9 @@ def _shortest(
                 way.append(came_from[way[-1]])
             return tuple(points[index] for index in reversed(way))
         for other, point in enumerate(points):
-            if other in came_from or any(
-                _is_met(one, points[here], point, height_m) for one in obstacles
-            ):
-                continue
-            until = metres + math.dist(points[here], point)
-            heapq.heappush(waiting, (until + math.dist(point, goal), until, other, here))
+            if other not in came_from:
+                until = metres + math.dist(points[here], point)
+                heapq.heappush(waiting, (until + math.dist(point, goal), until, other, here))
     return None
 
 

@@ -10,6 +10,7 @@ import pytest
 from drone_mesh.air.obstacles import Box, Obstacles
 from drone_mesh.drone.fence import CLEAR_M, Fence, Zone
 from drone_mesh.drone.flight_path import FlightPath
+from drone_mesh.drone.way_round import way_round
 from drone_mesh.errors import ConfigurationError
 
 SQUARE = ((0.0, 0.0), (20.0, 0.0), (20.0, 20.0), (0.0, 20.0))
@@ -122,6 +123,24 @@ def test_random_flights_past_boxes_and_fences_never_leave():
                 assert not fence.why_not(place)
                 assert obstacles.is_free(place)
     assert flown > 10
+
+
+def test_a_way_round_many_corners_asks_of_few_legs():
+    """A pilot sends its autopilot nothing meanwhile."""
+    lake = Zone.circle("lake", (0.0, 0.0), 30.0, inside=False)
+    (rule,) = Fence.of([], [Zone("lake", lake.rings)]).rules  # 64 turns
+    asked = []
+
+    class Asked:
+        turns = rule.turns
+
+        def meets(self, a, b):
+            asked.append(a)
+            return rule.meets(a, b)
+
+    way = way_round([Asked()], (-40.0, 0.0), (40.0, 0.0), 5.0)
+    assert way is not None
+    assert len(asked) < 1200  # of the 2145 between two of its corners
 
 
 def test_without_a_fence_flights_are_as_before():
