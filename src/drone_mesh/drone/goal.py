@@ -6,6 +6,7 @@ import itertools
 import math
 from typing import Mapping
 
+from drone_mesh.drone.fence import Fence
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused
 
@@ -14,7 +15,12 @@ MAX_HEIGHT_M = 500.0  # height of the underside: 0..500 m
 ROUNDING_M = 0.01  # places travel as float32 and in steps
 
 
-def check_goal(latitude: float, longitude: float, height: float) -> None:
+def check_goal(
+    latitude: float,
+    longitude: float,
+    height: float,
+    fence: Fence = Fence(),  # noqa: B008 (frozen)
+) -> None:
     """Raise GoalRefused unless a drone may fly to this position (metres, world frame)."""
     bounds = (
         ("latitude", latitude, -MAX_COORDINATE_M, MAX_COORDINATE_M),
@@ -26,6 +32,9 @@ def check_goal(latitude: float, longitude: float, height: float) -> None:
             raise GoalRefused(f"{name} {value} is not a finite number of metres")
         if not lowest <= value <= highest:
             raise GoalRefused(f"{name} {value:g} m is outside {lowest:g}..{highest:g} m")
+    why_not = fence.why_not((longitude, latitude, height)) if fence.rules else ""
+    if why_not:
+        raise GoalRefused(why_not)
 
 
 def check_apart(goals: Mapping[int, Location], clearance_m: float) -> None:

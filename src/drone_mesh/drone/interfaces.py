@@ -16,6 +16,7 @@ class IDroneEngine(abc.ABC):
     """
 
     fence = Fence()  # of the whole mesh; whoever creates the engine sets it
+    """The mesh gives it no goal outside. That its way does not lead outside is up to the engine."""
 
     @abc.abstractmethod
     def set_goal(self, latitude: float, longitude: float, height: float) -> None:
@@ -28,13 +29,6 @@ class IDroneEngine(abc.ABC):
     def why_not_fly(self) -> str:
         """Why the drone cannot fly to a goal now; empty if it can."""
         return ""
-
-    def fences(self) -> Fence:
-        """All fences that this drone keeps: the mesh's, and its own if it has one.
-
-        The mesh gives it no goal outside. That its way does not lead outside is up to the engine.
-        """
-        return self.fence
 
     def can_fly(self) -> bool:
         """Whether the drone can fly to a goal now. Override `why_not_fly` instead."""

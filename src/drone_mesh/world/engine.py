@@ -115,10 +115,7 @@ class DroneEngine(IDroneEngine):
         flight from the current position. Raises GoalRefused for NaN, infinity, positions out of
         bounds or outside the fence, and goals that obstacles or the fence make unreachable.
         """
-        check_goal(latitude, longitude, height)
-        why_not = self.fence.why_not((longitude, latitude, height))
-        if why_not:
-            raise GoalRefused(why_not)
+        check_goal(latitude, longitude, height, self.fence)
         goal = Location(latitude, longitude, height + self._half_height_m).to_vector()
         if self._plan(self._state.position, goal, self._world.now_s) is None:
             where = f"x {longitude:g} m, y {latitude:g} m, z {height:g} m"

@@ -166,4 +166,4 @@ def test_a_drone_of_the_world_refuses_a_goal_outside_and_flies_lower_than_usual(
 
 def test_the_engine_of_a_pi_has_the_fence_of_its_options():
     engine = create_engine(1, None, FlightOptions(fence=FENCE))
-    assert engine.fences().why_not((31.0, 0.0, 0.0)) == "outside fence yard"
+    assert engine.fence.why_not((31.0, 0.0, 0.0)) == "outside fence yard"

@@ -120,13 +120,12 @@ class Pilot:
         Returns False if the drone already flies there. Raises GoalRefused, and changes nothing, if
         it cannot fly, or the goal is out of bounds, outside a fence or refused by the engine.
         """
-        check_goal(*goal)
+        check_goal(*goal, self._engine.fence)
         why_not = self._engine.why_not_fly()
         if why_not:
             raise GoalRefused(f"drone {self._node_id} cannot fly: {why_not}")
         if self.goal == goal:
             return False
-        self._check(goal)
         self._engine.set_goal(*goal)
         self._begin(goal)
         return True
@@ -135,16 +134,11 @@ class Pilot:
         """Start a repair flight, or change the goal of the current one."""
         flight = self._begin(goal)
         try:
-            self._check(goal)
+            check_goal(*goal, self._engine.fence)
             self._engine.step_back_to(*goal)
         except GoalRefused as error:  # the flight ends as soon as the drone stands still
             flight.may_begin = False
             self._complaints.add("goal refused", str(error), self._deadlines.now_s)
-
-    def _check(self, goal: Location) -> None:
-        why_not = self._engine.fences().why_not(goal.to_vector())
-        if why_not:
-            raise GoalRefused(why_not)
 
     def _begin(self, goal: Location) -> Flight:
         here = self.location()

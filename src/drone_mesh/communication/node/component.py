@@ -286,17 +286,17 @@ class MeshnetworkComponent(NodeSnapshots, IMeshNetwork, IControlHost):
         now_s, due_s = self._deadlines.now_s, self._deadlines.at_s[Due.CHECK]
         period_s = self._timing.check_period_s
         self._deadlines.set(Due.CHECK, due_s + period_s * ((now_s - due_s) // period_s + 1.0))
-        self._look_at_fences()
+        self._look_at_fence()
         if self._antenna.on():
             self._check(due_s)
         else:
             self._antenna_is_off()
 
-    def _look_at_fences(self) -> None:
-        """Say so if the drone is outside one; it may then only fly inside."""
-        fences = self._engine.fences()
-        here = self._pilot.place() if fences else None
-        why_not = "" if here is None else fences.why_not(here.to_vector())
+    def _look_at_fence(self) -> None:
+        """Say so if the drone is outside; it may then only fly inside."""
+        fence = self._engine.fence
+        here = self._pilot.place() if fence.rules else None
+        why_not = "" if here is None else fence.why_not(here.to_vector())
         if why_not:
             self.complaints.add("the drone is where it may not be", why_not, self._deadlines.now_s)
 

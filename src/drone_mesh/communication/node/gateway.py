@@ -112,10 +112,7 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         self._deadlines.now_s = now_s
         if not 0 <= node_id <= MAX_NODE_ID:
             raise GoalRefused(f"invalid drone id {node_id}: must be 0..{MAX_NODE_ID}")
-        check_goal(latitude, longitude, height)
-        why_not = self._engine.fence.why_not((longitude, latitude, height))
-        if why_not:
-            raise GoalRefused(why_not)
+        check_goal(latitude, longitude, height, self._engine.fence)
         if height != int(height):
             raise GoalRefused(f"invalid height {height} m: must be in whole metres")
         goal = Location(latitude, longitude, height)

@@ -170,21 +170,21 @@ class RepairActions(abc.ABC):
         return [
             Step(place, owner, home=owner == gateway != NO_ROUTE)
             for known, owner in candidates
-            for place in self.within_fences(known)
+            for place in self.within_fence(known)
             if may_be_flown_to(place)
         ]
 
-    def within_fences(self, place: Location | None) -> list[Location]:
-        """A known place, or the nearest one to it that the fences allow, if there is one."""
-        fences = self._engine.fences()
-        if place is None or not fences:
+    def within_fence(self, place: Location | None) -> list[Location]:
+        """A known place, or the nearest one to it that the fence allows, if there is one."""
+        fence = self._engine.fence
+        if place is None or not fence:
             return [] if place is None else [place]
-        inside = fences.nearest_inside(at_whole_metres(place).to_vector())
+        inside = fence.nearest_inside(at_whole_metres(place).to_vector())
         return [] if inside is None else [Location.from_vector(inside)]
 
     def why_not_there(self, place: Location) -> str:
-        """Why the fences do not allow a place; empty if they do."""
-        return self._engine.fences().why_not(place.to_vector())
+        """Why the fence does not allow a place; empty if it does."""
+        return self._engine.fence.why_not(place.to_vector())
 
     @property
     def gateway_place(self) -> Location | None:

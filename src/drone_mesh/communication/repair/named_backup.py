@@ -195,7 +195,7 @@ class NamedBackup(Nearest):
         if place is None or mesh.now_s - named_s > NAMED_FOR * mesh.check_period_s:
             return None
         known = [step for step in mesh.steps if step.owner == node]  # as late as can be
-        known += [Step(inside, node) for inside in mesh.within_fences(place)]
+        known += [Step(inside, node) for inside in mesh.within_fence(place)]
         if not known:
             return None
         step = known[0]

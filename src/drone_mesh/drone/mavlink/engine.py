@@ -9,6 +9,7 @@ from collections import deque
 
 from drone_mesh.drone.fence import Fence
 from drone_mesh.drone.geodesy import Origin
+from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions
@@ -152,9 +153,7 @@ class MavlinkEngine(IDroneEngine):
         if home is None:  # the status has become stale since
             raise GoalRefused("the drone cannot fly: its home is not known")
         self._limits.check(goal, home)
-        why_not = self.fences().why_not(goal.to_vector())
-        if why_not:
-            raise GoalRefused(why_not)
+        check_goal(*goal, self.fence)
         self._goals.append((goal, lands, for_repair))
 
     def _run(self) -> None:
