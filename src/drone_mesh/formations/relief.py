@@ -288,7 +288,7 @@ class Relief:
         new, old = nodes.get(turn.new), nodes.get(-1 if turn.old is None else turn.old)
         if new is None or not new.on or new.crashed or now_s - turn.begin_s > GIVE_UP_S:
             self._turns.remove(turn)
-            orders.withdraw(turn.number)
+            orders.end(turn.number)
             if turn.old is None:
                 self._empty.append(turn.places)
             if new is not None and new.on and not self._is_home(new):

@@ -184,6 +184,12 @@ class StandingOrders:
         order = self._orders.pop(number, None)
         return None if order is None else order.progress()
 
+    def end(self, number: int) -> None:
+        """Like withdraw, but its last progress, which is over, is still shown to who watches it."""
+        if number in self._orders:
+            for part in self._orders[number].parts.values():
+                part.replace()
+
     def on_event(self, event: EventRecord) -> None:
         """Process an event: a drone refused its order, or somebody else sent it elsewhere."""
         if len(event.peers) != 1:

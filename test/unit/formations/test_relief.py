@@ -130,6 +130,8 @@ def test_a_spare_that_does_not_come_is_called_back_and_another_relief_begins():
     assert list(mesh.sent()) == [2]
     mesh.spare.position = (0.0, 2.0, 4.0)  # it hangs there
     assert mesh.sent(130)[2] == HOME
+    (first,) = [p for p in mesh.orders.all_progress() if p.name == "drone 2 relieves drone 1"][:1]
+    assert first.is_over  # the page shows it until then
 
 
 def test_where_a_drone_is_ordered_is_its_post_from_then_on():
