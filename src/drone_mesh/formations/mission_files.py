@@ -25,6 +25,7 @@ from drone_mesh.errors import ConfigurationError
 from drone_mesh.yaml_file import read_text
 
 MOST_WAYPOINTS = 1000
+MOST_NOTES = 20  # they are logged in one line
 _READERS = {".plan": read_plan, ".waypoints": read_waypoints}
 
 # MAV_CMD and MAV_FRAME of MAVLink's common.xml
@@ -120,7 +121,10 @@ class _Way:
                 raise ConfigurationError(f"{item.where}: {error}") from error
         told = [f"{what}{_names(items)}" for what, items in self._told.items()]
         unread = [f"not flown: {what}" for what in plan.unread]
-        return DrawnMission(self._places, self._speed_m_s, [*told, *unread])
+        notes = [*told, *unread]
+        if len(notes) > MOST_NOTES:
+            notes[MOST_NOTES:] = [f"and {len(notes) - MOST_NOTES} more such notes"]
+        return DrawnMission(self._places, self._speed_m_s, notes)
 
     def _take(self, item: PlanItem, plan: Plan) -> None:
         command, values = item.command, item.values

@@ -186,3 +186,9 @@ def test_a_file_of_missions_names_the_drone_of_a_drawn_one(tmp_path, caplog):
         read_missions(path, ORIGIN)
     with pytest.raises(ConfigurationError, match=r"says not which drone flies it: name both in a"):
         read_missions(tmp_path / "a.waypoints", ORIGIN)
+
+
+def test_a_file_with_thousands_of_unknown_commands_is_told_of_in_one_short_line():
+    _flown, drawn = read(waypoints(A, *((5000 + n, 3, NONE, [0, 0, 0]) for n in range(3000))))
+    assert len(drawn.in_words()) < 2000
+    assert drawn.notes[-1] == "and 2981 more such notes"
