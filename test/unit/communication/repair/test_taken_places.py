@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import pytest
+
 from drone_mesh.communication.control.places import KnownPlaces
 from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.repair.options import RepairOptions
-from drone_mesh.communication.repair.spots import TakenPlaces
+from drone_mesh.communication.repair.spots import Landing, TakenPlaces
 from drone_mesh.communication.timing import UNDISTURBED, Deadlines
 from drone_mesh.drone.location import Location
 
@@ -22,3 +24,22 @@ def test_a_spot_that_is_clear_of_a_rounded_place_is_clear_of_the_drone_itself():
     assert spot.distance_m(told) > 1.0 > 0.96
     assert not taken.is_free(spot)
     assert taken.is_free(Location(latitude=-0.1, longitude=0.0, height=0.0))
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_way_aside_and_a_spot_beside_are_on_the_side_that_the_fence_allows(side):
+    neighbours = Neighbours(UNDISTURBED, 30.0, 9.0)
+    neighbours.set_place(7, Location(latitude=0.0, longitude=10.0, height=10.0), 0.0)
+    options, places = RepairOptions(clearance_m=1.0, range_m=30.0), KnownPlaces()
+
+    def allows(place: Location) -> bool:
+        return side * place.latitude >= 0.0
+
+    taken = TakenPlaces(1, Deadlines(), neighbours, places, options, allows)
+    here, end = Location(0.0, 0.0, 0.0), Location(0.0, 20.0, 0.0)
+    assert not taken.is_clear(taken.way(here, end))
+    aside = taken.aside(here, end)
+    assert aside != end
+    assert allows(aside)
+    gone = Location(latitude=-side * 0.2, longitude=15.0, height=0.0)
+    assert allows(taken.at_or_beside(gone, Landing(here)))
