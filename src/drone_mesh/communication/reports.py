@@ -166,11 +166,12 @@ class NodeReporter:
         """Whether a drone in flight, or one that has just landed, is to report again.
 
         A report takes a frame on each hop. It waits where packets collide, and for the messages of
-        users: nobody counts who else flies.
+        users. Nobody counts who else flies: within h hops there may be as many as h squared.
         """
         self._has_moved = self._has_moved or self._pilot.goal is not None
         antenna, hops = self._antenna, self._control.hops
-        period_s = antenna.medium.report_frame_s * hops * (1.0 + antenna.patience())
+        frames = hops * max(1.0, hops / 2)
+        period_s = antenna.medium.report_frame_s * frames * (1.0 + antenna.patience())
         is_due = now_s >= self._sent_s + max(LOOK_PERIOD_S, period_s)
         return self._has_moved and is_due and antenna.data_room() > 0
 

@@ -147,7 +147,7 @@ class Medium:
     heard_periods: float = 0.0
     place_periods: float = 0.0
     data_pause_s: float = 0.005  # between bursts of users' packets
-    report_frame_s: float = 0.0  # in flight, reports take at most one frame in this time
+    report_frame_s: float = 0.0  # between two reports of a drone in flight at 1 hop
 
     @classmethod
     def for_hop(cls, hop_s: float) -> Medium:

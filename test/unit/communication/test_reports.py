@@ -6,7 +6,7 @@ import pytest
 from rig import Rig, packet
 
 from drone_mesh.communication.reports import NodeReport
-from drone_mesh.communication.timing import MeshTiming
+from drone_mesh.communication.timing import Medium, MeshTiming
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError
 
@@ -49,6 +49,18 @@ def test_in_flight_it_reports_every_second_and_once_after_its_landing():
     rig.mesh._pilot.goal = None
     rig.wait(8.0)
     assert len(rig.sent(66)) == 1
+
+
+@pytest.mark.parametrize(("hops", "reports"), [(1, 30), (2, 15), (4, 4), (6, 2)])
+def test_on_a_shared_channel_drones_that_are_further_away_report_less(hops, reports, monkeypatch):
+    rig = Rig(timing=REPORTING, medium=Medium.for_hop(0.002))
+    rig.connect_to_gateway()
+    monkeypatch.setattr(type(rig.mesh.control), "hops", hops)
+    rig.wait(16.0)
+    rig.sent(66)
+    rig.mesh._pilot.goal = Location(9.0, 9.0, 9.0)
+    rig.wait(60.0)
+    assert len(rig.sent(66)) == pytest.approx(reports, abs=2)
 
 
 def test_without_a_period_nothing_is_reported():
