@@ -16,6 +16,7 @@ from drone_mesh.drone.battery import PowerModel
 from drone_mesh.drone.fence import Fence
 from drone_mesh.drone.fleet import MAX_DRONES
 from drone_mesh.drone.flight_path import SPEED_M_S
+from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.goal import MAX_HEIGHT_M
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.fence_file import fence_of
@@ -243,6 +244,16 @@ class FenceSettings(Part):
     path: Optional[str] = None  # a file of them, beside the experiment
     origin: Optional[str] = None  # LAT,LON,ALT of x 0, y 0, for files in degrees
     areas: List[Dict[str, Any]] = []
+
+    @field_validator("origin")
+    @classmethod
+    def _is_origin(cls, origin: Optional[str]) -> Optional[str]:
+        try:
+            if origin is not None:
+                Origin.parse(origin)
+        except ConfigurationError as error:
+            raise ValueError(str(error)) from None
+        return origin
 
     @field_validator("areas")
     @classmethod

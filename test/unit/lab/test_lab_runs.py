@@ -533,7 +533,8 @@ def test_packets_arrive_as_often_as_the_fading_says(
 def test_the_fence_of_an_experiment_may_be_a_plan_of_a_ground_station(tmp_path):
     corners = [[52.0, 5.0], [52.001, 5.0], [52.001, 5.001]]
     polygon = {"polygon": corners, "inclusion": True}
-    plan = {"geoFence": {"version": 2, "polygons": [polygon], "circles": []}}
+    fence = {"version": 2, "polygons": [polygon], "circles": []}
+    plan = {"fileType": "Plan", "geoFence": fence}
     (tmp_path / "field.plan").write_text(json.dumps(plan), "utf-8")
     path = tmp_path / "x.yaml"
     path.write_text('name: x\nbase:\n  fence: {path: field.plan, origin: "52,5,0"}\n', "utf-8")
