@@ -174,6 +174,7 @@ def test_a_page_is_greeted_and_then_gets_everything():
                 "coordinate": 5000.0,
                 "height": 500.0,
                 "id": 253,
+                "characters": 1_500_000,
                 "events": 1000,
                 "samples": 600,
             },
