@@ -7,6 +7,8 @@ import logging
 import signal
 import threading
 import time
+from dataclasses import replace
+from typing import Sequence
 
 from inprocess_mesh import InProcessMesh
 
@@ -19,7 +21,10 @@ from drone_mesh.console.runner import ConsoleRunner
 from drone_mesh.console.server import ALL_ACTIONS, FRAME_PERIOD_S, ConsoleServer
 from drone_mesh.console.tiles import open_tiles
 from drone_mesh.drone.geodesy import Origin
+from drone_mesh.fence_file import read_fence
 from drone_mesh.formations.layouts import Layouts
+from drone_mesh.state.model import AreaStatus
+from drone_mesh.state.observation import describe_fence
 from drone_mesh.web.access import access_for
 
 LAYOUTS = [
@@ -30,9 +35,9 @@ LAYOUTS = [
 ]
 
 
-def feed(mesh: InProcessMesh, store: FrameStore) -> None:
+def feed(mesh: InProcessMesh, store: FrameStore, fence: Sequence[AreaStatus]) -> None:
     status, events = mesh.read()
-    store.update_mesh(status, time.monotonic())
+    store.update_mesh(replace(status, fence=fence), time.monotonic())
     if events:
         store.add_events(events)
 
@@ -76,6 +81,7 @@ def main(arguments: list[str] | None = None) -> None:
         "--recorded", type=float, default=0.0, help="simulated seconds of a recording; 2 a second"
     )
     parser.add_argument("--origin", default="", metavar="LAT,LON,ALT")
+    parser.add_argument("--fence", default="", metavar="FILE")
     parser.add_argument("--tiles", default="", metavar="MAP")
     parser.add_argument("--real", action="store_true", help="offer what a real gateway can do")
     options = parser.parse_args(arguments)
@@ -84,6 +90,7 @@ def main(arguments: list[str] | None = None) -> None:
     whole = recorded(options) if options.recorded else None
     mesh.skip(options.skip)
     origin = Origin.parse(options.origin) if options.origin else None
+    fence = describe_fence(read_fence(options.fence, origin)) if options.fence else ()
     store = FrameStore(History() if whole is None else None, origin)
     access = access_for(options.address, options.token)
     server = ConsoleServer(
@@ -114,7 +121,7 @@ def main(arguments: list[str] | None = None) -> None:
     def feed_once() -> None:
         if options.haste and not mesh.paused:
             mesh.skip(FRAME_PERIOD_S * mesh.factor * options.haste)
-        feed(mesh, store)
+        feed(mesh, store, fence)
         server.show_packets(*mesh.packets(FRAME_PERIOD_S))
         is_fed.set()
 

@@ -435,7 +435,7 @@ DRAW_LOST = """async (count) => {
     stroke();
   };
   const mesh = { nodes, links: { known: [], lost, route: [], soon: [] }, clock: {}, obstacles: [],
-    trails: new Map(), selected: null, group: new Set() };
+    fence: [], trails: new Map(), selected: null, group: new Set() };
   const options = { known: true, ranges: false, cast: new Set(),
     covered: { top: 0, bottom: 0 } };
   const drawn = drawMesh(context, new Camera(), mesh, readColours(), options, []);
@@ -583,6 +583,41 @@ GRID_CALLS = """() => new Promise((done) => {
 
 def test_no_line_of_the_grid_is_drawn_through_its_numbers(page):
     assert page.page.evaluate(GRID_CALLS)[:3] == ["stroke", "fillText", "fillText"]
+
+
+YARD = """areas:
+  - {name: yard, polygon: [[-5, -5], [40, -5], [40, 30], [-5, 30]], max_height: 30,
+     holes: [[[0, 20], [4, 20], [4, 24], [0, 24]]]}
+  - {name: tower, inclusion: false, center: [25, 12], radius: 5, min_height: 2, max_height: 20}
+"""
+FENCE_CALLS = """() => new Promise((done) => {
+  const calls = [];
+  const context = CanvasRenderingContext2D.prototype;
+  for (const name of ["stroke", "fill", "fillText"]) {
+    const call = context[name];
+    context[name] = function (...what) {
+      if (this.canvas.id === "map" && (what.length || this.getLineDash()[0] === 8))
+        calls.push(what[0] ?? "dashes");
+      return call.call(this, ...what);
+    };
+  }
+  document.querySelector("#zoom-out").click();
+  requestAnimationFrame(() => requestAnimationFrame(() => done(calls)));
+})"""
+
+
+def test_the_fence_is_drawn_with_its_names_and_heights(start_console, visit, tmp_path):
+    (tmp_path / "yard.yaml").write_text(YARD)
+    page = visit(start_console("--skip", "25", "--fence", str(tmp_path / "yard.yaml")).url)
+    page.wait_for_drones(len(PLACES))
+    calls = page.page.evaluate(FENCE_CALLS)
+    first = calls.index("dashes")
+    assert calls[first : first + 4] == [
+        "dashes", "yard, to 30 m", "evenodd", "tower, from 2 m to 20 m"
+    ]  # fmt: skip
+    legend = page.page.inner_text("#map-card .legend")
+    assert "stay inside" in legend
+    assert "stay out" in legend
 
 
 SHOWN_RATES = """async (whole) => {

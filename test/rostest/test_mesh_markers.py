@@ -93,6 +93,13 @@ class MeshMarkersTest(unittest.TestCase):
         wait_for("names", WALL_LIMIT_S, lambda: self.names() == ["0", "1", "2"])
         # 0 and 1 are 1 m apart, 0 and 2 are 7 m, 1 and 2 are 6 m: three links, two of them routes.
         wait_for("routes", WALL_LIMIT_S, lambda: self.points("links: route") == 4)
+        self.assertEqual(self.points("fence: stay in"), 2 * 4 * 2)  # an outline, and no height
+        # Three corners at two heights, and a post at each.
+        self.assertEqual(self.points("fence: stay out"), 2 * 3 * 3)
+        heights = {point.z for point in self.markers["fence: stay out", 0].points}
+        self.assertEqual(sorted(heights), [2.05, 20.05])
+        fence = [m.text for (name, _), m in self.markers.items() if name == "fence names"]
+        self.assertEqual(fence, ["yard", "tower"])
         wait_for("a known link", WALL_LIMIT_S, lambda: self.points("links: known") == 2)
 
     def test_2_a_node_that_is_off_is_grey_and_its_links_are_lost(self) -> None:

@@ -71,7 +71,7 @@ def record_in_an_older_definition(path: Path) -> None:
     """A bag with one state and one event, of messages without their newer fields."""
     newer = (
         r"(float32 (airtime|tries|battery)|uint16 queue|uint32 given_up|bool crashed|string \w+"
-        r"|Obstacle\[\] \w+) .*\n"
+        r"|(Obstacle|FenceArea)\[\] \w+) .*\n"
     )
     definition = re.sub(newer, "", MeshState._full_text)
     older = genpy.dynamic.generate_dynamic("drone_mesh/MeshState", definition)

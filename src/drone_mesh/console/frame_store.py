@@ -1,9 +1,9 @@
 """FrameStore: the state that a page should show, and its difference to what the page has.
 
 A frame is one JSON object: `version`, `clock`, `nodes` (id -> changed fields), `gone` (ids),
-`events` and `samples` (new ones), `obstacles`, `alarms` and `story` (complete, if they have
-changed). A page at version v gets what changed after v, however long ago: a page that falls behind
-gets a larger difference, and nothing is queued for it.
+`events` and `samples` (new ones), `obstacles`, `fence`, `alarms` and `story` (complete, if they
+have changed). A page at version v gets what changed after v, however long ago: a page that falls
+behind gets a larger difference, and nothing is queued for it.
 
 The fields of a node are those of NodeState.msg, plus decisions that the page only displays: the
 node's condition, the name of its colour, its trouble, its slot among nodes at the same position,
@@ -25,6 +25,7 @@ from drone_mesh.state.condition import Trouble, condition_of, find_trouble, summ
 from drone_mesh.state.doing import doings
 from drone_mesh.state.links import LinkForecast, LostLinks, known_links, links_by_use
 from drone_mesh.state.model import (
+    AreaStatus,
     EventRecord,
     MeshStatus,
     NodeStatus,
@@ -33,6 +34,7 @@ from drone_mesh.state.model import (
     data_in_words,
     footprint,
     position_is_known,
+    rings_of,
 )
 from drone_mesh.state.orders import OrderWatch
 from drone_mesh.state.outages import MeshSample, take_sample
@@ -75,6 +77,7 @@ class FrameStore:
         # What is sent complete: the version in which it changed, and the content.
         self._complete: dict[str, tuple[int, Any]] = {
             "obstacles": (0, []),
+            "fence": (0, []),
             "alarms": (0, []),
             "story": (0, {}),
         }
@@ -117,6 +120,7 @@ class FrameStore:
             del self._changed_at[gone]
             self._gone_at[gone] = self.version
         self._replace("obstacles", [_obstacle(box) for box in mesh.obstacles])
+        self._replace("fence", [_area(area) for area in mesh.fence])
         slots, does = fan_out(mesh.nodes), doings(mesh.nodes)
         for node in mesh.nodes:
             fields = _fields(node, troubles.get(node.id))
@@ -358,6 +362,15 @@ def _obstacle(box: ObstacleStatus) -> dict[str, Any]:
         "corners": [_centimetres(corner) for corner in footprint(box)],
         "top": round(float(box.center[2] + box.size[2] / 2), 2),
     }
+
+
+def _area(area: AreaStatus) -> dict[str, Any]:
+    low, high = (
+        round(float(height_m), 2) if math.isfinite(height_m) else None
+        for height_m in (area.lowest, area.highest)
+    )
+    rings = [[_centimetres(corner) for corner in ring] for ring in rings_of(area)]
+    return {"name": area.name, "inside": area.inside, "low": low, "high": high, "rings": rings}
 
 
 def _centimetres(metres: Sequence[float]) -> list[float]:

@@ -11,7 +11,7 @@ from typing import Any, Iterable, NamedTuple, Sequence
 
 from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.console.dots import RecordedDots
-from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus, ObstacleStatus
+from drone_mesh.state.model import AreaStatus, EventRecord, MeshStatus, NodeStatus, ObstacleStatus
 from drone_mesh.state.outages import MeshSample, take_sample
 
 KEPT_S = 1800.0  # simulated
@@ -45,7 +45,8 @@ def unpacked(state: bytes) -> MeshStatus:
     mesh: Any = MeshStatus(*json.loads(zlib.decompress(state)))  # of lists where records belong
     nodes = [NodeStatus(*_with_bytes(values)) for values in mesh.nodes]
     obstacles = [ObstacleStatus(*box) for box in mesh.obstacles]
-    whole: MeshStatus = replace(mesh, nodes=nodes, obstacles=obstacles)
+    fence = [AreaStatus(*area) for area in mesh.fence]
+    whole: MeshStatus = replace(mesh, nodes=nodes, obstacles=obstacles, fence=fence)
     return whole
 
 

@@ -40,7 +40,7 @@ from drone_mesh.lab.scenario_network import (
 from drone_mesh.lab.timeline import Timeline
 from drone_mesh.mobility import Track
 from drone_mesh.state.model import MeshStatus
-from drone_mesh.state.observation import describe_obstacles
+from drone_mesh.state.observation import describe_fence, describe_obstacles
 
 FLIGHT_SAMPLE_S = 0.25  # period of distance checks while a drone flies: 0.5 m at 2 m/s
 
@@ -91,9 +91,10 @@ class Simulation:
     def run(self, on_status: OnStatus | None = None) -> RunRecord:
         """Run to the end. `on_status` gets the state after each sample, for pictures."""
         boxes = describe_obstacles(obstacles_of(self.scenario).boxes)
+        fence = describe_fence(self.scenario.fence.fence())
         for _now_s in self.samples():
             if on_status is not None:
-                on_status(replace(self.network.status(), obstacles=boxes))
+                on_status(replace(self.network.status(), obstacles=boxes, fence=fence))
         return self.record()
 
     def samples(self) -> Iterator[float]:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import islice
 from typing import Iterable, Iterator, Sequence
 
 from drone_mesh.communication.control.router_states import RepairState
@@ -89,6 +90,24 @@ def footprint(box: ObstacleStatus) -> list[tuple[float, float]]:
 
 
 @dataclass(frozen=True)
+class AreaStatus:
+    """One area of the fence, as FenceArea.msg describes it."""
+
+    name: str
+    inside: bool  # drones stay inside any of these; otherwise out of it
+    lowest: float  # m; -inf: no lower end
+    highest: float  # m; inf: no upper end
+    corners: Sequence[float]  # (2 * corners,) m, map frame, ring after ring
+    rings: Sequence[int]  # how many corners each has; an odd number of rings surrounds the inside
+
+
+def rings_of(area: AreaStatus) -> list[list[tuple[float, float]]]:
+    """The corners of each ring of an area, in metres."""
+    corners = iter(zip(area.corners[::2], area.corners[1::2]))
+    return [list(islice(corners, size)) for size in area.rings]
+
+
+@dataclass(frozen=True)
 class EventRecord:
     """One event at one node, as MeshEvent.msg describes it."""
 
@@ -120,6 +139,7 @@ class MeshStatus:
     obstacles: Sequence[ObstacleStatus] = ()
     shape: str = ""  # how drones are drawn: a value of view.scene.Shape; empty: the default
     layouts: Sequence[str] = ()  # how far each ordered layout has come, in words
+    fence: Sequence[AreaStatus] = ()
 
 
 def channel_in_words(node: NodeStatus) -> str:

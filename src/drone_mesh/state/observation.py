@@ -15,12 +15,14 @@ from drone_mesh.communication.events.observer import MeshEvent, MeshEventKind
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.node.component import MeshnetworkComponent
 from drone_mesh.communication.repair.status import NOTHING_TO_REPAIR
+from drone_mesh.drone.fence import Fence
 from drone_mesh.drone.flight_path import FlightPath, Vector
 from drone_mesh.drone.roles import Role
 from drone_mesh.state.links import route_to_gateway
 from drone_mesh.state.model import (
     REPAIR_STATES,
     UNKNOWN_POSITION,
+    AreaStatus,
     EventRecord,
     NodeStatus,
     ObstacleStatus,
@@ -200,6 +202,21 @@ def describe_drone(
 def describe_obstacles(boxes: Iterable[Box]) -> list[ObstacleStatus]:
     """These boxes as parts of a MeshStatus."""
     return [ObstacleStatus(box.center, box.size, box.yaw_rad) for box in boxes]
+
+
+def describe_fence(fence: Fence) -> list[AreaStatus]:
+    """The areas of this fence as parts of a MeshStatus."""
+    return [
+        AreaStatus(
+            zone.name,
+            inside,
+            zone.lowest_m,
+            zone.highest_m,
+            [value for ring in zone.rings for corner in ring for value in corner],
+            [len(ring) for ring in zone.rings],
+        )
+        for zone, inside in fence.zones
+    ]
 
 
 def path_ahead(path: FlightPath, now_s: float, lower_by_m: float = 0.0) -> tuple[float, ...]:

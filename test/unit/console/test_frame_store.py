@@ -7,10 +7,12 @@ import math
 from dataclasses import replace
 
 from drone_mesh.console.frame_store import EVENTS_PER_FRAME, SAMPLES_KEPT, FrameStore
+from drone_mesh.drone.fence import Fence, Zone
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
 from drone_mesh.state.links import JUST_LOST_S
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus, ObstacleStatus
+from drone_mesh.state.observation import describe_fence
 from drone_mesh.state.outages import take_sample
 
 A, B = Location(3.0, 2.0, 0.0), Location(0.0, 0.0, 0.0)
@@ -67,6 +69,21 @@ def test_obstacles_are_sent_once_and_to_every_new_page():
     (shown,) = frame(store, 0)["obstacles"]
     assert sorted(shown["corners"]) == [[3.0, 0.0], [3.0, 2.0], [7.0, 0.0], [7.0, 2.0]]
     assert shown["top"] == 4.0
+
+
+def test_the_fence_is_sent_once_and_an_end_that_is_not_there_is_null():
+    store = FrameStore()
+    ring = [(0.0, 0.0), (9.0, 0.0), (9.0, 9.0)]
+    zones = [Zone("yard", (ring, [(6.0, 1.0), (7.0, 1.0), (7.0, 2.0)]), highest_m=30.0)]
+    store.update_mesh(replace(mesh(), fence=describe_fence(Fence.of(zones, ()))), wall_s=0.0)
+    known = store.version
+    store.update_mesh(replace(mesh(1.2), fence=describe_fence(Fence.of(zones, ()))), wall_s=0.2)
+    assert "fence" not in frame(store, known)
+    (area,) = frame(store, 0)["fence"]
+    rings = area.pop("rings")
+    assert area == {"name": "yard", "inside": True, "low": None, "high": 30.0}
+    assert [len(ring) for ring in rings] == [3, 3]
+    assert rings[1][2] == [7.0, 2.0]
 
 
 def test_a_page_that_fell_behind_gets_the_newest_of_all_it_missed():

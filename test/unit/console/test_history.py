@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
+import math
 
 from drone_mesh.console.history import History
 from drone_mesh.console.page import Player
-from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus, ObstacleStatus
+from drone_mesh.state.model import AreaStatus, EventRecord, MeshStatus, NodeStatus, ObstacleStatus
 
 
 def mesh(stamp_s: float, hops: int = 1, size: int = 1) -> MeshStatus:
@@ -41,6 +42,7 @@ def test_a_state_comes_back_as_it_was():
         ],
         obstacles=[ObstacleStatus([1.0, 2.0, 0.0], [1.0, 1.0, 3.0], 0.5)],
         layouts=["202: 1 of 9"],
+        fence=[AreaStatus("yard", True, -math.inf, 30.0, [0.0, 0.0, 9.0, 0.0, 9.0, 9.0], [3])],
     )
     history.add(given, wall_s=0.0)
     assert history.state(0) == given

@@ -94,6 +94,7 @@ export function drawMesh(context, camera, mesh, colours, options, goals) {
   context.lineCap = "round";
   drawGrid(context, camera, colours, options.top);
   for (const box of mesh.obstacles) drawObstacle(context, camera, box, colours);
+  for (const area of mesh.fence) drawArea(context, camera, area, colours, options.top);
   const selected = mesh.nodes.get(mesh.selected);
   if (options.ranges)
     for (const node of mesh.nodes.values()) drawRange(context, camera, mesh, node, colours, 0.35);
@@ -317,6 +318,38 @@ function drawObstacle(context, camera, box, colours) {
   context.font = "11px system-ui, sans-serif";
   context.textAlign = "center";
   context.fillText(`${Math.round(box.top)} m`, middle(0), middle(1) + 4);
+}
+
+/** An area of the fence; its name and heights stand at the highest of its corners that are in view, below `top`, px. */
+function drawArea(context, camera, { name, inside, low, high, rings }, colours, top) {
+  context.beginPath();
+  let at = null;
+  for (const ring of rings) {
+    for (const [index, [x, y]] of ring.entries()) {
+      const [px, py] = camera.toScreen(x, y);
+      if (index) context.lineTo(px, py);
+      else context.moveTo(px, py);
+      const seen = px >= 0 && px < camera.width && py > top + 16 && py < camera.height;
+      if (seen && (!at || py < at[1] - 0.5 || (py < at[1] + 0.5 && px < at[0]))) at = [px, py];
+    }
+    context.closePath();
+  }
+  context.strokeStyle = context.fillStyle = inside ? colours.accent : colours.disconnected;
+  if (!inside) {
+    context.globalAlpha = 0.15;
+    context.fill("evenodd");
+    context.globalAlpha = 1;
+  }
+  context.lineWidth = 2;
+  context.setLineDash(inside ? [8, 5] : []);
+  context.stroke();
+  context.setLineDash([]);
+  if (!at) return;
+  const to = high === null ? "" : `to ${high} m`;
+  const heights = [low === null ? "" : `from ${low} m`, to].filter(Boolean).join(" ");
+  context.font = "11px system-ui, sans-serif";
+  context.textAlign = "left";
+  context.fillText([name, heights].filter(Boolean).join(", "), at[0] + 2, at[1] - 5);
 }
 
 function metres(value, step) {

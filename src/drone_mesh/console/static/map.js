@@ -43,6 +43,8 @@ export class MapView {
     this.hover = card.querySelector("#hover");
     this.legendCrashed = card.querySelector("#legend-crashed");
     this.legendObstacle = card.querySelector("#legend-obstacle");
+    this.legendInside = card.querySelector("#legend-inside");
+    this.legendOutside = card.querySelector("#legend-outside");
     this.fly = fly;
     this.camera = new Camera();
     this.radius = 0; // of a drone, px
@@ -290,6 +292,8 @@ export class MapView {
     const nodes = [...this.mesh.nodes.values()];
     this.legendCrashed.hidden = !nodes.some((node) => node.condition === "crashed");
     this.legendObstacle.hidden = !this.mesh.obstacles.length;
+    this.legendInside.hidden = !this.mesh.fence.some(({ inside }) => inside);
+    this.legendOutside.hidden = this.mesh.fence.every(({ inside }) => inside);
     const outside = this.marks.reduce((sum, { ids }) => sum + ids.length, 0);
     Object.assign(this.note.dataset, drawn, { x, y, scale, outside });
   }

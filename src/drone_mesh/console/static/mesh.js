@@ -28,6 +28,7 @@ export class Mesh extends EventTarget {
     this.limits = { coordinate: Infinity, height: Infinity, events: Infinity, samples: Infinity };
     this.nodes = new Map(); // id -> node
     this.obstacles = []; // {corners: [[x, y]], top}, m
+    this.fence = []; // {name, inside, low, high, rings: [[[x, y]]]}, m; low and high may be null
     this.trails = new Map(); // id -> its last positions [x, y], m, one for every TRAIL_STEP_M
     this.links = { known: [], lost: [], route: [], soon: [] }; // use -> [[id, higher id]]
     this.events = [];
@@ -54,6 +55,7 @@ export class Mesh extends EventTarget {
       this.alarms = [];
     }
     if (frame.full || frame.obstacles) this.obstacles = frame.obstacles ?? [];
+    if (frame.full || frame.fence) this.fence = frame.fence ?? [];
     this.clock = frame.clock;
     this.link = frame.link;
     const changed = new Set();

@@ -13,12 +13,12 @@ from drone_mesh.drone.flight_path import Vector
 from drone_mesh.drone.location import Location
 from drone_mesh.formations.layouts import Order
 from drone_mesh.formations.missions import Mission
+from drone_mesh.msg import FenceArea, MeshState, NodeState, Obstacle
 from drone_mesh.msg import Location as LocationMsg
 from drone_mesh.msg import MeshEvent as MeshEventMsg
-from drone_mesh.msg import MeshState, NodeState, Obstacle
 from drone_mesh.ros.graph import names
 from drone_mesh.srv import FlyMissionRequest, OrderFormationRequest
-from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus, ObstacleStatus
+from drone_mesh.state.model import AreaStatus, EventRecord, MeshStatus, NodeStatus, ObstacleStatus
 
 _CODES = {kind.value: number for number, kind in enumerate(MeshEventKind)}  # as in MeshEvent.msg
 _MESH_FIELDS = [field.name for field in fields(MeshStatus) if field.name != "stamp_s"]
@@ -99,6 +99,7 @@ def state_msg(mesh: MeshStatus) -> MeshState:
         for node in mesh.nodes
     ]
     message.obstacles = [Obstacle(box.center, box.size, box.yaw) for box in mesh.obstacles]
+    message.fence = [FenceArea(**vars(area)) for area in mesh.fence]
     message.header.stamp = ros_time(mesh.stamp_s)
     message.header.frame_id = names.MAP_FRAME
     return message
@@ -118,6 +119,8 @@ def mesh_status(message: MeshState) -> MeshStatus:
         ]
     boxes = values.get("obstacles", ())
     values["obstacles"] = [ObstacleStatus(box.center, box.size, box.yaw) for box in boxes]
+    areas = values.get("fence", ())
+    values["fence"] = [AreaStatus(**_values(area, FenceArea.__slots__)) for area in areas]
     return MeshStatus(message.header.stamp.to_sec(), **values)
 
 

@@ -73,4 +73,6 @@ def _lines() -> list[tuple[str, Colour, float]]:
         ("flight path", DARK.path, 0.25),
         ("heading", DARK.muted, 0.25),
         ("obstacle", DARK.obstacle, 0.8),
+        ("stay inside", DARK.accent, 0.25),
+        ("stay out", DARK.disconnected, 0.25),
     ]

@@ -22,7 +22,14 @@ from drone_mesh.state.links import (
     links_by_use,
     shortest,
 )
-from drone_mesh.state.model import NodeStatus, ObstacleStatus, position_is_known, waypoints
+from drone_mesh.state.model import (
+    AreaStatus,
+    NodeStatus,
+    ObstacleStatus,
+    position_is_known,
+    rings_of,
+    waypoints,
+)
 from drone_mesh.view.palette import DARK, Colour, rgb  # rviz has a dark background
 from drone_mesh.view.quadrocopter import (
     BLADE_WIDTH_M,
@@ -44,6 +51,7 @@ LABEL_M = 0.5
 LINK_WIDTH_M = {LinkUse.ROUTE: 0.08, LinkUse.KNOWN: 0.03, LinkUse.LOST: 0.05}
 LINK_OPACITY = {LinkUse.ROUTE: 1.0, LinkUse.KNOWN: 0.6, LinkUse.LOST: 1.0}
 PATH_WIDTH_M = 0.06
+FENCE_WIDTH_M = 0.1
 OBSTACLE_OPACITY = 0.85
 
 _Place = Sequence[float]
@@ -73,6 +81,7 @@ class MarkerMaker:
         soon = self._forecast.update(known, nodes, state.header.stamp.to_sec(), state.max_distance)
         self._made = []
         self._add_obstacles(state.obstacles)
+        self._add_fence(state.fence)
         if shape_named(state.shape) is Shape.BOX:
             for role in Role:
                 of_role = [node for node in nodes if node.role == role]
@@ -146,6 +155,14 @@ class MarkerMaker:
                 marker.pose.position = _point(box.center)
                 marker.pose.orientation.z = math.sin(box.yaw / 2)
                 marker.pose.orientation.w = math.cos(box.yaw / 2)
+
+    def _add_fence(self, areas: Sequence[AreaStatus]) -> None:
+        for side, inside, colour in (("in", True, DARK.accent), ("out", False, DARK.disconnected)):
+            lines = [line for area in areas if area.inside is inside for line in _area_lines(area)]
+            self._add_lines(f"fence: stay {side}", lines, colour, FENCE_WIDTH_M)
+        for number, area in enumerate(areas):
+            place = (*area.corners[:2], max(_heights_m(area)))
+            self._add_text("fence names", number, [place], area.name, LABEL_M, LABEL_M)
 
     def _add_lines(
         self, name: str, lines: Sequence[_Line], colour: Colour, width_m: float, opacity: float = 1
@@ -222,6 +239,22 @@ class MarkerMaker:
 def _is_in_flight(node: NodeStatus) -> bool:
     """Whether a drone is on an ordered or decided flight, or flown by its pilot."""
     return len(node.path) > 0 or len(node.heading) > 0
+
+
+def _heights_m(area: AreaStatus) -> list[float]:
+    """At which its outline is drawn: at its ends; on the ground if it has no lower one."""
+    low_m = area.lowest if math.isfinite(area.lowest) else min(0.0, area.highest)
+    return [low_m, *([area.highest] if math.isfinite(area.highest) else [])]
+
+
+def _area_lines(area: AreaStatus) -> list[_Line]:
+    heights_m = _heights_m(area)
+    lines: list[_Line] = []
+    for ring in rings_of(area):
+        for start, end in zip(ring, (*ring[1:], ring[0])):
+            lines += [((*start, z), (*end, z)) for z in heights_m]
+            lines.append(((*start, heights_m[0]), (*start, heights_m[-1])))
+    return lines
 
 
 def _path_lines(nodes: Sequence[NodeStatus], positions: _Positions) -> list[_Line]:

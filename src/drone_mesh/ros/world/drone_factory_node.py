@@ -46,7 +46,7 @@ from drone_mesh.ros.world.pilots import start_pilots
 from drone_mesh.ros.world.world_runner import WorldRunner
 from drone_mesh.state.links import LostLinks, known_links
 from drone_mesh.state.model import EventRecord, MeshStatus
-from drone_mesh.state.observation import describe_obstacles
+from drone_mesh.state.observation import describe_fence, describe_obstacles
 from drone_mesh.view.scene import Scene, scene_of
 from drone_mesh.view.window_process import WindowProcess, require_screen
 from drone_mesh.world.dynamic_engine import BodyLimits
@@ -241,6 +241,7 @@ class RosSimulation:
             repair_strategy=str(configuration.node.repair),
             obstacles=describe_obstacles(obstacles.boxes if obstacles else ()),
             shape=configuration.shape,
+            fence=describe_fence(obstacles.fence) if obstacles else (),
         )
 
         def read() -> WorldView:
