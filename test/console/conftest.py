@@ -226,7 +226,10 @@ class Visit:
     ) -> None:
         deadline_s = time.monotonic() + within_s
         while not condition():
-            assert time.monotonic() < deadline_s, f"timed out: {what}, waited {within_s:g} s"
+            assert time.monotonic() < deadline_s, (
+                f"timed out: {what}, waited {within_s:g} s; {self.page.url} shows "
+                f"{[self.page.inner_text(part) for part in ('#clock', '#time-now', '#toasts')]}"
+            )
             self.page.wait_for_timeout(50)
 
     def answer_held(self, button: str) -> None:

@@ -131,7 +131,8 @@ def test_a_link_opens_the_moment_and_the_node_that_it_was_copied_from(start_cons
     page.wait_for("it says so", lambda: "to this moment" in page.page.inner_text("#toasts"))
     linked_s = float(page.page.url.partition("&t=")[2])
     other = visit(page.page.url)
-    other.wait_for("the same moment", lambda: clock_s(other) == clock_s(page))
+    at = f"the moment of {page.page.url}, where {page.page.inner_text('#clock')} is shown"
+    other.wait_for(at, lambda: clock_s(other) == clock_s(page))
     assert linked_s - 0.6 < clock_s(page) < linked_s + 0.1  # two states a second, one decimal
     other.wait_for("the same node", lambda: other.page.inner_text("#node-name") == "Router 5")
     own = other.page.inner_text("#node-events")
