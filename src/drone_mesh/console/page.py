@@ -49,9 +49,14 @@ class Player:
         self.show(times[index])
 
     def pause(self, paused: bool) -> None:
-        """Pause or resume."""
+        """Pause, at the time of the state that is shown, or resume.
+
+        A link names that time with two digits: a time between two states, rounded, could be of the
+        next one.
+        """
         self.paused, self._shown_s = paused, None  # the page must be informed
-        self.show(self.now_s)
+        times = self._history.times
+        self.show(times[self._history.index_at(self.now_s)] if paused else self.now_s)
 
     def show(self, at_s: float) -> None:
         """Show the mesh as it was at this time."""

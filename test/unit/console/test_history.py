@@ -101,6 +101,15 @@ def test_playing_adds_what_happened_since():
     assert [event["kind"] for event in frame["events"]] == ["connected"]
 
 
+def test_a_pause_is_at_the_time_of_the_state_that_is_shown():
+    """A link to 2.9996 s, which it names as 3.00, would show the next state."""
+    player = Player(filled(5), at_s=2.9996)
+    player.pause(True)
+    assert (player.now_s, shown(player)["clock"]["t"]) == (2.0, 2.0)
+    player.pause(False)
+    assert player.now_s == 2.0
+
+
 def test_a_step_pauses_and_ends_at_both_ends():
     player = Player(filled(), at_s=18.2)
     for expected_s in (19.0, 19.0):
