@@ -129,7 +129,8 @@ def _read(file: YamlFile, index: int, row: Any, origin: Origin | None) -> tuple[
     if is_drawn:
         name = value("file", "the name of a file", lambda v: isinstance(v, str))
         drawn = read_mission_file(Path(file.path).parent / name, origin)
-        _log.warning("%s: %s", name, drawn.in_words())
+        level = logging.WARNING if drawn.notes else logging.INFO
+        _log.log(level, "%s: %s", name, drawn.in_words())
     else:
         places = value("waypoints", "a list of [x, y] in metres", lambda v: _is_list(v, _is_point))
         drawn = DrawnMission([(float(x), float(y), 0.0) for x, y in places], None, [])

@@ -259,9 +259,11 @@ class FenceSettings(Part):
     @classmethod
     def _are_areas(cls, rows: List[Dict[str, Any]]) -> List[Dict[str, Any]]:
         try:
-            return rows if not rows or fence_of(rows) else []
+            if rows:
+                fence_of(rows)
         except ConfigurationError as error:
             raise ValueError(str(error)) from None
+        return rows
 
     def fence(self) -> Fence:
         """The fence, which may be none."""

@@ -423,9 +423,8 @@ class BeaconRoutes(IRoutes):
         for (is_other, *_rest), way in announcements:
             if not is_other:
                 yield way
-        yield from self._next_to(
-            node
-        )  # who hears it may be anybody; a child has it from its beacon
+        # After the children, which have it from its beacon: that it hears it, anybody may say.
+        yield from self._next_to(node)
         for _rank, way in announcements:
             yield way
         parent, before = self.neighbours.get(self.parent), self.neighbours.get(came_from)

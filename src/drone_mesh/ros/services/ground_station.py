@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import threading
-from concurrent.futures import ThreadPoolExecutor
 from typing import Callable
 
 import rospy
 
 from drone_mesh.drone.location import Location
+from drone_mesh.ground_station.order_queue import OrderQueue
 from drone_mesh.ground_station.server import GroundStationServer
 from drone_mesh.ground_station.settings import GroundStationSettings
 from drone_mesh.ground_station.vehicles import Vehicle, vehicles_of_state
@@ -43,9 +43,9 @@ class GroundStationNode:
     def __init__(self, settings: GroundStationSettings, on_other_run: Callable[[], None]) -> None:
         """Serve until `stop`. `on_other_run` is called when the world was replaced."""
         timing = get_fleet_parameter().node.timing
-        self._orders = ThreadPoolExecutor(1, "orders of ground stations")
+        self._orders = OrderQueue(_carry_out)
         self._server = GroundStationServer(
-            settings, earth_origin(""), timing.check_period_s, self._order
+            settings, earth_origin(""), timing.check_period_s, self._orders.give
         )
         self._run: Run | None = None
         self._on_other_run = on_other_run
@@ -60,7 +60,7 @@ class GroundStationNode:
     def stop(self) -> None:
         """End all threads."""
         self._server.stop()
-        self._orders.shutdown()
+        self._orders.stop()
 
     def _show(self, state: MeshState) -> None:
         with self._lock:
@@ -72,16 +72,13 @@ class GroundStationNode:
             self._vehicles = vehicles_of_state(mesh, self._vehicles)
             self._server.show(self._vehicles, mesh.stamp_s)
 
-    def _order(self, node: int, goal: Location, answer: Callable[[str], None]) -> None:
-        def order() -> None:
-            try:
-                request_flight(node, goal)
-            except FlightNotOrdered as error:
-                answer(str(error))
-            else:
-                answer("")
 
-        self._orders.submit(order)
+def _carry_out(node: int, goal: Location) -> str:
+    try:
+        request_flight(node, goal)
+    except FlightNotOrdered as error:
+        return str(error)
+    return ""
 
 
 def main() -> None:

@@ -101,7 +101,7 @@ class StandingLayouts:
         self._lock = threading.Lock()
         self._reporter = ThreadPoolExecutor(max_workers=1, thread_name_prefix="standing layouts")
         self._orders = StandingOrders()
-        self._relief: Relief | None = None  # made with the first state: then there is a fleet
+        self._relief: Relief | None = None  # made as soon as there is a fleet
         self._mesh: MeshStatus | None = None  # the latest state
         self._run: Run | None = None  # of that state
         self._shown: dict[int, StandingProgress] = {}
