@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import math
 import os
 import select
 import signal
 import sys
 import threading
+import time
 from typing import Any, Callable, Iterator, TypeVar, cast
 
 from drone_mesh.errors import MeshError
@@ -32,6 +34,10 @@ def run_with_extra(program: str, extra: str, load: Callable[[], Callable[[], int
 
 INTERRUPTED = 130  # exit status, as in a shell for SIGINT
 CLOSED_PIPE = 141  # as in a shell for SIGPIPE
+
+# Python handles a signal in the main thread, after its system call. Nothing interrupts that call if
+# the signal comes just before it, or if the kernel gives the signal to another thread.
+HANDLER_LATENCY_S = 0.5
 
 Main = TypeVar("Main", bound=Callable[..., int])
 
@@ -66,10 +72,14 @@ class StopRequest:
 
     def wait(self, timeout_s: float | None = None) -> bool:
         """Wait, at most `timeout_s` seconds if given; returns whether it was made. Any thread."""
+        poll = select.poll()  # select() takes no file descriptor above 1023
         if not self._made:
-            poll = select.poll()  # select() takes no file descriptor above 1023
             poll.register(self._read_end, select.POLLIN)
-            poll.poll(None if timeout_s is None else max(0.0, timeout_s) * 1000.0)
+        deadline_s = math.inf if timeout_s is None else time.monotonic() + timeout_s
+        while not self._made:
+            left_s = deadline_s - time.monotonic()
+            if not poll.poll(1000.0 * max(0.0, min(left_s, HANDLER_LATENCY_S))) and left_s <= 0.0:
+                break
         return self._made
 
     def close(self) -> None:

@@ -6,6 +6,7 @@ import os
 import resource
 import signal
 import threading
+import time
 
 import pytest
 
@@ -51,6 +52,31 @@ def test_a_signal_handler_makes_it_while_its_own_thread_waits():
                 sender.join()
     finally:
         signal.signal(signal.SIGUSR1, before)
+
+
+def test_a_signal_that_another_thread_takes_is_handled_while_the_main_thread_waits():
+    """Python handles it in the main thread, whose system call it does not interrupt."""
+    before = signal.getsignal(signal.SIGUSR1)
+    waits, end = threading.Event(), threading.Event()
+    with StopRequest() as request:
+
+        def take() -> None:
+            waits.wait(LONG_S)
+            signal.pthread_kill(threading.get_ident(), signal.SIGUSR1)
+            end.wait(LONG_S)
+
+        taker = threading.Thread(target=take)
+        taker.start()
+        try:
+            signal.signal(signal.SIGUSR1, lambda *_: request.make())
+            threading.Timer(0.1, waits.set).start()  # the wait has begun by then
+            begun_s = time.monotonic()
+            assert request.wait(LONG_S)
+            assert time.monotonic() - begun_s < LONG_S / 2, "only when the wait ended"
+        finally:
+            signal.signal(signal.SIGUSR1, before)
+            end.set()
+            taker.join(LONG_S)
 
 
 def test_it_works_in_a_program_with_a_thousand_open_sockets():

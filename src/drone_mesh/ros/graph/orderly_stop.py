@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import _thread
 import logging
 import os
 import signal
@@ -22,8 +23,11 @@ _log = logging.getLogger(__name__)
 
 
 def end_without_dead_master() -> None:
-    """Call when the program was told to end: ROS would wait for a master that hangs for ever."""
-    threading.Thread(target=_end_without_dead_master, name="dead master", daemon=True).start()
+    """Call when the program was told to end: ROS would wait for a master that hangs for ever.
+
+    Signal handlers call it: Thread.start would wait, with locks that the interrupted code may hold.
+    """
+    _thread.start_new_thread(_end_without_dead_master, ())
 
 
 def _end_without_dead_master() -> None:
@@ -101,7 +105,7 @@ class OrderlyStop:
             self._finished.wait(FINISH_TIMEOUT_S)
 
     def _tell(self) -> None:
+        self._request.make()
         if not self._told:
             self._told = True
             end_without_dead_master()
-        self._request.make()
