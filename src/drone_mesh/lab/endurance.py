@@ -135,7 +135,7 @@ class EnduranceRun:
         self._homes = {n: Location(y, x, 0.0) for n, (x, y) in zip(ordered, stands)}
         self._pads = {drone: count % len(part.pads) for count, drone in enumerate(ordered)}
         self._posts: np.ndarray = np.array([drones[n].get_location().to_vector() for n in posts])
-        self._since_s = np.full(len(posts), math.nan)  # when each post was left
+        self._since_s: np.ndarray = np.full(len(posts), math.nan)  # when each post was left
         flights_m = [self._homes[n].distance_m(drones[n].get_location()) for n in posts]
         flight_s = sum(flights_m) / len(posts) / SPEED_M_S
         least = fewest_spares(part, len(posts), flight_s)
