@@ -34,6 +34,7 @@ from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import event_record, mesh_status
 from drone_mesh.ros.graph.fleet_parameter import get_fleet_parameter
 from drone_mesh.ros.graph.master import NO_ANSWER
+from drone_mesh.ros.graph.orderly_stop import FINISH_TIMEOUT_S
 from drone_mesh.ros.graph.parameters import configured_obstacles
 from drone_mesh.ros.graph.simulation import Run, run_of
 from drone_mesh.state.model import MeshStatus
@@ -115,8 +116,15 @@ class StandingLayouts:
             names.LAYOUT_ACTION, LayoutAction, self._goal_came, self._cancel_came, auto_start=False
         )
         self._server.start()
+        rospy.on_shutdown(self._end_status)
         rospy.Subscriber(names.EVENTS_TOPIC, MeshEvent, self._event_came, queue_size=_QUEUE)
         rospy.Subscriber(names.STATE_TOPIC, MeshState, self._state_came, queue_size=1)
+
+    def _end_status(self) -> None:
+        """Before the topics are closed: actionlib's timer would die of a closed one, aloud."""
+        self._server.started = False
+        if self._server.lock.acquire(timeout=FINISH_TIMEOUT_S):  # it publishes under its lock
+            self._server.lock.release()
 
     def give(
         self,
