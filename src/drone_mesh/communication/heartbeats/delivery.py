@@ -28,7 +28,7 @@ from drone_mesh.communication.wire.messages import CREATOR_AT, FORWARD_AT, TO_AT
 
 DATA_PERSISTENCE = 3  # users' packets are many, so a chain of losses is more likely
 LEAST_LOOP = 3  # links: no node sends a packet straight back to where it came from
-SENT_KEPT_S = 30.0  # on a busy channel a packet is under way for seconds
+SENT_KEPT_S = 60.0  # on a channel that is too full a packet is under way for half a minute
 
 Passage = Tuple[int, int, float, int]
 """Of a packet: the neighbour that it came from, its next hop, the time and its hop count."""

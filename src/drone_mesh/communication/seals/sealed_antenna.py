@@ -260,7 +260,7 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
             self._doubtful[from_] = payload
         elif from_ == self._node_id:
             self.complaints.own_id_heard(now_s)
-        else:
+        elif payload[SEAL_AT:] == _NO_SEAL:
             self._not_answered(from_, payload, now_s)
         self._challenge(from_, now_s)
 

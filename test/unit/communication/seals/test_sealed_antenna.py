@@ -333,7 +333,7 @@ def test_a_neighbour_that_has_answered_gets_the_same_time_again_before_it_is_nam
 def test_a_challenge_that_nobody_took_says_nothing_about_a_neighbours_key():
     """While a mesh starts, a shared channel may take seconds and lose it."""
     layer, rig = layer_of_1()
-    heard = HopSeal(7, KEY, random.Random(7), 30.0).seal(packet("07 07 03 01 fe 00 01"))
+    heard = packet("07 07 03 01 fe 00 01")
     for now_s in (0.0, 4.0):
         layer.on_msg(heard, now_s)
         challenge = rig.antenna.taken.pop()
@@ -342,7 +342,7 @@ def test_a_challenge_that_nobody_took_says_nothing_about_a_neighbours_key():
     assert not layer.complaints.counts
     for now_s in (30.0, 42.0):
         layer.on_msg(heard, now_s)
-    assert "node 7, sends packets that this node's key" in next(iter(layer.complaints.counts))
+    assert "node 7, sends packets without a seal" in next(iter(layer.complaints.counts))
 
 
 def test_a_very_late_answer_shows_that_the_neighbour_has_the_key():
@@ -365,11 +365,23 @@ def test_one_challenge_without_an_answer_says_nothing_about_a_neighbours_key():
     On a busy channel the answer takes seconds.
     """
     layer, rig = layer_of_1()
-    heard = HopSeal(7, KEY, random.Random(7), 30.0).seal(packet("07 07 03 01 fe 00 01"))
+    heard = packet("07 07 03 01 fe 00 01")
     for now_s in (0.0, 20.0, 21.0, 22.0, 29.0):
         layer.on_msg(heard, now_s)
         assert not layer.complaints.counts
     layer.on_msg(heard, 31.0)
+    assert "node 7, sends packets without a seal" in next(iter(layer.complaints.counts))
+
+
+def test_only_a_challenge_with_another_key_shows_that_a_neighbour_has_one():
+    """Its other packets may not open because its answers wait, on a channel that is too full."""
+    layer, rig = layer_of_1()
+    heard = HopSeal(7, KEY, random.Random(7), 30.0).seal(packet("07 07 03 01 fe 00 01"))
+    foreign = HopSeal(7, OTHER_KEY, random.Random(7), 30.0)
+    for now_s in range(0, 60, 5):
+        layer.on_msg(heard, float(now_s))
+        assert not layer.complaints.counts
+    layer.on_msg(foreign.challenge(1, 60.0), 60.0)
     assert "node 7, sends packets that this node's key" in next(iter(layer.complaints.counts))
 
 
