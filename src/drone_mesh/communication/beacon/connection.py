@@ -164,7 +164,8 @@ class Proofs:
 
     def _ask(self) -> None:
         self._asked_s, self._ask_s = self._routes.now_s, math.inf
-        self._requests.ask(self._routes.gateway)
+        if self._routes.parent != NO_ROUTE:  # a question that waited may outlive the route
+            self._requests.ask(self._routes.gateway)
 
     def on_time(self) -> None:
         """Do what is due."""

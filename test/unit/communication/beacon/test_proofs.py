@@ -107,6 +107,15 @@ def test_a_gateway_that_moves_is_asked_once_in_ten_seconds_at_a_random_moment(no
     assert node.proofs.next_s == 15.0
 
 
+def test_a_question_that_waited_while_the_way_up_was_lost_asks_nobody(node):
+    node.proofs.due_s = math.inf
+    node.proofs.ask_soon()
+    node.routes.neighbours.clear()
+    node.routes.choose()
+    assert node.sent(2.5) == []
+    assert node.proofs.next_s == math.inf
+
+
 def test_a_gateway_answers_routers_and_no_other_gateway_and_tells_nobody_by_itself():
     node = Node(is_gateway=True)
     node.connect()
