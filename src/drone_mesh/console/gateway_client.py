@@ -13,13 +13,14 @@ from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
 from drone_mesh.state.links import route_to_gateway
-from drone_mesh.state.model import UNKNOWN_POSITION, EventRecord, MeshStatus, NodeStatus
+from drone_mesh.state.model import UNKNOWN_POSITION, AreaStatus, EventRecord, MeshStatus, NodeStatus
 from drone_mesh.web.json_client import NoAnswer, ask_json
 
 ANSWER_WITHIN_S = 5.0  # the gateway itself answers within two seconds
 REPORTS_MISSING_S = 75.0  # two reports of the default period, and a half
 _ONLY_SIMULATED = "layouts and formations exist only in the simulation"
 _OWN_AUTOPILOT = "the missions of real drones belong to their autopilots"
+_NO_ENDS = {"lowest": -math.inf, "highest": math.inf}  # of an area that has none in height
 
 More = Dict[int, Dict[str, Any]]
 """By node, the fields for the page that only real nodes have."""
@@ -91,9 +92,9 @@ def real_mesh(answer: Mapping[str, Any]) -> tuple[MeshStatus, More]:
     by_id = {node.id: node for node in nodes}
     for node in nodes:
         node.route = route_to_gateway(node.id, by_id)
-    mesh = MeshStatus(
-        float(answer["uptime_s"]), nodes, max_distance=0.0, achieved_real_time_factor=1.0
-    )
+    uptime_s = float(answer["uptime_s"])
+    fence = [AreaStatus(**{**_NO_ENDS, **area}) for area in answer.get("fence", ())]  # or older
+    mesh = MeshStatus(uptime_s, nodes, max_distance=0.0, achieved_real_time_factor=1.0, fence=fence)
     return mesh, {int(entry["id"]): _more(entry) for entry in answer["nodes"]}
 
 

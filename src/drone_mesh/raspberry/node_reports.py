@@ -151,6 +151,17 @@ def mesh_report(
     return {
         "gateway": gateway.get_node_id(),
         "origin": None if origin is None else dataclasses.astuple(origin),
+        "fence": [
+            {
+                "name": zone.name,
+                "inside": inside,
+                **({"lowest": zone.lowest_m} if math.isfinite(zone.lowest_m) else {}),
+                **({"highest": zone.highest_m} if math.isfinite(zone.highest_m) else {}),
+                "corners": [round(m, 2) for ring in zone.rings for corner in ring for m in corner],
+                "rings": [len(ring) for ring in zone.rings],
+            }
+            for zone, inside in engine.fence.zones
+        ],
         "nodes": [
             _gateway(gateway, engine, on, origin),
             *(

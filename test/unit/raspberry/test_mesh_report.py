@@ -9,6 +9,7 @@ import pytest
 from drone_mesh.communication.events.observer import MeshEvent, MeshEventKind
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.console.gateway_client import events_of, real_mesh
+from drone_mesh.drone.fence import Fence, Zone
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
@@ -16,6 +17,7 @@ from drone_mesh.inprocess import Network
 from drone_mesh.raspberry.node_events import EventHistory
 from drone_mesh.raspberry.node_reports import mesh_report
 from drone_mesh.state.condition import Condition, condition_of
+from drone_mesh.state.observation import describe_fence
 
 ORIGIN = Origin(52.0907, 5.1214, 3.0)
 
@@ -64,6 +66,12 @@ def test_the_page_shows_routes_places_and_why_a_drone_cannot_fly(network):
     assert more[2]["neighbours"] == 1
     assert more[2]["total_messages"] is None
     assert more[2]["earth"][2] == 3.0
+
+
+def test_the_page_shows_the_fence_of_the_gateway(network):
+    yard = Zone("yard", (((0, 0), (9, 0), (9, 9)), ((1, 1), (2, 1), (2, 2))), highest_m=30.0)
+    network.nodes[0].drone.fence = fence = Fence.of([yard], [])
+    assert real_mesh(answer(network))[0].fence == describe_fence(fence)
 
 
 def test_a_node_that_falls_silent_is_shown_as_silent(network):
