@@ -20,6 +20,7 @@ class VehicleFaults:
     estimate_good: bool = True
     positions_stop: bool = False
     fence_breached: bool = False
+    fence_on: bool = False  # by a switch, whatever its parameter says
     refuses_to_arm: bool = False
     spool_up_s: float = 0.0  # from the acknowledgement of a take-off to the first movement
     battery_known: bool = True

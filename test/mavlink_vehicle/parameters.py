@@ -13,7 +13,12 @@ from drone_mesh.drone.mavlink.telemetry import Message
 _ARDUPILOT = {
     "BATT_FS_LOW_ACT": 1.0,
     "FENCE_ACTION": 1.0,
+    "FENCE_ALT_MAX": 100.0,
+    "FENCE_AUTOENABLE": 0.0,
     "FENCE_ENABLE": 1.0,
+    "FENCE_OPTIONS": 0.0,
+    "FENCE_RADIUS": 300.0,
+    "FENCE_TYPE": 4.0,  # areas, of which there are none at first
     "FS_EKF_ACTION": 1.0,
     "FS_GCS_ENABLE": 5.0,  # land
     "FS_THR_ENABLE": 1.0,

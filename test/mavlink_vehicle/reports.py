@@ -18,6 +18,7 @@ from drone_mesh.drone.mavlink.telemetry import (
 )
 from mavlink_vehicle.body import Body, VehicleFaults
 from mavlink_vehicle.modes import Mode, mode_number
+from mavlink_vehicle.parameters import Parameters
 
 SENSORS = (
     mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO
@@ -37,6 +38,7 @@ class Reported(Protocol):
     home: Origin
     body: Body
     faults: VehicleFaults
+    parameters: Parameters
     mode: Mode
     in_failsafe: bool
     now_s: float
@@ -170,9 +172,10 @@ class Reports:
         percent = vehicle.body.battery_percent
         cell_mv = EMPTY_CELL_MV + (FULL_CELL_MV - EMPTY_CELL_MV) * percent / 100.0
         healthy = SENSORS if vehicle.faults.fence_breached else SENSORS | FENCE_SENSOR
+        keeps_fence = vehicle.faults.fence_on or vehicle.parameters.get("FENCE_ENABLE", 1.0)
         return mavlink.MAVLink_sys_status_message(
             SENSORS | FENCE_SENSOR,
-            SENSORS | FENCE_SENSOR,
+            SENSORS | FENCE_SENSOR if keeps_fence else SENSORS,
             healthy,
             200,
             round(cell_mv * CELLS),

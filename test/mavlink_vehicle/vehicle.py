@@ -12,6 +12,7 @@ from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.autopilots import OUR_SYSTEM_ID, PX4, Autopilot
 from drone_mesh.drone.mavlink.telemetry import Message
 from mavlink_vehicle.body import LANDING_SPEED_M_S, Body, VehicleFaults
+from mavlink_vehicle.fence import FENCE_MESSAGES, FenceStore
 from mavlink_vehicle.modes import Mode, mode_of
 from mavlink_vehicle.parameters import Parameters
 from mavlink_vehicle.reports import Reports
@@ -48,6 +49,7 @@ class MavlinkVehicle:
         self.faults = VehicleFaults()
         self.body = Body()
         self.parameters = parameters = Parameters(autopilot, self._send)
+        self.fence = FenceStore(self._send)
         self.mode = Mode.HOLD
         self.in_failsafe = False
         self.now_s = 0.0
@@ -63,6 +65,7 @@ class MavlinkVehicle:
             "COMMAND_LONG": self._take_command,
             "SET_POSITION_TARGET_GLOBAL_INT": self._take_target,
             "PARAM_REQUEST_READ": parameters.take_read_request,
+            **dict.fromkeys(FENCE_MESSAGES, self.fence.take),
         }
 
     # Actions of the human pilot --------------------------------------------------------------

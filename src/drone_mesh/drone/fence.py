@@ -16,6 +16,7 @@ from drone_mesh.errors import ConfigurationError
 
 Ring = Tuple[Point, ...]
 
+OF_AUTOPILOT = "the autopilot's fence"  # how the names of areas begin that an autopilot keeps
 CLEAR_M = 0.5  # how far a way round keeps from a fence; as from a box (air/obstacles.py)
 CIRCLE_CORNERS = 64  # the polygon for a circle is off by 0.12 % of its radius, to the safe side
 CIRCLE_TURNS = 16  # of ways round a circle, which are up to 2 % longer so
@@ -179,14 +180,14 @@ class Rule:
         if self.allows(place):
             return ""
         if not self.inside:
-            return f"inside fence {self.names}, which drones stay out of"
+            return f"inside {called(self.names)}, which drones stay out of"
         x, y, height_m = place
         for zone in self.zones:
             if zone.surrounds(place):
                 high = height_m > zone.highest_m
                 side, end_m = ("above", zone.highest_m) if high else ("below", zone.lowest_m)
-                return f"{side} fence {zone.name}: {height_m:.4g} m, and it ends at {end_m:g} m"
-        return f"outside fence {self.names}"
+                return f"{side} {called(zone.name)}: {height_m:.4g} m, and it ends at {end_m:g} m"
+        return f"outside {called(self.names)}"
 
 
 @dataclass(frozen=True)
@@ -240,7 +241,7 @@ class Fence:
         for one, other in zip(places, places[1:] or places):
             for rule in self.rules:
                 if rule.meets(one, other):
-                    return rule.why_not(other) or f"its way passes fence {rule.names}"
+                    return rule.why_not(other) or f"its way passes {called(rule.names)}"
         return ""
 
     def outside_share(self, a: Vector, b: Vector) -> float:
@@ -261,6 +262,11 @@ class Fence:
         points = sorted({*found, *corners}, key=lambda point: math.dist(point, place[:2]))
         places = ((x, y, place[2]) for x, y in points)
         return next((one for one in (place, *places) if not self.why_not(one)), None)
+
+
+def called(names: str) -> str:
+    """These names as a part of a sentence."""
+    return names if names.startswith(OF_AUTOPILOT) else f"fence {names}"
 
 
 def _closed(corners: Sequence[Point]) -> list[tuple[Point, Point]]:

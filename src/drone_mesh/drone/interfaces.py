@@ -18,6 +18,10 @@ class IDroneEngine(abc.ABC):
     fence = Fence()  # of the whole mesh; whoever creates the engine sets it
     """The mesh gives it no goal outside. That its way does not lead outside is up to the engine."""
 
+    def fences(self) -> Fence:
+        """All that this drone keeps: `fence`, and what its autopilot keeps by itself."""
+        return self.fence
+
     @abc.abstractmethod
     def set_goal(self, latitude: float, longitude: float, height: float) -> None:
         """Fly to this position (metres, world frame). Returns at once; replaces the last goal."""

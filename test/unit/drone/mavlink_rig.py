@@ -30,10 +30,12 @@ class Wire:
     def __init__(self, system_id: int, component_id: int) -> None:
         self._sender = mavlink.MAVLink(None, system_id, component_id)
         self._receiver = mavlink.MAVLink(None)
-        self.waiting: list[Message] = []
+        self.waiting: list[tuple[int, Message]] = []  # and at which take it arrives
         self.sent: list[Message] = []
         self.broken = False
         self.loses: Callable[[], bool] = lambda: False  # asked for each message
+        self.delays: Callable[[], int] = lambda: 0  # by how many takes; likewise
+        self._takes = 0
 
     def send(self, message: Message) -> None:
         data = message.pack(self._sender)
@@ -41,10 +43,12 @@ class Wire:
             return
         for arrived in self._receiver.parse_buffer(data) or ():
             self.sent.append(arrived)
-            self.waiting.append(arrived)
+            self.waiting.append((self._takes + self.delays(), arrived))
 
     def take(self) -> list[Message]:
-        taken, self.waiting = self.waiting, []
+        taken = [message for at, message in self.waiting if at <= self._takes]
+        self.waiting = [(at, message) for at, message in self.waiting if at > self._takes]
+        self._takes += 1
         return taken
 
 

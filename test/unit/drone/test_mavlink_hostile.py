@@ -37,6 +37,9 @@ LISTENED_TO = [
     "RC_CHANNELS",
     "COMMAND_ACK",
     "PARAM_VALUE",
+    "MISSION_COUNT",
+    "MISSION_ITEM_INT",
+    "MISSION_ACK",
 ]
 TYPES = {message.msgname: message for message in mavlink.mavlink_map.values()}
 FLIGHT_ORDERS = {

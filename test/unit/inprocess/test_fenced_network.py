@@ -51,7 +51,8 @@ def test_an_order_outside_is_refused_by_the_gateway_and_by_a_drone_whose_gateway
     network = fenced()
     with pytest.raises(GoalRefused, match=words):
         network.order(1, *goal)
-    network.nodes[0].drone.fence = Fence()
+    network.nodes[0].drone.fence = network.nodes[1].drone.fence = Fence()
+    network.nodes[1].drone.fences = lambda: FENCE  # as one with an autopilot, which has its own
     network.order(1, *goal)
     network.run_for(5.0)
     (order,) = network.nodes[0].component.get_orders()

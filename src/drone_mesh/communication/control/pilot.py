@@ -120,7 +120,7 @@ class Pilot:
         Returns False if the drone already flies there. Raises GoalRefused, and changes nothing, if
         it cannot fly, or the goal is out of bounds, outside a fence or refused by the engine.
         """
-        check_goal(*goal, self._engine.fence)
+        check_goal(*goal, self._engine.fences())
         why_not = self._engine.why_not_fly()
         if why_not:
             raise GoalRefused(f"drone {self._node_id} cannot fly: {why_not}")
@@ -134,7 +134,7 @@ class Pilot:
         """Start a repair flight, or change the goal of the current one."""
         flight = self._begin(goal)
         try:
-            check_goal(*goal, self._engine.fence)
+            check_goal(*goal, self._engine.fences())
             self._engine.step_back_to(*goal)
         except GoalRefused as error:  # the flight ends as soon as the drone stands still
             flight.may_begin = False

@@ -294,7 +294,7 @@ class MeshnetworkComponent(NodeSnapshots, IMeshNetwork, IControlHost):
 
     def _look_at_fence(self) -> None:
         """Say so if the drone is outside; it may then only fly inside."""
-        fence = self._engine.fence
+        fence = self._engine.fences()
         here = self._pilot.place() if fence.rules else None
         why_not = "" if here is None else fence.why_not(here.to_vector())
         if why_not:

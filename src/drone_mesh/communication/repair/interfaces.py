@@ -176,7 +176,7 @@ class RepairActions(abc.ABC):
 
     def within_fence(self, place: Location | None) -> list[Location]:
         """A known place, or the nearest one to it that the fence allows, if there is one."""
-        fence = self._engine.fence
+        fence = self._engine.fences()
         if place is None or not fence:
             return [] if place is None else [place]
         inside = fence.nearest_inside(at_whole_metres(place).to_vector())
@@ -184,7 +184,7 @@ class RepairActions(abc.ABC):
 
     def why_not_there(self, place: Location) -> str:
         """Why the fence does not allow a place; empty if it does."""
-        return self._engine.fence.why_not(place.to_vector())
+        return self._engine.fences().why_not(place.to_vector())
 
     @property
     def gateway_place(self) -> Location | None:

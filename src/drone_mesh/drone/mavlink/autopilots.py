@@ -33,6 +33,7 @@ class Autopilot:
     estimate_message: int  # its report on the quality of its position estimate
     integers_as_bytes: bool  # integer parameters are sent as their bytes in place of the float
     requirements: tuple[Requirement, ...] = field(repr=False)
+    fence_parameters: tuple[str, ...] = field(repr=False)
 
     def mode_name(self, mode: int) -> str:
         """The mode's name, or its number."""
@@ -90,6 +91,14 @@ ARDUPILOT = Autopilot(
         Requirement(("FENCE_ENABLE",), _is_on, "1: a fence", 1),
         Requirement(("FENCE_ACTION",), _is_on, "not 0: it acts at the fence", 1),
     ),
+    fence_parameters=(
+        "FENCE_ALT_MAX",
+        "FENCE_AUTOENABLE",  # since 4.6; so are the options
+        "FENCE_ENABLE",
+        "FENCE_OPTIONS",
+        "FENCE_RADIUS",
+        "FENCE_TYPE",
+    ),
 )
 
 PX4 = Autopilot(
@@ -129,6 +138,7 @@ PX4 = Autopilot(
         Requirement(("GF_MAX_HOR_DIST",), _is_on, "not 0: a fence around home", 500),
         Requirement(("GF_MAX_VER_DIST",), _is_on, "not 0: a ceiling", 100),
     ),
+    fence_parameters=("GF_ACTION", "GF_MAX_HOR_DIST", "GF_MAX_VER_DIST"),
 )
 
 

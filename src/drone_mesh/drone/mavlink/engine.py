@@ -80,6 +80,9 @@ class MavlinkEngine(IDroneEngine):
         self._thread = threading.Thread(target=self._run, name=f"mavlink {node_id}", daemon=True)
         self._thread.start()
 
+    def fences(self) -> Fence:
+        return self._pilot.fences()
+
     def set_goal(self, latitude: float, longitude: float, height: float) -> None:
         """Fly there, and land if the height is 0. Raises GoalRefused with the reason."""
         why_not = self.status().why_not_fly
@@ -153,7 +156,7 @@ class MavlinkEngine(IDroneEngine):
         if home is None:  # the status has become stale since
             raise GoalRefused("the drone cannot fly: its home is not known")
         self._limits.check(goal, home)
-        check_goal(*goal, self.fence)
+        check_goal(*goal, self.fences())
         self._goals.append((goal, lands, for_repair))
 
     def _run(self) -> None:

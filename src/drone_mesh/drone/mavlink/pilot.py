@@ -12,13 +12,14 @@ from typing import Callable
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from drone_mesh.drone.fence import CLEAR_M, Fence
+from drone_mesh.drone.fence import CLEAR_M, Fence, called
 from drone_mesh.drone.flight_path import Point
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.authority import Authority, FlightArea
 from drone_mesh.drone.mavlink.commander import CARRIED_OUT_WITHIN_S, Commander
 from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions
+from drone_mesh.drone.mavlink.own_fence import OwnFence
 from drone_mesh.drone.mavlink.parameter_check import ParameterCheck
 from drone_mesh.drone.mavlink.pilot_status import UNDER_WAY, Phase, PilotStatus
 from drone_mesh.drone.mavlink.telemetry import Message, Telemetry
@@ -53,7 +54,7 @@ class MavlinkPilot:
         send: Callable[[Message], None],
         fence: Fence = Fence(),  # noqa: B008 (frozen)
     ) -> None:
-        self._fence = fence
+        self._given_fence = fence
         self._limits = limits
         self._cruise_m = limits.layer_height_m(node_id)
         self._node_id = node_id
@@ -62,6 +63,8 @@ class MavlinkPilot:
         self._authority = Authority(self._telemetry, self._area, limits, permissions)
         self._commander = Commander(self._telemetry, send)
         self._parameters = ParameterCheck(self._commander, self._telemetry)
+        self._own_fence = OwnFence(self._telemetry, origin, send)
+        self._flown_in = fence  # what the route keeps
         self._phase = Phase.IDLE
         self._phase_since_s = -math.inf
         self._goal: Location | None = None
@@ -90,6 +93,9 @@ class MavlinkPilot:
             self._commander.on_text(message)
         elif message.get_type() == "PARAM_VALUE":
             self._parameters.on_value(message)
+            self._own_fence.on_value(message, now_s)
+        elif message.get_type() in ("MISSION_COUNT", "MISSION_ITEM_INT", "MISSION_ACK"):
+            self._own_fence.on_mission(message, now_s)
         elif message.get_type() == "HOME_POSITION":
             self._doubt_origin()
 
@@ -100,7 +106,7 @@ class MavlinkPilot:
         """
         if (goal, lands) == (self._goal, self._lands):
             return
-        reason = self._authority.why_not(now_s, self._phase, for_repair)
+        reason = self._why_not(now_s, for_repair)
         if reason:
             raise GoalRefused(f"the drone cannot fly: {reason}")
         if for_repair and self._stalled:
@@ -139,6 +145,7 @@ class MavlinkPilot:
         self._last_tick_s = now_s
         self._commander.tick(now_s)
         self._parameters.tick(now_s)
+        self._own_fence.tick(now_s)
         if self._telemetry.heartbeat_s <= self._slept_s and not self._telemetry.link_trouble(now_s):
             return
         if self._phase is not Phase.IDLE:
@@ -159,8 +166,8 @@ class MavlinkPilot:
             location=None if trouble else self._area.here(now_s),
             location_trouble=trouble,
             home=self._area.home(),
-            why_not_fly=self._authority.why_not(now_s, self._phase),
-            why_not_repair=self._authority.why_not(now_s, self._phase, for_repair=True)
+            why_not_fly=self._why_not(now_s),
+            why_not_repair=self._why_not(now_s, for_repair=True)
             or (NO_PROGRESS if self._stalled else ""),
             ended=self._ended,
             autopilot=autopilot.name if autopilot else "",
@@ -171,6 +178,13 @@ class MavlinkPilot:
             complaints=self._parameters.complaints,
             goal=self._goal,
         )
+
+    def fences(self) -> Fence:
+        """The given one and the autopilot's own. Any thread."""
+        return Fence((*self._given_fence.rules, *self._own_fence.fence.rules))
+
+    def _why_not(self, now_s: float, for_repair: bool = False) -> str:
+        return self._authority.why_not(now_s, self._phase, for_repair) or self._own_fence.trouble
 
     def _doubt_origin(self) -> None:
         """Log once what the autopilot's home says about --origin."""
@@ -312,6 +326,7 @@ class MavlinkPilot:
         self._route = Route(
             start, self._goal, cross_at_m, self._lands, self._limits.speed_m_s, around
         )
+        self._flown_in = self.fences()
         self._commander.no_command()
         self._moved = None
         self._enter(Phase.FLYING, now_s)
@@ -324,7 +339,7 @@ class MavlinkPilot:
         Straight in its layer, else the shortest; it never goes down first, unless it is outside and
         there is no other way: what is below it there is not known.
         """
-        fence, ceiling_m = self._fence, self._limits.ceiling_m(home)
+        fence, ceiling_m = self.fences(), self._limits.ceiling_m(home)
         one, other = start.to_vector(), goal.to_vector()
         usual_m = max(min(self._cruise_m, ceiling_m), goal.height)
         level_m = max(usual_m, start.height)
@@ -347,14 +362,16 @@ class MavlinkPilot:
         if ways:
             return min(ways)[2:]
         raise GoalRefused(
-            fence.why_not(goal.to_vector()) or f"no path that keeps fence {fence.names}"
+            fence.why_not(goal.to_vector()) or f"no path that keeps {called(fence.names)}"
         )
 
     def _fly_on(self, passed_s: float, now_s: float) -> None:
         here, route = self._area.here(now_s), self._route
         assert here is not None
         assert route is not None
-        if not route.advance(here, passed_s):
+        if self.fences() != self._flown_in:
+            self._fly(now_s)
+        elif not route.advance(here, passed_s):
             self._send_target(route.target, now_s)
             self._watch_progress(here, now_s)
         elif self._lands:

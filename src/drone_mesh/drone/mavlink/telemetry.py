@@ -83,7 +83,7 @@ class Telemetry:
         self._battery_s = -math.inf
         self._landed = mavlink.MAV_LANDED_STATE_UNDEFINED
         self._landed_s = -math.inf
-        self.is_outside_fence = False  # as the autopilot reports
+        self.keeps_fence = self.is_outside_fence = False  # as the autopilot reports
         self._sticks_at_rest: tuple[int, ...] | None = None
         self._sticks_moved_s = -math.inf
         self._readers: dict[str, Callable[[Message, float], None]] = {
@@ -206,7 +206,8 @@ class Telemetry:
         self._battery_percent = float(remaining) if 0 <= remaining <= 100 else None
         self._battery_s = now_s
         health = message.onboard_control_sensors_health
-        if message.onboard_control_sensors_enabled & FENCE_SENSOR:
+        self.keeps_fence = bool(message.onboard_control_sensors_enabled & FENCE_SENSOR)
+        if self.keeps_fence:
             self.is_outside_fence = not health & FENCE_SENSOR
 
     def _take_landed(self, message: Message, now_s: float) -> None:
