@@ -53,13 +53,13 @@ class Battery:
     def __init__(self, model: PowerModel) -> None:
         """It is full."""
         self._model = model
-        self._left_j = model.capacity_j
+        self._full_j = self._left_j = model.capacity_j
         self.used_j = 0.0  # from all batteries that the drone has had
 
     @property
     def percent(self) -> float:
         """Its charge, 0..100."""
-        return 100.0 * self._left_j / self._model.capacity_j
+        return 100.0 * self._left_j / self._full_j
 
     def use(self, seconds: float, speed_m_s: float | None) -> None:
         """Let so much time pass at this speed in the air; None: on the ground."""
@@ -70,7 +70,7 @@ class Battery:
 
     def swap(self) -> None:
         """Put in a full battery."""
-        self._left_j = self._model.capacity_j
+        self._left_j = self._full_j
 
 
 class Crews:

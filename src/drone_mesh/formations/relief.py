@@ -82,6 +82,7 @@ class Relief:
         self._homes = dict(homes or {})
         self._posts: dict[int, Sequence[Location]] = {}  # by holder: its place and the one beside
         self._empty: list[Sequence[Location]] = []  # posts without a holder
+        self._left: dict[int, Sequence[Location]] = {}  # by drone that fell silent at its post
         self._turns: list[_Turn] = []
         self._homing: set[int] = set()  # ordered home
         self._uses: dict[int, _Use] = {}
@@ -99,7 +100,7 @@ class Relief:
             return
         known = {node.id: node for node in mesh.nodes if position_is_known(node)}
         nodes = {n: node for n, node in known.items() if node.role != Role.GATEWAY}
-        self._look(nodes, mesh, rules)
+        self._look(nodes, mesh, orders, rules)
         for turn in list(self._turns):
             self._go_on(turn, nodes, orders, mesh.stamp_s)
         for drone in [d for d in self._posts.keys() & nodes.keys() if self._must_go(nodes[d])]:
@@ -117,11 +118,18 @@ class Relief:
         drones = {drone for turn in self._turns for drone in (turn.old, turn.new)}
         return {drone for drone in drones if drone is not None}
 
-    def _look(self, nodes: Mapping[int, NodeStatus], mesh: MeshStatus, rules: FlightRules) -> None:
+    def _look(
+        self,
+        nodes: Mapping[int, NodeStatus],
+        mesh: MeshStatus,
+        orders: StandingOrders,
+        rules: FlightRules,
+    ) -> None:
         """Learn homes, use and posts."""
         busy = self._busy()
         for drone in self._posts.keys() - nodes.keys() - busy:
-            self._empty.append(self._posts.pop(drone))
+            self._left[drone] = self._posts.pop(drone)
+            self._empty.append(self._left[drone])
         for drone, node in nodes.items():
             here, flies = Location.from_vector(node.position), bool(len(node.path))
             in_air = flies or here.height > IN_AIR_M
@@ -129,15 +137,34 @@ class Relief:
             if not in_air:
                 self._homes.setdefault(drone, here)
                 self._homing.discard(drone)
+                self._left.pop(drone, None)
             if drone in busy or drone in self._homing or flies:
                 continue
             if node.on and in_air and not node.crashed and not len(node.heading):
-                if not any(_is_at(node, place) for place in self._posts.get(drone, ())):
+                if _is_at_one(node, self._posts.get(drone, ())):
+                    continue
+                if _is_at_one(node, self._left.get(drone, ())):
+                    self._come_back(drone, orders, mesh.stamp_s)
+                else:
                     self._posts[drone] = self._post_at(here, drone, mesh, rules)
             elif drone in self._posts:
                 post = self._posts.pop(drone)
                 if not node.on or node.crashed or self._is_low(node):  # nobody ordered it down
                     self._empty.append(post)
+                    self._left[drone] = post
+
+    def _come_back(self, drone: int, orders: StandingOrders, now_s: float) -> None:
+        """It was silent at its post: nobody came, somebody is coming, or holds it meanwhile."""
+        post = self._left.pop(drone)
+        coming = next((turn for turn in self._turns if turn.places is post), None)
+        if post in self._empty:
+            self._empty.remove(post)
+        elif coming is None or coming.old is not None:
+            self._send_home(drone, orders, now_s)
+            return
+        else:
+            coming.old = drone
+        self._posts[drone] = post
 
     def _note_use(self, node: NodeStatus, in_air: bool, now_s: float) -> None:
         use = self._uses.get(node.id)
@@ -293,6 +320,7 @@ class Relief:
                 self._empty.append(turn.places)
             if new is not None and new.on and not self._is_home(new):
                 self._send_home(turn.new, orders, now_s)
+            self._left[turn.new] = turn.places
             return
         if not (_is_at(new, turn.to) and new.connected and not len(new.path)):
             turn.there_s = None
@@ -307,6 +335,8 @@ class Relief:
             self.reliefs += 1
             if old is not None and old.on:
                 self._send_home(turn.old, orders, now_s)
+            else:
+                self._left[turn.old] = turn.places
 
     def _is_home(self, node: NodeStatus) -> bool:
         return node.id in self._homes and _is_at(node, self._homes[node.id])
@@ -315,6 +345,10 @@ class Relief:
         self._homing.add(drone)  # without a known home too: it holds no post any more
         if drone in self._homes:
             orders.give(f"drone {drone} goes home", {drone: self._homes[drone]}, now_s)
+
+
+def _is_at_one(node: NodeStatus, post: Sequence[Location]) -> bool:
+    return any(_is_at(node, place) for place in post)
 
 
 def _is_at(node: NodeStatus, place: Location, within_m: float = AT_PLACE_M) -> bool:

@@ -134,6 +134,33 @@ def test_a_spare_that_does_not_come_is_called_back_and_another_relief_begins():
     assert first.is_over  # the page shows it until then
 
 
+@pytest.mark.parametrize("back_when", ["another one is on its way", "another one holds its post"])
+def test_a_drone_that_was_silent_at_its_post_goes_home_when_another_one_has_come(back_when):
+    mesh = Mesh()
+    mesh.sent()
+    mesh.holder.on = False
+    ((drone, place),) = mesh.sent().items()
+    assert drone == 2
+    if back_when == "another one is on its way":
+        mesh.holder.on = True
+        assert mesh.sent(5) == {2: place}
+    mesh.spare.position = place.to_vector()
+    if back_when == "another one holds its post":
+        assert mesh.sent(10) == {}
+        mesh.holder.on = True
+    assert mesh.sent(10) == {1: OTHER}
+
+
+def test_a_drone_that_was_silent_has_its_post_again_if_nobody_came():
+    mesh = Mesh()
+    mesh.spare.battery = 50.0
+    mesh.sent()
+    mesh.holder.on = False
+    mesh.sent(30)
+    mesh.holder.on, mesh.spare.battery = True, 100.0
+    assert mesh.sent(30) == {}
+
+
 def test_where_a_drone_is_ordered_is_its_post_from_then_on():
     mesh = Mesh()
     mesh.sent()
