@@ -110,11 +110,25 @@ def test_the_focus_goes_to_the_map_when_what_had_it_disappears(page):
     )
 
 
+ORDER_SPEEDS = """() => {
+  window.shown = [];
+  new MutationObserver(() =>
+    window.shown.push([...document.querySelectorAll(".toast")].map((one) => one.innerText)),
+  ).observe(document.getElementById("toasts"), { childList: true });
+  for (const factor of ["2", "5", "10"]) {
+    const speed = document.getElementById("speed");
+    speed.value = factor;
+    speed.dispatchEvent(new Event("change"));
+  }
+}"""
+
+
 def test_at_most_two_toasts_are_shown(page):
-    for factor in ("2", "5", "10"):
-        page.page.select_option("#speed", factor)
-        page.page.wait_for_selector(f"#toasts :text('speed {factor}')")
-    assert page.page.locator(".toast").count() == 2
+    page.page.evaluate(ORDER_SPEEDS)
+    page.page.wait_for_selector("#toasts :text('speed 10')")
+    shown = page.page.evaluate("window.shown")
+    with_last = next(texts for texts in shown if any("speed 10" in text for text in texts))
+    assert (len(with_last), max(map(len, shown))) == (2, 2)
 
 
 OVERLAPS = """() => {
