@@ -77,20 +77,19 @@ make_venv() {
   "$python" -m venv --clear --system-site-packages "$venv" || fail "could not make $venv"
 }
 
-# pip_install [--no-deps] FILE...: installs the requirement files whose content has changed, at once:
-# each start of pip costs seconds.
+# pip_install [--no-deps] FILE...: installs requirement files whose content has changed.
 pip_install() {
-  local options=() file changed=()
+  local options=() file stamp
   [ "$1" = --no-deps ] && { options=(--no-deps); shift; }
   for file in "$@"; do
-    cmp -s "$root/$file" "$venv/.installed-${file##*/}" || changed+=("$file")
+    stamp="$venv/.installed-$(basename "$file")"
+    cmp -s "$root/$file" "$stamp" && continue
+    say "installing Python packages into ${venv##*/}: $file"
+    "$venv/bin/python" -m pip install --disable-pip-version-check --no-input --prefer-binary \
+      --progress-bar off "${pip_options[@]}" "${options[@]}" -r "$root/$file" </dev/null ||
+      fail "pip could not install $file"
+    cp "$root/$file" "$stamp"
   done
-  [ ${#changed[@]} -gt 0 ] || return 0
-  say "installing Python packages into ${venv##*/}: ${changed[*]}"
-  "$venv/bin/python" -m pip install --disable-pip-version-check --no-input --prefer-binary \
-    --progress-bar off "${pip_options[@]}" "${options[@]}" "${changed[@]/#/-r$root/}" </dev/null ||
-    fail "pip could not install ${changed[*]}"
-  for file in "${changed[@]}"; do cp "$root/$file" "$venv/.installed-${file##*/}"; done
 }
 
 # can_check_javascript: eslint needs Node.js 18; Ubuntu 20.04 has 10.
@@ -235,6 +234,6 @@ prepare_checks() {
 
 # What the checks and rostests need beside the unit tests.
 prepare_rest() {
-  pip_install requirements/{browser,checks,docs}.txt
   prepare_checks
+  pip_install requirements/{browser,docs}.txt
 }

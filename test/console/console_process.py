@@ -35,8 +35,14 @@ LAYOUTS = [
 ]
 
 
-def feed(mesh: InProcessMesh, store: FrameStore, fence: Sequence[AreaStatus]) -> None:
+def feed(mesh: InProcessMesh, store: FrameStore, fence: Sequence[AreaStatus], relief: bool) -> None:
     status, events = mesh.read()
+    if relief:
+        for node in status.nodes[1:]:
+            node.battery, node.time_left, node.home = 87.0, 803.0, tuple(node.position)
+        low, new, served = status.nodes[1:4]
+        low.battery, low.time_left, new.relieves = 24.0, 48.0, low.id
+        served.pad = "the crew swaps its battery: 12 s left"
     store.update_mesh(replace(status, fence=fence), time.monotonic())
     if events:
         store.add_events(events)
@@ -82,6 +88,7 @@ def main(arguments: list[str] | None = None) -> None:
     )
     parser.add_argument("--origin", default="", metavar="LAT,LON,ALT")
     parser.add_argument("--fence", default="", metavar="FILE")
+    parser.add_argument("--relief", action="store_true", help="2 relieves 1, 3 gets a battery")
     parser.add_argument("--tiles", default="", metavar="MAP")
     parser.add_argument("--real", action="store_true", help="offer what a real gateway can do")
     options = parser.parse_args(arguments)
@@ -98,7 +105,7 @@ def main(arguments: list[str] | None = None) -> None:
         mesh,
         access,
         LAYOUTS,
-        options.demonstrate,
+        "repair" if options.demonstrate else "",
         GatewayControls.ACTIONS if options.real else ALL_ACTIONS,
         recording=options.recording,
         whole=whole,
@@ -121,7 +128,7 @@ def main(arguments: list[str] | None = None) -> None:
     def feed_once() -> None:
         if options.haste and not mesh.paused:
             mesh.skip(FRAME_PERIOD_S * mesh.factor * options.haste)
-        feed(mesh, store, fence)
+        feed(mesh, store, fence, options.relief)
         server.show_packets(*mesh.packets(FRAME_PERIOD_S))
         is_fed.set()
 

@@ -15,7 +15,7 @@ LINKS = sum(
     for i, (ax, ay) in enumerate(PLACES)
     for bx, by in PLACES[:i]
 )
-STATE, HOPS, NEXT, NEIGHBOURS, X, Y = 2, 4, 5, 6, 9, 10  # columns of the table
+STATE, DOES, BATTERY, HOPS, NEXT, NEIGHBOURS, X, Y = 2, 3, 4, 5, 6, 7, 10, 11  # columns
 FAST = ("--skip", "25")
 FAR_FROM_17 = (3.0, 3.0)  # a flight of eleven seconds: a slow page sees it, too
 
@@ -236,11 +236,11 @@ def test_the_map_moves_and_zooms_by_keyboard(page):
 
 def test_the_table_sorts_by_the_column_that_is_clicked(shared_page):
     ids = "#nodes tbody tr td:first-child"
-    shared_page.page.click("#nodes th:nth-child(4) button")
-    shared_page.page.click("#nodes th:nth-child(4) button")
+    shared_page.page.click("#nodes th:nth-child(5) button")
+    shared_page.page.click("#nodes th:nth-child(5) button")
     hops = [
         int(h)
-        for h in shared_page.page.locator("#nodes tbody tr td:nth-child(4)").all_inner_texts()
+        for h in shared_page.page.locator("#nodes tbody tr td:nth-child(5)").all_inner_texts()
     ]
     assert hops == sorted(hops, reverse=True)
     shared_page.page.click("#nodes th:nth-child(1) button")
@@ -434,8 +434,8 @@ DRAW_LOST = """async (count) => {
     if (context.getLineDash().length) alpha ??= context.globalAlpha;
     stroke();
   };
-  const mesh = { nodes, links: { known: [], lost, route: [], soon: [] }, clock: {}, obstacles: [],
-    fence: [], trails: new Map(), selected: null, group: new Set() };
+  const mesh = { nodes, links: { known: [], lost, route: [], soon: [], relief: [] }, clock: {},
+    obstacles: [], fence: [], trails: new Map(), selected: null, group: new Set() };
   const options = { known: true, ranges: false, cast: new Set(),
     covered: { top: 0, bottom: 0 } };
   const drawn = drawMesh(context, new Camera(), mesh, readColours(), options, []);
@@ -618,6 +618,19 @@ def test_the_fence_is_drawn_with_its_names_and_heights(start_console, visit, tmp
     legend = page.page.inner_text("#map-card .legend")
     assert "stay inside" in legend
     assert "stay out" in legend
+
+
+def test_a_relief_with_its_batteries_and_pads_is_told(start_console, visit):
+    page = visit(start_console("--skip", "25", "--relief").url)
+    page.wait_for_drones(len(PLACES))
+    assert (page.row(1, BATTERY), page.row(2, BATTERY)) == ("24 % 0:50", "87 % 13:25")
+    assert page.row(2, DOES).startswith("relieves 1; ")
+    legend = page.page.inner_text("#map-card .legend")
+    assert re.search(r"pad; filled: a crew is at work\s+relieves", legend)
+    served = "the crew swaps its battery: 12 s left"
+    for node, fact in ((1, "Relieved by\n2"), (2, "Relieves\n1"), (3, served)):
+        page.page.click(f"#nodes tr[data-id='{node}']")
+        page.wait_for(fact, lambda fact=fact: fact in page.page.inner_text("#node-facts"))
 
 
 SHOWN_RATES = """async (whole) => {

@@ -1,16 +1,25 @@
 #!/usr/bin/env python3
-"""Two drones hover for longer than their batteries last, because two spares relieve them."""
+"""Two drones hover for longer than their batteries last, because two spares relieve them.
+
+The manager is killed amid a relief. Before, the demonstration explains one relief.
+"""
 
 from __future__ import annotations
 
 import math
+import os
+import signal
 import unittest
 
 import rospy
 import rostest
-from rostest_support import MeshWatch, call, wait_for
+from rostest_support import WALL_LIMIT_S, MeshWatch, call, pid_of, wait_for
 
+from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.console.relief_demonstration import ReliefDemonstration
 from drone_mesh.msg import Location, MeshState
+from drone_mesh.ros.graph.conversions import mesh_status
+from drone_mesh.ros.views.console_controls import RosControls
 from drone_mesh.srv import OrderFormation
 
 POSTS = {3: (5.0, 4.0, 4), 4: (5.0, 8.0, 4)}  # x, y, z
@@ -18,10 +27,33 @@ POSTS_KEPT_S = 420.0  # simulated; a battery lasts for 180 s
 HOLDS_M = 2.2  # of the place or the one beside it
 
 
+def state() -> MeshState:
+    return rospy.wait_for_message("/mesh/state", MeshState, WALL_LIMIT_S)
+
+
 class ReliefTest(unittest.TestCase):
-    def test_two_posts_stay_held_by_drones_that_take_turns(self) -> None:
+    def test_1_the_demonstration_explains_a_relief_and_puts_everything_back(self) -> None:
+        MeshWatch(5).wait("all connected", 60, lambda: all(n.connected for n in state().nodes))
+        controls, demonstration = RosControls(), ReliefDemonstration()
+        mesh = mesh_status(state())
+        while not demonstration.is_over:
+            for order in demonstration.advance(mesh):
+                order(controls)
+            mesh = mesh_status(state())
+        told = [step.text for step in demonstration.story.steps]
+        parts = ("[12] relieves [34]", "hovers beside", "flies home", "swaps its battery", "spare")
+        self.assertRegex("; ".join(told), ".*".join(parts))
+        self.assertEqual(told[-1], "Everything is put back: power, places and speed", told)
+
+    def test_2_two_posts_stay_held_by_drones_that_take_turns(self) -> None:
         mesh = MeshWatch(5)
         mesh.wait("all connected at the start", 60, mesh.connected)
+        routers = (
+            "all have full batteries",
+            60,
+            lambda: min(n.battery for n in state().nodes[1:]) > 95,
+        )
+        wait_for(*routers)
         places = [Location(latitude=y, longitude=x, height=z) for x, y, z in POSTS.values()]
         call(
             "/DroneManager/orderFormation", OrderFormation, "posts", list(POSTS), places, False, []
@@ -29,9 +61,11 @@ class ReliefTest(unittest.TestCase):
         held: list[set[int]] = [set(), set()]
         since_s = math.inf
         gaps, apart_m, charges = 0, math.inf, []
+        killed: list[int] = []
+        hover = 0
 
         def look(state: MeshState) -> None:
-            nonlocal since_s, gaps, apart_m
+            nonlocal since_s, gaps, apart_m, hover
             now_s = state.header.stamp.to_sec()
             near = [
                 {
@@ -41,6 +75,11 @@ class ReliefTest(unittest.TestCase):
                 }
                 for place in POSTS.values()
             ]
+            hover = sum(n.position[2] > 1.0 for n in state.nodes)
+            comes = any(n.relieves != NO_ROUTE and len(n.path) for n in state.nodes)
+            if comes and since_s < math.inf and not killed:
+                killed.append(pid_of("/DroneManager") or 0)
+                os.kill(killed[0], signal.SIGKILL)
             if all(near):
                 since_s = min(since_s, now_s)
             if since_s < math.inf:
@@ -60,6 +99,8 @@ class ReliefTest(unittest.TestCase):
             300,
             lambda: rospy.get_time() - since_s > POSTS_KEPT_S,
         )
+        self.assertNotIn(pid_of("/DroneManager"), [*killed, None])
+        wait_for("only two hover: nobody holds a third post", WALL_LIMIT_S, lambda: hover == 2)
         self.assertEqual(set.union(*held), {1, 2, 3, 4})  # both spares took their turns
         self.assertGreater(min(map(len, held)), 1)
         self.assertEqual(gaps, 0)

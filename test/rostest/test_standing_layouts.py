@@ -144,7 +144,7 @@ class StandingLayoutsTest(unittest.TestCase):
         self.assertIn("ordered", layout.stdout.readline())
         wait_for("it waits for 17", FLIGHTS_S, lambda: any(map(waits_for_17, self.open())))
         (number,) = (progress.id for progress in self.open())
-        (kept,) = json.loads(rospy.get_param("/DroneManager/standing"))
+        (kept,) = json.loads(rospy.get_param("/DroneManager/standing"))["orders"]
         self.assertTrue(kept["at_once"])
         os.kill(layout.pid, signal.SIGINT)
         self.assertEqual(layout.wait(60), 130)
@@ -186,7 +186,7 @@ class StandingLayoutsTest(unittest.TestCase):
 
     def stored(self, number: int) -> list[str]:
         """The drones that a manager which starts now would order."""
-        orders = json.loads(rospy.get_param("/DroneManager/standing", "[]"))
+        orders = json.loads(rospy.get_param("/DroneManager/standing"))["orders"]
         return [drone for order in orders if order["number"] == number for drone in order["goals"]]
 
     def waiting(self, number: int) -> bytes | None:

@@ -1,15 +1,16 @@
-"""RepairDemonstration: arranges a repair that a viewer can follow sentence by sentence.
+"""Demonstration: arranges what a viewer can follow sentence by sentence, such as a repair.
 
-Five routers form layout 202 of 2019, scaled to the range of the radios: a chain of two, and behind
-it a group of three. Then the second router of the chain is switched off. It begins with any fleet,
-and puts it back as it was.
+It begins with any fleet, and puts it back as it was. For the repair five routers form layout 202
+of 2019, scaled to the range of the radios: a chain of two, and behind it a group of three. Then the
+second router of the chain is switched off.
 """
 
 from __future__ import annotations
 
+import abc
 import math
 from dataclasses import dataclass
-from typing import Callable, Sequence
+from typing import Callable, ClassVar, Sequence
 
 from drone_mesh.communication.control.router_states import RepairState
 from drone_mesh.communication.interfaces import NO_ROUTE
@@ -78,7 +79,7 @@ class Casting:
         return cls(
             gateways[0].id,
             cast,
-            dict(zip(cast, _free_places(gateways[0], mesh.max_distance, others))),
+            dict(zip(cast, free_places(gateways[0], mesh.max_distance, others, _PLACES))),
             resting,
             FleetBefore.of(mesh, able),
         )
@@ -93,18 +94,24 @@ class Casting:
         )
 
 
-class RepairDemonstration:
+class Demonstration(abc.ABC):
     """Issues orders and describes what happens. Belongs to one thread, which carries them out."""
+
+    casting: ClassVar[type[Casting]] = Casting
 
     def __init__(self) -> None:
         self.story = RepairStory()
         self.plan: Casting | None = None  # from the first state on
         self.is_over = False
         self.is_leaving = False  # it puts everything back
-        self._script: Script = self._play()
+        self._script: Script = self._run()
         next(self._script)
         self._factor = 0.0  # ordered last; 0: none
         self._describes_repair = False  # flights before the repair also look like losses
+
+    @abc.abstractmethod
+    def _play(self, mesh: MeshStatus, plan: Casting) -> Script:
+        """What it shows, from this state on."""
 
     def advance(self, mesh: MeshStatus) -> list[Order]:
         """The orders due in this state of the mesh.
@@ -132,68 +139,13 @@ class RepairDemonstration:
         orders = [power(node, True) for node in (*self.plan.resting, *self.plan.cast)]
         return [*orders, *([speed(self.plan.before.real_time_factor)] if self._factor else [])]
 
-    def _play(self) -> Script:
+    def _run(self) -> Script:
         mesh = yield []
         while mesh.stamp_s < _STARTED_S:
             mesh = yield []
-        self.plan = plan = Casting.choose(mesh)
-        chain, group = plan.cast[:_CHAIN], plan.cast[_CHAIN:]
-        lost = chain[-1]
-        self.story.add(
-            f"The gateway sends five drones out: {and_(chain)} as a chain, {and_(group)} as a "
-            "group behind it. The others stay on until they are there, because orders need routes",
-            mesh.stamp_s,
-        )
-        dark = [node for node in (plan.gateway, *plan.cast) if node in plan.before.off]
-        mesh = yield [*(power(node, True) for node in dark), *self._at_pace(FAST)]
-        mesh = yield from self._bring(mesh, plan.places)
-        if plan.resting:
-            count = len(plan.resting)
-            self.story.add(
-                f"{count} other drone{'s' if count > 1 else ''} could provide another route, and "
-                f"{'are' if count > 1 else 'is'} switched off during the demonstration",
-                mesh.stamp_s,
-            )
-            mesh = yield [power(node, False) for node in plan.resting]
-        mesh = yield from self._until(
-            mesh,
-            f"{and_(plan.cast)} are not all connected at their places",
-            lambda m: (
-                _are_connected(m, plan.cast) and not any(away(n, plan.places) for n in m.nodes)
-            ),
-        )
-        settled_s = mesh.stamp_s + _SETTLE_S
-        self.story.add(
-            "All are connected. Each asks for the position of its next hop to the gateway, because "
-            "it would fly to that place if the next hop fell silent: from there it must be heard",
-            mesh.stamp_s,
-            settled_s,
-        )
-        mesh = yield from self._until(
-            mesh,
-            "the routers do not know the places of their next hops",
-            lambda m: m.stamp_s >= settled_s and _know_fallback(m, group, lost),
-        )
-        begun_s, self._describes_repair = mesh.stamp_s, True
-        self.story.update(mesh)
-        mesh = yield [power(lost, False), *self._at_pace(_WAITING)]
-        yield from self._follow(mesh, group, begun_s)
+        self.plan = self.casting.choose(mesh)
+        yield from self._play(mesh, self.plan)
         yield from self._put_back()
-
-    def _follow(self, mesh: MeshStatus, group: Sequence[int], begun_s: float) -> Script:
-        """Describe the repair until the group is connected again, adapting the speed."""
-        noticed = False
-        while True:
-            nodes = [node for node in mesh.nodes if node.id in group]
-            noticed = noticed or not all(node.connected for node in nodes)
-            if noticed and self.story.is_over and all(node.connected for node in nodes):
-                return
-            if mesh.stamp_s > begun_s + _REPAIR_WITHIN_S:
-                raise OrderRefused(
-                    f"{and_(group)} {_why_not(nodes)} after {_REPAIR_WITHIN_S:.0f} s "
-                    f"(repair strategy: {mesh.repair_strategy or 'unknown'})"
-                )
-            mesh = yield self._at_pace(_pace(nodes))
 
     def _put_back(self) -> Script:
         self._describes_repair, self.is_leaving = False, True
@@ -238,15 +190,84 @@ class RepairDemonstration:
         return [speed(factor)]
 
 
-def _free_places(gateway: NodeStatus, range_m: float, others: Sequence[NodeStatus]) -> list[Place]:
-    """Five places beside the gateway, in the first direction where no other drone is near them."""
+class RepairDemonstration(Demonstration):
+    """A repair: the second router of a chain is switched off."""
+
+    def _play(self, mesh: MeshStatus, plan: Casting) -> Script:
+        chain, group = plan.cast[:_CHAIN], plan.cast[_CHAIN:]
+        lost = chain[-1]
+        self.story.add(
+            f"The gateway sends five drones out: {and_(chain)} as a chain, {and_(group)} as a "
+            "group behind it. The others stay on until they are there, because orders need routes",
+            mesh.stamp_s,
+        )
+        dark = [node for node in (plan.gateway, *plan.cast) if node in plan.before.off]
+        mesh = yield [*(power(node, True) for node in dark), *self._at_pace(FAST)]
+        mesh = yield from self._bring(mesh, plan.places)
+        if plan.resting:
+            count = len(plan.resting)
+            self.story.add(
+                f"{count} other drone{'s' if count > 1 else ''} could provide another route, and "
+                f"{'are' if count > 1 else 'is'} switched off during the demonstration",
+                mesh.stamp_s,
+            )
+            mesh = yield [power(node, False) for node in plan.resting]
+        mesh = yield from self._until(
+            mesh,
+            f"{and_(plan.cast)} are not all connected at their places",
+            lambda m: (
+                _are_connected(m, plan.cast) and not any(away(n, plan.places) for n in m.nodes)
+            ),
+        )
+        settled_s = mesh.stamp_s + _SETTLE_S
+        self.story.add(
+            "All are connected. Each asks for the position of its next hop to the gateway, because "
+            "it would fly to that place if the next hop fell silent: from there it must be heard",
+            mesh.stamp_s,
+            settled_s,
+        )
+        mesh = yield from self._until(
+            mesh,
+            "the routers do not know the places of their next hops",
+            lambda m: m.stamp_s >= settled_s and _know_fallback(m, group, lost),
+        )
+        begun_s, self._describes_repair = mesh.stamp_s, True
+        self.story.update(mesh)
+        mesh = yield [power(lost, False), *self._at_pace(_WAITING)]
+        yield from self._follow(mesh, group, begun_s)
+
+    def _follow(self, mesh: MeshStatus, group: Sequence[int], begun_s: float) -> Script:
+        """Describe the repair until the group is connected again, adapting the speed."""
+        noticed = False
+        while True:
+            nodes = [node for node in mesh.nodes if node.id in group]
+            noticed = noticed or not all(node.connected for node in nodes)
+            if noticed and self.story.is_over and all(node.connected for node in nodes):
+                return
+            if mesh.stamp_s > begun_s + _REPAIR_WITHIN_S:
+                raise OrderRefused(
+                    f"{and_(group)} {_why_not(nodes)} after {_REPAIR_WITHIN_S:.0f} s "
+                    f"(repair strategy: {mesh.repair_strategy or 'unknown'})"
+                )
+            mesh = yield self._at_pace(_pace(nodes))
+
+
+def free_places(
+    gateway: NodeStatus,
+    range_m: float,
+    others: Sequence[NodeStatus],
+    places: Sequence[tuple[float, float]],
+    up_m: float = 0.0,
+) -> list[Place]:
+    """These places beside the gateway, in the first direction where no other drone is near them.
+
+    `places`: x, y from the gateway, in ranges; `up_m`: above it.
+    """
     x, y, z = gateway.position
 
     def pointing(cos: int, sin: int) -> list[Place]:
-        return [
-            rounded((x + (cos * dx - sin * dy) * range_m, y + (sin * dx + cos * dy) * range_m, z))
-            for dx, dy in _PLACES
-        ]
+        around = [(cos * dx - sin * dy, sin * dx + cos * dy) for dx, dy in places]
+        return [rounded((x + dx * range_m, y + dy * range_m, z + up_m)) for dx, dy in around]
 
     def room_m(places: Sequence[Place]) -> float:
         free = (math.dist(at[:2], other.position[:2]) for at in places for other in others)

@@ -18,6 +18,7 @@ from collections import deque
 from dataclasses import asdict, astuple
 from typing import Any, Iterable, Mapping, Sequence
 
+from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.console.history import History
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.state.alarms import AlarmBook
@@ -349,6 +350,10 @@ def _fields(node: NodeStatus, trouble: Trouble | None) -> dict[str, Any]:
         "repair": node.repair,
         "mission": node.mission,
         "battery": round(node.battery) if math.isfinite(node.battery) else None,
+        "time_left": round(node.time_left / 5) * 5 if math.isfinite(node.time_left) else None,
+        "home": _centimetres(node.home),
+        "pad": node.pad,
+        "relieves": None if node.relieves == NO_ROUTE else node.relieves,
         "why_not_fly": node.why_not_fly,
         "channel": channel_in_words(node),
         "data": data_in_words(node),

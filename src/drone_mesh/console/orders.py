@@ -248,7 +248,7 @@ class NeighbourWatch(_Request):
 
 
 class Demonstrate(_Answered):
-    """Begin or end the demonstration of a repair, or ask what it would do (`plan`)."""
+    """Begin or end the demonstration, or ask what it would do (`plan`)."""
 
     do: Literal["demonstrate"]
     heard: HeardOrNone = None

@@ -150,14 +150,14 @@ class ConsoleServer:
         controls: MeshControls,
         access: Access,
         layouts: Sequence[LayoutOffer] = (),
-        demonstrate: bool = False,
+        demo: str = "",
         actions: Sequence[str] = ALL_ACTIONS,
         recording: str = "",
         whole: History | None = None,
         is_played: bool = True,
         tiles: Tiles | None = None,
     ) -> None:
-        """`demonstrate`: show a repair as soon as a page opens; `actions`: the orders it offers.
+        """`demo`: show this of DEMONSTRATIONS as soon as a page opens; `actions`: what it offers.
 
         `recording`: its name, if the console shows one; `whole`: its whole history. Without
         `whole`, pages look back at the store's history. A recording that is not playing is shown
@@ -173,8 +173,9 @@ class ConsoleServer:
         self._recording = recording
         self._pages: set[Page] = set()
         self._workers = ThreadPoolExecutor(ORDER_THREADS, thread_name_prefix="order")
-        self._stage = Stage(store, controls, self._workers)
-        self._demonstrate = demonstrate
+        self._demo = demo or "repair"  # for the button
+        self._stage = Stage(store, controls, self._workers, self._demo)
+        self._demonstrate = bool(demo)
         self.app = Starlette(
             routes=[
                 Route("/", self._index),
@@ -261,6 +262,7 @@ class ConsoleServer:
                 "actions": list(self._actions),
                 "packet_kinds": [kind.value for kind in PacketKind],
                 "recording": self._recording,
+                "demo": self._demo,
                 "map": self._tiles.for_page() if self._tiles else None,
             }
             await self._send(page, json.dumps(hello))

@@ -9,11 +9,16 @@ from concurrent.futures import Executor
 from typing import Any, Mapping, Sequence
 
 from drone_mesh.console.controls import MeshControls, OrderRefused
-from drone_mesh.console.demonstration import Casting, RepairDemonstration
+from drone_mesh.console.demonstration import Demonstration, RepairDemonstration
 from drone_mesh.console.frame_store import FrameStore
 from drone_mesh.console.put_back import Order
+from drone_mesh.console.relief_demonstration import ReliefDemonstration
 from drone_mesh.state.model import MeshStatus
 
+DEMONSTRATIONS: Mapping[str, type[Demonstration]] = {
+    "repair": RepairDemonstration,
+    "relief": ReliefDemonstration,
+}
 POLL_PERIOD_S = 0.1  # wall time
 ENDED_AT_ONCE = "Ended at once: all are switched on, and those that are away stay where they are"
 
@@ -21,7 +26,11 @@ ENDED_AT_ONCE = "Ended at once: all are switched on, and those that are away sta
 class Stage:
     """One demonstration at a time. Belongs to the server's event loop; orders run in `workers`."""
 
-    def __init__(self, store: FrameStore, controls: MeshControls, workers: Executor) -> None:
+    def __init__(
+        self, store: FrameStore, controls: MeshControls, workers: Executor, what: str
+    ) -> None:
+        """`what`: one of DEMONSTRATIONS."""
+        self._kind = DEMONSTRATIONS[what]
         self._store = store
         self._controls = controls
         self._workers = workers
@@ -32,14 +41,14 @@ class Stage:
         """The plan of a demonstration, as a question. Raises OrderRefused if it cannot begin."""
         if self._store.mesh is None:
             raise OrderRefused("no state of a mesh yet")
-        return Casting.choose(self._store.mesh).in_words()
+        return self._kind.casting.choose(self._store.mesh).in_words()
 
     def begin(self) -> str:
         """Begin a demonstration; returns words for the page. Raises OrderRefused."""
         if self._running is not None and not self._running.done():
             raise OrderRefused("a demonstration is running")
         self._ending = False
-        self._running = asyncio.ensure_future(self._play(RepairDemonstration()))
+        self._running = asyncio.ensure_future(self._play(self._kind()))
         return "the demonstration begins"
 
     def end(self) -> str:
@@ -56,7 +65,7 @@ class Stage:
         self._store.set_story({})
         return "closed"
 
-    async def _play(self, demonstration: RepairDemonstration) -> None:
+    async def _play(self, demonstration: Demonstration) -> None:
         shown = None
         try:
             while not demonstration.is_over:
@@ -92,9 +101,7 @@ class Stage:
             await loop.run_in_executor(self._workers, order, self._controls)
 
 
-def describe(
-    demonstration: RepairDemonstration, mesh: MeshStatus, running: bool
-) -> Mapping[str, Any]:
+def describe(demonstration: Demonstration, mesh: MeshStatus, running: bool) -> Mapping[str, Any]:
     """The story for a page.
 
     Its steps, how many seconds the mesh still waits at the last one, who takes part, and the places

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple, Sequence
 
 GRAVITY_M_S2 = 9.81
 LAND_AT_PERCENT = 20.0  # it comes down while it still can
@@ -47,6 +48,14 @@ class PowerModel:
         return self.hover_s * self.watts(0.0)
 
 
+class Endurance(NamedTuple):
+    """How long a drone can stay in the air."""
+
+    hover_left_s: float = math.nan  # until it comes down by itself; NaN: for ever, or unknown
+    home: Sequence[float] = ()  # (3,) m, its pad, where crews swap its battery; empty: none
+    pad: str = ""  # what they do for it, in words; empty: nothing
+
+
 class Battery:
     """The charge of one drone."""
 
@@ -60,6 +69,11 @@ class Battery:
     def percent(self) -> float:
         """Its charge, 0..100."""
         return 100.0 * self._left_j / self._full_j
+
+    @property
+    def hover_left_s(self) -> float:
+        """How long it can hover until it comes down."""
+        return max(0.0, self.percent - LAND_AT_PERCENT) / 100.0 * self._model.hover_s
 
     def use(self, seconds: float, speed_m_s: float | None) -> None:
         """Let so much time pass at this speed in the air; None: on the ground."""
@@ -94,6 +108,14 @@ class Crews:
         del ends_s[drone]
         self.swaps += 1
         return True
+
+    def in_words(self, drone: int, pad: int, now_s: float) -> str:
+        """What they do for this drone, or that it waits; empty: neither. Any thread."""
+        end_s = self._ends_s.get(pad, {}).get(drone)
+        crew = "the crew" if self._at_once == 1 else f"one of {self._at_once} crews"
+        if end_s is None or math.isinf(end_s):
+            return "" if end_s is None else f"waits for {crew}"
+        return f"{crew} swaps its battery: {max(0.0, end_s - now_s):.0f} s left"
 
     def leave(self, drone: int, pad: int) -> None:
         """It does not want one any more."""

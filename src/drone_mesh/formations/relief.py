@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Mapping, NamedTuple, Sequence
+from typing import Any, Iterable, Mapping, NamedTuple, Sequence
 
 from drone_mesh.drone.battery import LAND_AT_PERCENT, READY_PERCENT, PowerModel
 from drone_mesh.drone.flight_path import SPEED_M_S
@@ -51,8 +51,8 @@ class _Use:
     now_s: float
 
     def per_s(self, usual: float) -> float:
-        used = self.begin_percent - self.percent
-        return used / (self.now_s - self.begin_s) if used >= LEAST_USE_PERCENT else usual
+        used, passed_s = self.begin_percent - self.percent, self.now_s - self.begin_s
+        return used / passed_s if used >= LEAST_USE_PERCENT and passed_s > 0.0 else usual
 
 
 @dataclass
@@ -65,6 +65,7 @@ class _Turn:
     to: Location
     begin_s: float
     number: int = 0  # of its standing order
+    arrived: bool = False  # it has been there
     there_s: float | None = None  # since when it is connected there
 
 
@@ -84,7 +85,7 @@ class Relief:
         self._empty: list[Sequence[Location]] = []  # posts without a holder
         self._left: dict[int, Sequence[Location]] = {}  # by drone that fell silent at its post
         self._turns: list[_Turn] = []
-        self._homing: set[int] = set()  # ordered home
+        self._homing: dict[int, int | None] = {}  # ordered home, by which order
         self._uses: dict[int, _Use] = {}
         self.is_active = policy.is_active
         self.reliefs = 0  # drones that left when another one carried their traffic
@@ -95,7 +96,10 @@ class Relief:
         orders: StandingOrders,
         rules: FlightRules = FlightRules(),  # noqa: B008 (immutable)
     ) -> None:
-        """Compare the charges with the state of the mesh, and give or withdraw orders."""
+        """Compare the charges with the state of the mesh, and give or withdraw orders.
+
+        Of `orders` it needs the lock only for moments: to look for ways takes long.
+        """
         if not self.is_active:
             return
         known = {node.id: node for node in mesh.nodes if position_is_known(node)}
@@ -134,10 +138,13 @@ class Relief:
             here, flies = Location.from_vector(node.position), bool(len(node.path))
             in_air = flies or here.height > IN_AIR_M
             self._note_use(node, in_air, mesh.stamp_s)
+            if len(node.home):
+                self._homes[drone] = Location.from_vector(node.home)
             if not in_air:
                 self._homes.setdefault(drone, here)
-                self._homing.discard(drone)
                 self._left.pop(drone, None)
+            if not in_air or self._is_called_away(node, orders):
+                self._homing.pop(drone, None)
             if drone in busy or drone in self._homing or flies:
                 continue
             if node.on and in_air and not node.crashed and not len(node.heading):
@@ -156,7 +163,7 @@ class Relief:
     def _come_back(self, drone: int, orders: StandingOrders, now_s: float) -> None:
         """It was silent at its post: nobody came, somebody is coming, or holds it meanwhile."""
         post = self._left.pop(drone)
-        coming = next((turn for turn in self._turns if turn.places is post), None)
+        coming = next((turn for turn in self._turns if turn.places == post), None)
         if post in self._empty:
             self._empty.remove(post)
         elif coming is None or coming.old is not None:
@@ -165,6 +172,12 @@ class Relief:
         else:
             coming.old = drone
         self._posts[drone] = post
+
+    def _is_called_away(self, node: NodeStatus, orders: StandingOrders) -> bool:
+        """Whether somebody else has sent it elsewhere on its way home."""
+        number = self._homing.get(node.id)
+        is_over = number is not None and not orders.stands(number)
+        return is_over and not _leads_to(node, [self._homes[node.id]])
 
     def _note_use(self, node: NodeStatus, in_air: bool, now_s: float) -> None:
         use = self._uses.get(node.id)
@@ -243,9 +256,15 @@ class Relief:
         rules: FlightRules,
     ) -> bool:
         """Begin the next relief; returns whether there was one to begin."""
-        busy = self._busy() | self._homing
+        busy = self._busy() | self._homing.keys()
         spares = sorted(self._homes.keys() & known.keys() - self._posts.keys())
-        ready = [drone for drone in spares if drone not in busy and self._is_ready(known[drone])]
+        ready = [
+            drone
+            for drone in spares
+            if drone not in busy
+            and self._is_ready(known[drone])
+            and not orders.is_bound(drone, self._homes[drone], mesh.stamp_s)
+        ]
         places = [p for post in [*self._posts.values(), *self._empty] for p in post]
         fixed = Airspace(rules.sway_m, rules.clearance_m)
         for count, place in enumerate(places[:_MOST_PLACES]):
@@ -305,35 +324,61 @@ class Relief:
 
     def _send(self, turn: _Turn, orders: StandingOrders) -> None:
         what = "fills a gap" if turn.old is None else f"relieves drone {turn.old}"
-        name = f"drone {turn.new} {what}"
-        turn.number = orders.give(name, {turn.new: turn.to}, turn.begin_s)
+        name, goals = f"drone {turn.new} {what}", {turn.new: turn.to}
+        turn.number = orders.give(name, goals, turn.begin_s, relieves=turn.old)
         self._turns.append(turn)
 
     def _go_on(
         self, turn: _Turn, nodes: Mapping[int, NodeStatus], orders: StandingOrders, now_s: float
     ) -> None:
         new, old = nodes.get(turn.new), nodes.get(-1 if turn.old is None else turn.old)
-        if new is None or not new.on or new.crashed or now_s - turn.begin_s > GIVE_UP_S:
-            self._turns.remove(turn)
-            orders.end(turn.number)
-            if turn.old is None:
-                self._empty.append(turn.places)
-            if new is not None and new.on and not self._is_home(new):
-                self._send_home(turn.new, orders, now_s)
+        if new is None or not new.on or new.crashed:
+            self._give_up(turn, orders)
             self._left[turn.new] = turn.places
-            return
-        if not (_is_at(new, turn.to) and new.connected and not len(new.path)):
+        elif self._is_off(turn, new, orders):
+            self._give_up(turn, orders)
+        elif (old and self._has_left(turn, old)) or now_s - turn.begin_s > GIVE_UP_S:
+            self._give_up(turn, orders)
+            if not self._is_home(new):
+                self._send_home(turn.new, orders, now_s)
+        elif not (_is_at(new, turn.to) and not len(new.path)):
             turn.there_s = None
-            return
-        turn.there_s = now_s if turn.there_s is None else turn.there_s
-        if now_s - turn.there_s < CARRIES_S:
-            return
+        else:
+            turn.arrived = True
+            since_s = now_s if turn.there_s is None else turn.there_s
+            turn.there_s = since_s if new.connected else None
+            if new.connected and now_s - since_s >= CARRIES_S:
+                self._take_over(turn, old, orders, now_s)
+
+    def _is_off(self, turn: _Turn, new: NodeStatus, orders: StandingOrders) -> bool:
+        """Whether somebody else has sent the new one elsewhere, or a repair took it there."""
+        is_ours = not turn.arrived and orders.stands(turn.number)
+        return not is_ours and not _leads_to(new, [turn.to])
+
+    def _has_left(self, turn: _Turn, old: NodeStatus) -> bool:
+        """Whether the old one was sent elsewhere: it takes its post along.
+
+        One that has failed, or comes down by itself, leaves it behind.
+        """
+        can_stay = old.on and not old.crashed and not self._is_low(old)
+        return can_stay and not _leads_to(old, turn.places)
+
+    def _give_up(self, turn: _Turn, orders: StandingOrders) -> None:
         self._turns.remove(turn)
+        orders.end(turn.number)
+        if turn.old is None:
+            self._empty.append(turn.places)
+
+    def _take_over(
+        self, turn: _Turn, old: NodeStatus | None, orders: StandingOrders, now_s: float
+    ) -> None:
+        self._turns.remove(turn)
+        orders.end(turn.number)
         self._posts[turn.new] = turn.places
         if turn.old is not None:
             self._posts.pop(turn.old, None)
             self.reliefs += 1
-            if old is not None and old.on:
+            if old is not None and old.on and not old.crashed:
                 self._send_home(turn.old, orders, now_s)
             else:
                 self._left[turn.old] = turn.places
@@ -342,9 +387,43 @@ class Relief:
         return node.id in self._homes and _is_at(node, self._homes[node.id])
 
     def _send_home(self, drone: int, orders: StandingOrders, now_s: float) -> None:
-        self._homing.add(drone)  # without a known home too: it holds no post any more
-        if drone in self._homes:
-            orders.give(f"drone {drone} goes home", {drone: self._homes[drone]}, now_s)
+        home, number = self._homes.get(drone), None
+        if home is not None:
+            number = orders.give(f"drone {drone} goes home", {drone: home}, now_s)
+        self._homing[drone] = number  # without a known home too: it holds no post any more
+
+    # For a restart ---------------------------------------------------------------------------
+
+    def saved(self) -> dict[str, Any]:
+        """Its posts and reliefs, as plain values that `restore` reads."""
+        return {
+            "posts": list(self._posts.items()),
+            "empty": list(self._empty),
+            "left": list(self._left.items()),
+            "homing": list(self._homing.items()),
+            "turns": [dict(vars(turn)) for turn in self._turns],
+        }
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Go on with what `saved` returned. Raises KeyError, TypeError or ValueError."""
+        self._posts = {int(drone): _places(post) for drone, post in saved["posts"]}
+        self._empty = [_places(post) for post in saved["empty"]]
+        self._left = {int(drone): _places(post) for drone, post in saved["left"]}
+        self._homing = dict(saved["homing"])
+        self._turns = [
+            _Turn(**{**turn, "places": _places(turn["places"]), "to": Location(*turn["to"])})
+            for turn in saved["turns"]
+        ]
+
+
+def _places(post: Iterable[Iterable[float]]) -> Sequence[Location]:
+    return tuple(Location(*place) for place in post)
+
+
+def _leads_to(node: NodeStatus, places: Iterable[Location]) -> bool:
+    """Whether it flies to one of these places, or is about there."""
+    end = Location.from_vector(node.path[-3:] if len(node.path) else node.position)
+    return any(end.distance_m(place) <= BESIDE_M / 2 for place in places)
 
 
 def _is_at_one(node: NodeStatus, post: Sequence[Location]) -> bool:

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import enum
 import math
+from contextlib import nullcontext
 from dataclasses import dataclass, field
-from typing import Any, Iterable, Mapping, Sequence
+from typing import Any, ContextManager, Iterable, Mapping, Sequence
 
 from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.drone.fleet import ids_in_words
@@ -93,11 +94,13 @@ class StandingProgress:
     name: str
     drones: Mapping[PartState, Sequence[int]]
     reasons: Mapping[int, str] = field(default_factory=dict)  # of the refused drones
+    relieves: int | None = None  # the drone whose place its drone takes
 
     @property
     def is_over(self) -> bool:
-        """Whether nothing is left to order."""
-        return not any(self.drones[state] for state in PartState if state.is_open)
+        """Whether nothing is left to order; a relief is over when it was ended."""
+        is_open = any(self.drones[state] for state in PartState if state.is_open)
+        return self.relieves is None and not is_open
 
     def in_words(self) -> str:
         """One line, such as: 12 of 17 at their places, 3 flying, 2 without a route: 4, 9."""
@@ -126,6 +129,7 @@ class _StandingOrder:
     parts: Mapping[int, _Part]  # by drone
     given_s: float
     at_once: bool
+    relieves: int | None = None
 
     def is_moving(self) -> bool:
         """Whether a drone has still to arrive: it may then connect others."""
@@ -139,34 +143,57 @@ class _StandingOrder:
             for state in PartState
         }
         reasons = {drone: self.parts[drone].reason for drone in by_state[PartState.REFUSED]}
-        return StandingProgress(self.number, self.name, by_state, reasons)
+        return StandingProgress(self.number, self.name, by_state, reasons, self.relieves)
 
 
 class StandingOrders:
-    """All layouts that were ordered and are not complete. Not thread-safe.
+    """All layouts that were ordered and are not complete.
 
-    Each drone has at most one goal: that of the latest order for it.
+    Each drone has at most one goal: that of the latest order for it. Whoever shares them between
+    threads holds a lock for each call; what a Relief calls takes it itself.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, lock: ContextManager[object] | None = None) -> None:
+        """`lock`: a reentrant one; None: they belong to one thread."""
+        self._lock = lock or nullcontext()
         self._orders: dict[int, _StandingOrder] = {}  # by number, oldest first
         self._sent: dict[int, tuple[Location, float]] = {}  # latest order of each drone, and when
         self._last_number = 0
 
     def give(
-        self, name: str, goals: Mapping[int, Location], now_s: float, at_once: bool = False
+        self,
+        name: str,
+        goals: Mapping[int, Location],
+        now_s: float,
+        at_once: bool = False,
+        relieves: int | None = None,
     ) -> int:
         """Begin an order to these drones, which replaces their earlier goals; returns its number.
 
         `name`: such as "layout 202"; `now_s`: simulated time. `at_once`: all drones set out
-        together, whatever becomes of the mesh and whomever they meet. The first orders are those of
-        the next `update`.
+        together, whatever becomes of the mesh and whomever they meet. `relieves`: the drone whose
+        place is taken; the order then lasts until `end`. The first orders are those of the next
+        `update`.
         """
-        self._replace(goals)
-        number = self._last_number = self._last_number + 1
         parts = {drone: _Part(goal) for drone, goal in goals.items()}
-        self._orders[number] = _StandingOrder(number, name, parts, now_s, at_once)
+        with self._lock:
+            self._replace(goals)
+            number = self._last_number = self._last_number + 1
+            self._orders[number] = _StandingOrder(number, name, parts, now_s, at_once, relieves)
         return number
+
+    def stands(self, number: int) -> bool:
+        """Whether this order is known, and no later one has sent its drones elsewhere."""
+        with self._lock:
+            order = self._orders.get(number)
+            parts = order.parts.values() if order else ()
+            return bool(order) and all(part.state is not PartState.REPLACED for part in parts)
+
+    def is_bound(self, drone: int, at: Location, now_s: float) -> bool:
+        """Whether an order may still move this drone, which stands there."""
+        with self._lock:
+            parts = [order.parts[drone] for order in self._orders.values() if drone in order.parts]
+            return any(part.state.is_open for part in parts) or self._may_leave(drone, at, now_s)
 
     def ordered(self, drone: int, to: Location, now_s: float) -> None:
         """Somebody else ordered this drone to a place."""
@@ -186,9 +213,11 @@ class StandingOrders:
 
     def end(self, number: int) -> None:
         """Like withdraw, but its last progress, which is over, is still shown to who watches it."""
-        if number in self._orders:
-            for part in self._orders[number].parts.values():
-                part.replace()
+        with self._lock:
+            if number in self._orders:
+                self._orders[number].relieves = None
+                for part in self._orders[number].parts.values():
+                    part.replace()
 
     def on_event(self, event: EventRecord) -> None:
         """Process an event: a drone refused its order, or somebody else sent it elsewhere."""
@@ -327,10 +356,11 @@ class StandingOrders:
                 "number": order.number,
                 "name": order.name,
                 "at_once": order.at_once,
+                "relieves": order.relieves,
                 "goals": {
                     str(drone): list(part.goal)
                     for drone, part in order.parts.items()
-                    if part.state.is_open
+                    if part.state.is_open or order.relieves is not None
                 },
             }
             for order in self._orders.values()
@@ -341,7 +371,7 @@ class StandingOrders:
         for entry in saved:
             parts = {int(n): _Part(Location(*goal)) for n, goal in entry["goals"].items()}
             number = int(entry["number"])
-            self._orders[number] = _StandingOrder(
-                number, str(entry["name"]), parts, -math.inf, bool(entry["at_once"])
-            )
+            name, at_once = str(entry["name"]), bool(entry["at_once"])
+            order = _StandingOrder(number, name, parts, -math.inf, at_once, entry["relieves"])
+            self._orders[number] = order
             self._last_number = max(self._last_number, number)

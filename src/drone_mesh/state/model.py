@@ -68,6 +68,10 @@ class NodeStatus:
     mission: str = ""  # what its pilot flies, and how far it is, in words; empty: none
     repair: str = ""  # what the node does about a lost connection, and why; empty: nothing
     repair_reason: str = ""  # that why alone: of a node that does not fly or bid, or lands early
+    time_left: float = math.nan  # simulated s that it can hover until it comes down; NaN: unknown
+    home: Sequence[float] = ()  # (3,) m, its pad, where crews swap its battery; empty: none
+    pad: str = ""  # what they do for it, in words; empty: nothing
+    relieves: int = NO_ROUTE  # the drone whose place it takes; NO_ROUTE: none
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from drone_mesh.communication.events.observer import MeshEvent, MeshEventKind
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.node.component import MeshnetworkComponent
 from drone_mesh.communication.repair.status import NOTHING_TO_REPAIR
+from drone_mesh.drone.battery import Endurance
 from drone_mesh.drone.fence import Fence
 from drone_mesh.drone.flight_path import FlightPath, Vector
 from drone_mesh.drone.roles import Role
@@ -92,6 +93,7 @@ class DroneView:
     crashed: bool = False
     why_not_fly: str = ""  # empty: it can fly
     mission: str = ""  # in words; empty: none
+    endurance: Endurance = Endurance()
 
 
 class MeshRoster:
@@ -136,6 +138,7 @@ class MeshRoster:
             if view is not None:
                 node.battery, node.crashed = view.battery, view.crashed
                 node.why_not_fly, node.mission = view.why_not_fly, view.mission
+                node.time_left, node.home, node.pad = view.endurance
                 node.on = node.on and view.battery != 0.0
             node.route = route_to_gateway(node.id, self._nodes)
             node.report_age = wall_s - self._heard_at_s[node.id]

@@ -15,6 +15,7 @@ from drone_mesh.drone.battery import (
     READY_PERCENT,
     Battery,
     Crews,
+    Endurance,
     PowerModel,
 )
 from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath, PlanFlight, Vector
@@ -154,6 +155,13 @@ class DynamicEngine(DroneEngine):
 
     def battery_percent(self) -> float:
         return self._battery.percent
+
+    def endurance(self, now_s: float) -> Endurance:
+        if self._crews is None:
+            return Endurance(self._battery.hover_left_s)
+        home = self._home._replace(height=self._home.height - self._half_height_m).to_vector()
+        pad = self._crews.in_words(self._box, ONE_PAD, now_s)
+        return Endurance(self._battery.hover_left_s, home, pad)
 
     @property
     def is_flat(self) -> bool:

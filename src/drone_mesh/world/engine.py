@@ -9,6 +9,7 @@ from typing import Callable, NamedTuple
 
 from drone_mesh.air.obstacles import no_path
 from drone_mesh.communication.events.observer import MeshEventKind
+from drone_mesh.drone.battery import Endurance
 from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath, PlanFlight, Vector
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine
@@ -93,6 +94,10 @@ class DroneEngine(IDroneEngine):
     def is_flat(self) -> bool:
         """Whether the battery is empty, so that its node is off as well."""
         return False
+
+    def endurance(self, _now_s: float) -> Endurance:
+        """How long it can stay in the air, and its pad."""
+        return Endurance()
 
     def add_listener(self, listener: StateListener) -> None:
         """Call `listener` with the new state in each step that moves the drone.

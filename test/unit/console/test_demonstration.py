@@ -11,6 +11,7 @@ import pytest
 
 from drone_mesh.console.controls import OrderRefused
 from drone_mesh.console.demonstration import Casting, RepairDemonstration
+from drone_mesh.console.relief_demonstration import ReliefDemonstration
 from drone_mesh.formations.layouts import Layouts
 from drone_mesh.inprocess import Network
 from drone_mesh.state.alarms import AlarmBook
@@ -255,6 +256,16 @@ def test_a_strategy_that_never_flies_ends_it_with_the_reason():
     why = "Not finished: 3, 4 and 5 have no gateway, and none flew after 240 s"
     assert any(text.startswith(why) for text in texts(demonstration))
     assert fleet.is_off == set()
+
+
+def test_without_pads_a_relief_is_refused_with_the_command_that_has_them():
+    demonstration = ReliefDemonstration()
+    fleet = Fleet()
+    fleet.watch(demonstration)
+    assert texts(demonstration) == [
+        "Not finished: this demonstration needs a gateway, and 3 routers on pads with crews: start "
+        "it with scripts/run demo:=relief"
+    ]
 
 
 def test_four_routers_are_too_few():

@@ -38,6 +38,8 @@ def test_a_state_comes_back_as_it_was():
                 neighbours=b"\x01",
                 battery=80.0,
                 fallback_age=1.5,
+                time_left=720.0,
+                home=[0.0, 2.0, 0.0],
             )
         ],
         obstacles=[ObstacleStatus([1.0, 2.0, 0.0], [1.0, 1.0, 3.0], 0.5)],

@@ -181,6 +181,7 @@ def test_a_page_is_greeted_and_then_gets_everything():
             "actions": ACTIONS,
             "packet_kinds": KINDS,
             "recording": "",
+            "demo": "repair",
             "map": None,
         }
         assert page.received[1]["full"]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import pytest
 
 from drone_mesh.configuration import FactoryConfiguration
@@ -184,3 +186,91 @@ def test_a_drone_whose_home_is_unknown_holds_no_post_of_its_own_when_it_is_relie
     mesh.sent()
     mesh.holder.battery = 100.0
     assert mesh.sent(5) == {}  # nobody fills a post that is held
+
+
+AWAY = Location(0.0, -9.0, 4.0)
+
+
+def relief_on_its_way():
+    """The spare flies to the place beside the post; returns the mesh and that place."""
+    mesh = Mesh()
+    mesh.sent()
+    mesh.hover(mesh.holder, 26.0)
+    ((drone, place),) = mesh.sent().items()
+    assert drone == 2
+    mesh.spare.position, mesh.spare.path = (1.0, 4.0, 4.0), place.to_vector()
+    mesh.sent()
+    return mesh, place
+
+
+def fly(mesh, node, place):
+    """It flies there, and needs no time for that."""
+    node.path = place.to_vector()
+    sent = mesh.sent()
+    node.position, node.path = place.to_vector(), ()
+    return {**sent, **mesh.sent()}
+
+
+def test_a_restart_amid_a_relief_makes_no_second_post():
+    mesh, place = relief_on_its_way()
+    left = json.loads(json.dumps([mesh.orders.saved(), mesh.relief.saved()]))
+    mesh.orders, mesh.relief = StandingOrders(), Relief(relief_policy("spare_first"))
+    mesh.orders.restore(left[0])
+    mesh.relief.restore(left[1])
+    mesh.spare.home, mesh.holder.home = HOME.to_vector(), OTHER.to_vector()
+    assert fly(mesh, mesh.spare, place) == {}
+    assert mesh.sent(6) == {1: OTHER}
+    mesh.holder.position, mesh.holder.battery = OTHER.to_vector(), 100.0
+    assert mesh.sent(5) == {}
+    assert [holder for holder, _post in mesh.relief.saved()["posts"]] == [2]
+
+
+@pytest.mark.parametrize("before", [True, False])
+def test_a_coming_drone_that_a_user_sends_elsewhere_is_not_called_home(before):
+    """Before it has arrived, or when it hovers there."""
+    mesh, place = relief_on_its_way()
+    if not before:
+        assert fly(mesh, mesh.spare, place) == {}
+        mesh.orders.forget_complete()
+    mesh.orders.ordered(2, AWAY, mesh.now_s)
+    assert 2 not in fly(mesh, mesh.spare, AWAY)
+    assert 2 not in mesh.sent(120)
+    assert mesh.relief.reliefs == 0
+
+
+def test_a_drone_that_a_user_sends_elsewhere_takes_its_post_along_and_its_relief_goes_home():
+    mesh, place = relief_on_its_way()
+    mesh.orders.ordered(1, AWAY, mesh.now_s)
+    fly(mesh, mesh.spare, place)
+    sent = fly(mesh, mesh.holder, AWAY)
+    assert (sent.get(1), sent[2]) == (None, HOME)
+    posts = dict(mesh.relief.saved()["posts"])
+    assert posts[1][0] == AWAY
+    assert 2 not in posts
+
+
+def test_a_drone_that_fails_while_its_relief_comes_is_left_alone_and_its_post_is_held():
+    mesh, place = relief_on_its_way()
+    mesh.holder.position, mesh.holder.crashed = (0.0, 6.0, 0.0), True
+    assert fly(mesh, mesh.spare, place) == {}
+    assert mesh.sent(10) == {}
+    assert [holder for holder, _post in mesh.relief.saved()["posts"]] == [2]
+
+
+def test_a_drone_that_has_another_order_is_no_spare():
+    mesh = Mesh()
+    mesh.sent()
+    mesh.orders.ordered(2, AWAY, mesh.now_s)
+    mesh.now_s += 1.0
+    mesh.holder.battery = 24.0  # it needs one now
+    assert 2 not in mesh.sent()
+
+
+def test_a_drone_that_is_sent_elsewhere_on_its_way_home_holds_a_post_there():
+    mesh, place = relief_on_its_way()
+    fly(mesh, mesh.spare, place)
+    assert mesh.sent(6) == {1: OTHER}
+    mesh.holder.battery = 60.0
+    mesh.orders.ordered(1, AWAY, mesh.now_s)
+    fly(mesh, mesh.holder, AWAY)
+    assert {holder for holder, _post in mesh.relief.saved()["posts"]} == {1, 2}

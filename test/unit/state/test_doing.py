@@ -32,10 +32,20 @@ def router(**fields: object) -> NodeStatus:
         (router(on=False, path=(4.0, 6.0, 0.0)), ""),
         (router(report_age=9.0), ""),
         (router(crashed=True), ""),
+        (router(pad="waits for the crew"), "waits for the crew"),
     ],
 )
 def test_the_words_of_one_router(node, words):
     assert doings([node]) == {3: words}
+
+
+def test_both_sides_of_a_relief_are_told():
+    comes = NodeStatus(4, connected=True, position=HERE, path=(4.0, 6.0, 0.0), relieves=3)
+    words = {
+        3: "4 relieves it; relays for nobody",
+        4: "relieves 3; flies to x 4.0, y 6.0: 5 m left",
+    }
+    assert doings([router(), comes]) == words
 
 
 def test_a_relay_and_a_gateway_count_the_routes_that_lead_there():

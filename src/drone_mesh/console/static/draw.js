@@ -1,5 +1,7 @@
 // Draws one picture of the mesh on a canvas.
 
+import { LOW_BATTERY } from "./groups.js";
+
 const DIGIT_WIDTH = 0.7; // of a bold digit, as a share of its height
 const SMALLEST_ID_PX = 8; // in a drone; a smaller id is drawn beside it
 const LABEL_PX = 10; // of an id beside its drone, at most
@@ -17,6 +19,8 @@ const MOTOR_AT = 1.2; // in radii of a drone, as the next two
 const ROTOR = 0.45;
 const HULL = 0.85;
 const ROTOR_RAD_PER_S = 9; // a real one is a blur
+const PAD = 1.6; // half an edge of a pad, in radii of a drone, and at most in m
+const PAD_M = 0.8;
 const MOST_LINKS = 4000; // known links; with more, which would be a grey blot, only those of the selected node are drawn
 
 const MOST_LOST = 1500; // lost links drawn: the shortest ones, as in rviz
@@ -95,11 +99,12 @@ export function drawMesh(context, camera, mesh, colours, options, goals) {
   drawGrid(context, camera, colours, options.top);
   for (const box of mesh.obstacles) drawObstacle(context, camera, box, colours);
   for (const area of mesh.fence) drawArea(context, camera, area, colours, options.top);
+  const radius = droneRadius(camera, mesh);
+  for (const node of mesh.nodes.values()) drawPad(context, camera, node, colours, radius);
   const selected = mesh.nodes.get(mesh.selected);
   if (options.ranges)
     for (const node of mesh.nodes.values()) drawRange(context, camera, mesh, node, colours, 0.35);
   else if (selected) drawRange(context, camera, mesh, selected, colours, 1);
-  const radius = droneRadius(camera, mesh);
   const drawn = {
     drones: 0,
     links: mesh.links.known.length + mesh.links.route.length,
@@ -157,6 +162,7 @@ export function drawMesh(context, camera, mesh, colours, options, goals) {
     for (const trail of mesh.trails.values()) drawTrail(context, camera, trail, colours);
   for (const node of mesh.nodes.values()) drawHeading(context, camera, node, colours, radius);
   for (const node of mesh.nodes.values()) drawPath(context, camera, node, colours, radius);
+  drawLines(context, camera, radius, ends(mesh.links.relief), colours.accent, 3, [8, 5]);
   const drones = drawingOrder(mesh);
   const labelPx = labelSize([...mesh.nodes.keys()], radius);
   const draw = (some) => {
@@ -193,6 +199,7 @@ function dim(context, camera, mesh, colours, radius, ids) {
     ["known", "known-link", 1, []],
     ["lost", "lost-link", 1.5, [5, 5]],
     ["route", "route-link", 3, []],
+    ["relief", "accent", 3, [8, 5]],
   ]) {
     const links = mesh.links[use].filter(([a, b]) => ids.has(a) && ids.has(b));
     const ends = links.map(([a, b]) => [mesh.nodes.get(a), mesh.nodes.get(b)]);
@@ -200,7 +207,9 @@ function dim(context, camera, mesh, colours, radius, ids) {
   }
   for (const id of ids) {
     const node = mesh.nodes.get(id);
-    if (node) drawPath(context, camera, node, colours, radius);
+    if (!node) continue;
+    drawPad(context, camera, node, colours, radius);
+    drawPath(context, camera, node, colours, radius);
   }
 }
 
@@ -350,6 +359,39 @@ function drawArea(context, camera, { name, inside, low, high, rings }, colours, 
   context.font = "11px system-ui, sans-serif";
   context.textAlign = "left";
   context.fillText([name, heights].filter(Boolean).join(", "), at[0] + 2, at[1] - 5);
+}
+
+/** Where crews swap the battery of a drone: filled while they do, dashed while it waits for them. */
+function drawPad(context, camera, { role, home, pad }, colours, radius) {
+  if (!home?.length || role === 1) return; // nobody relieves a gateway
+  const [px, py] = camera.toScreen(...home);
+  const half = Math.max(4, Math.min(PAD * radius, PAD_M * camera.scale));
+  context.beginPath();
+  context.roundRect(px - half, py - half, 2 * half, 2 * half, 0.3 * half);
+  context.strokeStyle = context.fillStyle = pad ? colours.accent : colours.muted;
+  context.lineWidth = 1.5;
+  context.setLineDash(pad.startsWith("waits") ? [3, 3] : []);
+  context.stroke();
+  context.setLineDash([]);
+  if (!pad || pad.startsWith("waits")) return;
+  context.globalAlpha = 0.3;
+  context.fill();
+  context.globalAlpha = 1;
+}
+
+/** A low battery, at the upper right of its drone. */
+function drawBattery(context, px, py, battery, colours, radius) {
+  const [x, y] = [px + radius, py - radius - 7];
+  context.fillStyle = colours.card;
+  context.strokeStyle = colours.disconnected;
+  context.lineWidth = 1.5;
+  context.beginPath();
+  context.roundRect(x, y, 15, 8, 2);
+  context.fill();
+  context.stroke();
+  context.fillStyle = colours.disconnected;
+  context.fillRect(x + 15, y + 2.5, 2, 3);
+  context.fillRect(x + 2, y + 2, (11 * battery) / LOW_BATTERY, 4);
 }
 
 function metres(value, step) {
@@ -506,6 +548,8 @@ function drawDrone(context, camera, node, selected, colours, radius, shape, labe
     context.fillText(node.id, px, py + 0.5);
     context.textBaseline = "alphabetic";
   }
+  if ((node.battery ?? LOW_BATTERY) < LOW_BATTERY)
+    drawBattery(context, px, py, node.battery, colours, radius);
   return 1;
 }
 

@@ -1,7 +1,7 @@
 // Selects drones by a rule or by the name of a group; groups are kept in this browser.
 
 const GROUPS_KEY = "drone-mesh-groups";
-const LOW_BATTERY = 30;
+export const LOW_BATTERY = 30; // percent
 
 const byId = (id) => document.getElementById(id);
 

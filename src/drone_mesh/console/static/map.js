@@ -1,6 +1,7 @@
 // The map: pan, zoom, select, drag. Drawing itself is in draw.js.
 
 import { Camera } from "./camera.js";
+import { batteryOf } from "./mesh.js";
 import {
   drawLasso,
   drawMark,
@@ -45,6 +46,8 @@ export class MapView {
     this.legendObstacle = card.querySelector("#legend-obstacle");
     this.legendInside = card.querySelector("#legend-inside");
     this.legendOutside = card.querySelector("#legend-outside");
+    this.legendPad = card.querySelector("#legend-pad");
+    this.legendRelief = card.querySelector("#legend-relief");
     this.fly = fly;
     this.camera = new Camera();
     this.radius = 0; // of a drone, px
@@ -294,6 +297,8 @@ export class MapView {
     this.legendObstacle.hidden = !this.mesh.obstacles.length;
     this.legendInside.hidden = !this.mesh.fence.some(({ inside }) => inside);
     this.legendOutside.hidden = this.mesh.fence.every(({ inside }) => inside);
+    this.legendPad.hidden = !nodes.some(({ home }) => home?.length);
+    this.legendRelief.hidden = !this.mesh.links.relief.length;
     const outside = this.marks.reduce((sum, { ids }) => sum + ids.length, 0);
     Object.assign(this.note.dataset, drawn, { x, y, scale, outside });
   }
@@ -329,7 +334,8 @@ export class MapView {
       `${node.role === 1 ? "Gateway" : "Router"} ${node.id}`,
       node.trouble || node.condition,
     ];
-    if ((node.battery ?? null) !== null) parts.push(`battery ${node.battery} %`);
+    if (batteryOf(node)) parts.push(`battery ${batteryOf(node)}`);
+    if (node.pad) parts.push(node.pad);
     this.hover.textContent = [parts.join(", "), node.order].filter(Boolean).join("; ");
     const { width, height } = this.camera;
     const [x, y] = [event.offsetX, event.offsetY];

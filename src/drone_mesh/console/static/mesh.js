@@ -30,11 +30,13 @@ export class Mesh extends EventTarget {
     this.obstacles = []; // {corners: [[x, y]], top}, m
     this.fence = []; // {name, inside, low, high, rings: [[[x, y]]]}, m; low and high may be null
     this.trails = new Map(); // id -> its last positions [x, y], m, one for every TRAIL_STEP_M
-    this.links = { known: [], lost: [], route: [], soon: [] }; // use -> [[id, higher id]]
+    // use -> [[id, higher id]]; of relief: who comes, and whom it relieves
+    this.links = { known: [], lost: [], route: [], soon: [], relief: [] };
     this.events = [];
     this.samples = [];
     this.story = {}; // of a demonstration: {running, steps: [{t, text}], wait: {left, of}, cast: [id], places: [[x, y, z]]}
     this.alarms = []; // [{text, nodes, since, over, acknowledged}]
+    this.demo = "repair"; // what the button shows
     this.recording = ""; // its name, if the console shows one
     this.timeline = {}; // {start, end, now, live, paused, factor, packets} of the recorded time
     this.map = null; // {url, min_zoom, max_zoom, credit, bounds} of the map under the drones
@@ -75,6 +77,9 @@ export class Mesh extends EventTarget {
       changed.add(id);
     }
     if (linksChanged) this.#relink();
+    this.links.relief = [...this.nodes.values()]
+      .filter(({ relieves }) => this.nodes.has(relieves))
+      .map(({ id, relieves }) => [id, relieves]);
     if (frame.events) this.events = this.events.concat(frame.events).slice(-this.limits.events);
     if (frame.samples)
       this.samples = this.samples.concat(frame.samples).slice(-this.limits.samples);
@@ -131,8 +136,9 @@ export class Mesh extends EventTarget {
     this.#notify("packets", packets);
   }
 
-  applyHello({ layouts, limits, actions, recording, packet_kinds: packetKinds, map }) {
+  applyHello({ layouts, limits, actions, recording, demo, packet_kinds: packetKinds, map }) {
     this.map = map;
+    this.demo = demo;
     this.packetKinds = packetKinds;
     this.recording = recording;
     this.actions = actions;
@@ -195,6 +201,13 @@ export class Mesh extends EventTarget {
 /** Where a drone flies to, or where it is, [x, y, z] in metres; null: unknown. */
 export function goalOf({ path, position }) {
   return path.length ? path.slice(-3) : position;
+}
+
+/** The charge of its battery and how long it can hover, such as 63 %, 8:25; empty: unknown. */
+export function batteryOf({ battery = null, time_left: left = null }, glue = ", ") {
+  if (battery === null) return "";
+  const minutes = `${Math.floor(left / 60)}:${String(left % 60).padStart(2, "0")}`;
+  return left === null ? `${battery} %` : `${battery} %${glue}${minutes}`;
 }
 
 /** A number as text; 255 means unknown. */

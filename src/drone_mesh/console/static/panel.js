@@ -2,7 +2,7 @@
 
 import { arrowKeys } from "./arrows.js";
 import { inDegrees, toEarth, toFrame } from "./earth.js";
-import { goalOf, orDash, UNKNOWN } from "./mesh.js";
+import { batteryOf, goalOf, orDash, UNKNOWN } from "./mesh.js";
 import { typedNumber } from "./numbers.js";
 
 export class NodePanel {
@@ -58,6 +58,7 @@ export class NodePanel {
   #facts(node) {
     const neighbours = this.#neighbours(node);
     const earth = this.#earth(node);
+    const coming = [...this.mesh.nodes.values()].find(({ relieves }) => relieves === node.id);
     const facts = [
       ...(node.repair ? [["Repair", node.repair, { wide: true }]] : []),
       ...(node.mission ? [["Mission", node.mission, { wide: true }]] : []),
@@ -70,7 +71,12 @@ export class NodePanel {
         node.fallback === UNKNOWN ? "–" : [node.fallback],
         { before: "node ", after: `’s${this.#fallbackAge(node)}` },
       ],
-      ...((node.battery ?? null) === null ? [] : [["Battery", `${node.battery} %`]]),
+      ...(batteryOf(node) ? [["Battery, minutes left", batteryOf(node)]] : []),
+      ...(node.home?.length ? [["Pad", placeOf(node.home, node.pad), { wide: true }]] : []),
+      ...((node.relieves ?? null) === null ? [] : [["Relieves", [node.relieves]]]),
+      ...(coming
+        ? [["Relieved by", [coming.id], { after: coming.path.length ? ", on its way" : "" }]]
+        : []),
       ...(node.why_not_fly ? [["Cannot fly", node.why_not_fly]] : []),
       ["Known nodes", String(node.known_nodes ?? "–")],
       ["Messages sent", String(node.total_messages ?? "–")],
@@ -210,6 +216,10 @@ export class NodePanel {
       this.fly(node.id, ...place, z);
     }
   }
+}
+
+function placeOf([x, y], words) {
+  return [`x ${x.toFixed(1)}, y ${y.toFixed(1)} m`, words].filter(Boolean).join("; ");
 }
 
 /** A button that selects this node. `tabIndex` -1: only the arrow keys reach it. */

@@ -1,4 +1,4 @@
-// The demonstration of a repair: its sentences, and how long the mesh still waits at the last one.
+// The demonstration of a repair or a relief: its sentences, and how long the mesh still waits at the last one.
 
 import { agreed } from "./confirm.js";
 
@@ -11,7 +11,7 @@ export class Story {
    */
   constructor(mesh, demonstrate, plan) {
     this.mesh = mesh;
-    mesh.addEventListener("story", () => this.#show());
+    for (const what of ["story", "layouts"]) mesh.addEventListener(what, () => this.#show());
     byId("demonstrate").addEventListener("click", async () => {
       if (this.running) return demonstrate(false);
       const text = await plan();
@@ -28,7 +28,7 @@ export class Story {
     const { steps = [], wait = {}, running = false } = this.mesh.story;
     byId("story-card").hidden = !steps.length;
     document.body.toggleAttribute("data-story", Boolean(steps.length));
-    byId("demonstrate").textContent = running ? "End" : "Show a repair";
+    byId("demonstrate").textContent = running ? "End" : `Show a ${this.mesh.demo}`;
     byId("demonstrate").setAttribute("aria-pressed", running);
     this.#list(steps);
     byId("story-wait").hidden = wait.left === undefined;

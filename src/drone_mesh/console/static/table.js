@@ -1,7 +1,7 @@
 // The table of nodes: one row per node, sorted by the column that was clicked.
 
 import { arrowKeys } from "./arrows.js";
-import { orDash } from "./mesh.js";
+import { batteryOf, orDash } from "./mesh.js";
 
 const COLUMNS = [
   { name: "Node", title: "Id", sort: (n) => n.id, text: (n) => String(n.id) },
@@ -18,6 +18,12 @@ const COLUMNS = [
     sort: (n) => n.does,
     text: (n) => n.does || "–",
     long: true,
+  },
+  {
+    name: "Battery",
+    title: "Its charge, and how long it can hover until it comes down, in minutes and seconds",
+    sort: (n) => n.battery ?? Infinity,
+    text: (n) => batteryOf(n, " ") || "–",
   },
   { name: "Hops", title: "Hops to its gateway", sort: (n) => n.hops, text: (n) => orDash(n.hops) },
   {
@@ -108,6 +114,8 @@ export class NodeTable {
       this.rows.delete(id);
     }
     for (const id of changed) this.#fill(this.mesh.nodes.get(id));
+    const known = [...this.mesh.nodes.values()].some(({ battery }) => (battery ?? null) !== null);
+    this.head.closest("table").toggleAttribute("data-batteries", known);
     this.#sort();
     this.#hide();
     this.#mark(false);

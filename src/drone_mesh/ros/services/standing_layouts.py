@@ -7,11 +7,12 @@ import json
 import logging
 import threading
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import Callable, NamedTuple, Sequence
+from typing import Any, Callable, Mapping, NamedTuple, Sequence
 
 import actionlib
 import rospy
 
+from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.drone.fence import Fence
 from drone_mesh.drone.flight_path import FlightPath, PlanFlight
 from drone_mesh.errors import ConfigurationError
@@ -60,6 +61,7 @@ def progress_msg(progress: StandingProgress, over: bool) -> LayoutProgress:
         not_in_fleet=ids[PartState.ABSENT],
         over=over,
         message=progress.in_words(),
+        relieves=NO_ROUTE if progress.relieves is None else progress.relieves,
     )
 
 
@@ -79,7 +81,8 @@ class StandingLayouts:
     Action:     /DroneManager/layout (Layout)
     Parameter:  /DroneManager/standing, what is left to order, for the next start
 
-    `_lock` guards the orders and the actions; nothing is published or stored while it is held.
+    `_lock` guards the orders and the actions; nothing is published or stored while it is held, and
+    no relief is looked for: the relief belongs to the thread of the states.
     One thread publishes and stores, in the order in which it was told under the lock: what was
     said last is what a latched topic keeps. It ends with the process.
     """
@@ -99,10 +102,11 @@ class StandingLayouts:
         self._order = order
         self._begin = begin
         self._on_other_run = on_other_run
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()
+        self._orders = StandingOrders(self._lock)
         self._reporter = ThreadPoolExecutor(max_workers=1, thread_name_prefix="standing layouts")
-        self._orders = StandingOrders()
         self._relief: Relief | None = None  # made as soon as there is a fleet
+        self._relief_left: Mapping[str, Any] | None = None  # what a restarted one goes on with
         self._mesh: MeshStatus | None = None  # the latest state
         self._run: Run | None = None  # of that state
         self._shown: dict[int, StandingProgress] = {}
@@ -195,14 +199,15 @@ class StandingLayouts:
         if before not in (None, self._run):
             self._on_other_run()
             return
-        relief = self._relief = self._relief or relief_of_fleet()
+        relief = self._relief = self._relief or relief_of_fleet(self._relief_left)
         with self._lock:
             is_idle = not (relief and relief.is_active or self._orders.all_progress())
         rules = FlightRules() if is_idle else flight_rules()
+        if relief and relief.is_active:
+            relief.update(mesh, self._orders, rules)
+            self._relief_left = relief.saved()
         with self._lock:
             self._mesh = mesh
-            if relief:
-                relief.update(mesh, self._orders, rules)
             wanted = [Order(*one) for one in self._orders.update(mesh, rules)]
         self._order(wanted)
         self._show()
@@ -228,8 +233,7 @@ class StandingLayouts:
             changed = [p for p in progresses if self._shown.get(p.number) != p]
             self._shown = {p.number: p for p in progresses if not p.is_over}
             self._orders.forget_complete()
-            if changed:
-                self._save()  # first: what is reported outlives this program
+            self._save()  # first: what is reported outlives this program
             for progress in changed:
                 handle = self._handles.get(progress.number)
                 if progress.is_over:
@@ -237,8 +241,8 @@ class StandingLayouts:
                 self._later(self._report, progress, handle)
 
     def _save(self) -> None:
-        """Store what is left to order, for a restart. The caller holds the lock."""
-        left = json.dumps(self._orders.saved())
+        """Store what is left to do, for a restart. The caller holds the lock."""
+        left = json.dumps({"orders": self._orders.saved(), "relief": self._relief_left})
         if left != self._saved:
             self._saved = left
             self._later(_store, left)
@@ -268,8 +272,10 @@ class StandingLayouts:
 
     def _restore(self) -> None:
         try:
+            left = json.loads(rospy.get_param(names.STANDING_PARAM, '{"orders": []}'))
             with self._lock:
-                self._orders.restore(json.loads(rospy.get_param(names.STANDING_PARAM, "[]")))
+                self._orders.restore(left["orders"])
+            self._relief_left = left.get("relief")
         except (KeyError, TypeError, ValueError) as error:
             _log.warning("parameter %s is ignored: %s", names.STANDING_PARAM, error)
             return
@@ -302,14 +308,20 @@ def _tell(handle: actionlib.ServerGoalHandle, progress: StandingProgress) -> Non
     end(LayoutResult(progress.number, complete, words), words)
 
 
-def relief_of_fleet() -> Relief | None:
-    """What relieves the drones of the present factory; None if there is none (yet)."""
+def relief_of_fleet(left: Mapping[str, Any] | None) -> Relief | None:
+    """What relieves the drones of the present factory; None if there is none (yet).
+
+    `left`: what one before it saved.
+    """
     try:
         fleet = get_fleet_parameter()
     except (KeyError, *NO_ANSWER):
         return None
     rules = ReliefRules(fleet.swap_time, fleet.swaps_at_once, 60.0 * fleet.hover_minutes)
-    return Relief(relief_policy(fleet.relief), rules)
+    relief = Relief(relief_policy(fleet.relief), rules)
+    if left is not None:
+        relief.restore(left)
+    return relief
 
 
 def flight_rules() -> FlightRules:

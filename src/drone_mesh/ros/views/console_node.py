@@ -20,6 +20,7 @@ from drone_mesh.console.memory import ConsoleMemory, memory_of
 from drone_mesh.console.orders import LayoutOffer, places_of
 from drone_mesh.console.runner import ConsoleRunner, PageToken
 from drone_mesh.console.server import ConsoleServer
+from drone_mesh.console.stage import DEMONSTRATIONS
 from drone_mesh.console.tiles import open_tiles
 from drone_mesh.errors import ConfigurationError, naming_argument
 from drone_mesh.formations.layouts import FIELD_CASE, GRID_CASE, Layouts
@@ -40,7 +41,6 @@ from drone_mesh.web import LOOPBACK
 from drone_mesh.web.listening import port_of
 
 CHECK_PERIOD_S = 1.0  # wall time between two checks of the master
-REPAIR_DEMO = "repair"
 WAS_UP = "~was_up"  # in this launch: what ails it now is no bad argument
 
 log = logging.getLogger(__name__)
@@ -143,9 +143,9 @@ def main() -> None:
     Parameters (private): ~address (str, 127.0.0.1) and ~port (int, 8080) to listen on; ~token_file
     (str): path of a file with the password of the console, which only its owner can access;
     without it, a random one is made and printed if other machines can reach the address; ~demo
-    (str): "repair" shows a repair as soon as a page is open; ~recording (str): path of the bag that
-    is played; its page takes no orders; ~origin (str): LAT,LON,ALT, where the world's origin
-    is on the earth, in degrees and metres above sea level, by default that of the running
+    (str): "repair" or "relief" shows one as soon as a page is open; ~recording (str): path of the
+    bag that is played; its page takes no orders; ~origin (str): LAT,LON,ALT, where the world's
+    origin is on the earth, in degrees and metres above sea level, by default that of the running
     simulation; ~tiles (str): a map, see open_tiles.
     /DroneManager/casus (str): the file of the layouts; /drone_mesh/origin (str).
     """
@@ -162,8 +162,9 @@ def _run() -> int:
     port = port_of(rospy.get_param("~port", DEFAULT_PORT))
     token = _token(address)
     demo = str(rospy.get_param("~demo", ""))
-    if demo not in ("", REPAIR_DEMO):
-        raise ConfigurationError(f"invalid demo {demo!r}: must be {REPAIR_DEMO} or empty")
+    if demo and demo not in DEMONSTRATIONS:
+        known = ", ".join(DEMONSTRATIONS)
+        raise ConfigurationError(f"invalid demo {demo!r}: must be {known} or empty")
     recording = str(rospy.get_param("~recording", ""))
     origin = earth_origin(str(rospy.get_param("~origin", "")), is_live=not recording)
     whole = History(math.inf, math.inf) if recording else None
@@ -181,7 +182,7 @@ def _run() -> int:
         controls,
         access,
         layouts,
-        demo == REPAIR_DEMO,
+        demo,
         recording=Path(recording).name,
         whole=whole,
         tiles=tiles,

@@ -14,6 +14,7 @@ from typing import Callable, Iterable, Mapping, Sequence, Tuple
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
+from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.msg import GroundedDrones, HostReport, LayoutProgress, MeshEvent, MeshState
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import event_msg, ros_time, state_msg
@@ -132,9 +133,12 @@ class MeshStatePublisher(Periodic):
         if grounded != self._grounded_now:
             self._grounded_now = grounded
             self._grounded.publish(GroundedDrones(list(grounded), list(grounded.values())))
+        nodes, reliefs = self._roster.snapshot(drones, now_s), self._reliefs()
+        for node in nodes:
+            node.relieves = reliefs.get(node.id, NO_ROUTE)
         self.latest = mesh = replace(
             world,
-            nodes=self._roster.snapshot(drones, now_s),
+            nodes=nodes,
             achieved_real_time_factor=self._achieved(now_s, world),
             layouts=[f"{p.name}: {p.message}" for p in self._layouts.values()],
         )
@@ -142,6 +146,16 @@ class MeshStatePublisher(Periodic):
         if now_s - self._diagnosed_s >= DIAGNOSTICS_PERIOD_S:
             self._diagnosed_s = now_s
             self._diagnostics.publish(diagnostics_msg(mesh))
+
+    def _reliefs(self) -> dict[int, int]:
+        """By drone that comes: whose place it takes."""
+        return {
+            drone: progress.relieves
+            for progress in self._layouts.values()
+            if not progress.over
+            for drones in (progress.arrived, progress.flying, progress.later, progress.waiting)
+            for drone in drones
+        }
 
     def _achieved(self, now_s: float, world: MeshStatus) -> float:
         before, self._last_state = self._last_state, (now_s, world.stamp_s)
@@ -166,6 +180,7 @@ def _view(drone: VirtualDrone, now_s: float) -> DroneView:
         crashed=engine.crashed,
         why_not_fly=engine.why_not_fly(),
         mission="" if pilot is None else pilot.mission_in_words(place),
+        endurance=engine.endurance(now_s),
     )
 
 
