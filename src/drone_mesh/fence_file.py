@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import json
 import math
 import reprlib
 from pathlib import Path
@@ -13,12 +15,13 @@ from drone_mesh.drone.geodesy import EarthPlace, Origin
 from drone_mesh.earth_files.geojson import features_of, read_json
 from drone_mesh.earth_files.plan import MAX_PLAN_CHARACTERS, Plan, read_plan
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.yaml_file import is_number, read_mapping, read_text
+from drone_mesh.yaml_file import MAX_FILE_BYTES, is_number, read_mapping_text, read_text
 
 MOST_AREAS = 100
 MOST_M = 100_000.0  # from x 0, y 0; farther away, the plane is not the earth
 KEYS = ("name", "inclusion", "polygon", "holes", "center", "radius", "min_height", "max_height")
 MAX_NAME = 40
+IN_DEGREES = (".plan", ".geojson", ".json")  # the ends of the names of such files
 
 Row = Mapping[str, Any]
 
@@ -28,49 +31,77 @@ def read_fence(path: str | Path, origin: Origin | None = None) -> Fence:
 
     Raises ConfigurationError: one line with the file, the area and what is wrong.
     """
-    return fence_of(rows_of_file(path, origin), str(path))
+    return fence_in(areas_json(rows_of_file(path, origin)))
 
 
 def rows_of_file(path: str | Path, origin: Origin | None = None) -> list[Row]:
     """Its areas in metres, as `fence_of` takes them. Raises ConfigurationError."""
     kind = Path(path).suffix.lower()
-    if kind not in (".plan", ".geojson", ".json"):
-        file = read_mapping(path)
-        rows = file.content.get("areas")
+    most_bytes = MAX_PLAN_CHARACTERS if kind in IN_DEGREES else MAX_FILE_BYTES
+    return rows_of_text(read_text(path, most_bytes=most_bytes), str(path), origin, kind)
+
+
+def rows_of_text(text: str, path: str, origin: Origin | None, kind: str = "") -> list[Row]:
+    """The same of the text of a file, by the end of its name or, without `kind`, by its content."""
+    kind = kind or (".plan" if '"fileType"' in text else ".json" if '"type"' in text else ".yaml")
+    rows: list[Row]
+    if kind not in IN_DEGREES:
+        file = read_mapping_text(text, path)
+        rows = file.content.get("areas", [])
         if set(file.content) != {"areas"} or not isinstance(rows, list):
             raise ConfigurationError(f"{file.where('areas')}: expected 'areas:' with a list")
-        return rows
-    if origin is None:
-        raise ConfigurationError(f"{path}: its places are in degrees: that needs an origin")
-    text = read_text(path, most_bytes=MAX_PLAN_CHARACTERS)
     try:
-        if kind != ".plan":
-            rows = list(_of_geojson(read_json(text), origin))
-            fence_of(rows)
-        else:
-            plan = read_plan(text)
-            rows = list(_of_plan(plan.geo_fence, origin))
-            _check_rally_points(plan, fence_of(rows), origin)
+        if kind in IN_DEGREES:
+            if origin is None:
+                raise ConfigurationError("its places are in degrees: that needs an origin")
+            rows = _in_degrees(text, kind, origin)
+        if not fence_of(rows):
+            raise ConfigurationError("0 areas")
     except ConfigurationError as error:
         raise ConfigurationError(f"{path}: {error}") from error
     return rows
 
 
-def fence_of(rows: Sequence[Any], source: str = "") -> Fence:
+def _in_degrees(text: str, kind: str, origin: Origin) -> list[Row]:
+    if kind != ".plan":
+        return list(_of_geojson(read_json(text), origin))
+    plan = read_plan(text)
+    rows = list(_of_plan(plan.geo_fence, origin))
+    _check_rally_points(plan, fence_of(rows), origin)
+    return rows
+
+
+def areas_json(rows: Sequence[Any]) -> str:
+    """These areas, from which a fence can be made, as `fence_in` takes them."""
+    return json.dumps(rows)
+
+
+def areas_in(areas: str) -> list[Row]:
+    """The areas in this JSON."""
+    rows: list[Row] = json.loads(areas)
+    return rows
+
+
+@functools.lru_cache(maxsize=4)
+def fence_in(areas: str) -> Fence:
+    """The fence with the areas in this JSON, built once. Raises ConfigurationError."""
+    return fence_of(areas_in(areas))
+
+
+def fence_of(rows: Sequence[Any]) -> Fence:
     """The fence with these areas: KEYS, a polygon or a center and a radius, in metres.
 
-    Raises ConfigurationError, which names the area and begins with the `source` if there is one.
+    Raises ConfigurationError, which names the area.
     """
-    where = f"{source}: " if source else ""
     zones: dict[bool, list[Zone]] = {True: [], False: []}
-    if not 1 <= len(rows) <= MOST_AREAS:
-        raise ConfigurationError(f"{where}{len(rows)} areas: expected 1..{MOST_AREAS}")
+    if len(rows) > MOST_AREAS:
+        raise ConfigurationError(f"{len(rows)} areas: expected at most {MOST_AREAS}")
     for number, row in enumerate(rows, start=1):
         try:
             name, inside = _name_and_side(row, number)
             zones[inside].append(_zone(row, name, inside))
         except ConfigurationError as error:
-            raise ConfigurationError(f"{where}area {number}: {error}") from None
+            raise ConfigurationError(f"area {number}: {error}") from None
     return Fence.of(zones[True], zones[False])
 
 

@@ -7,8 +7,6 @@ import logging
 import signal
 import threading
 import time
-from dataclasses import replace
-from typing import Sequence
 
 from inprocess_mesh import InProcessMesh
 
@@ -21,10 +19,8 @@ from drone_mesh.console.runner import ConsoleRunner
 from drone_mesh.console.server import ALL_ACTIONS, FRAME_PERIOD_S, ConsoleServer
 from drone_mesh.console.tiles import open_tiles
 from drone_mesh.drone.geodesy import Origin
-from drone_mesh.fence_file import read_fence
+from drone_mesh.fence_file import rows_of_file
 from drone_mesh.formations.layouts import Layouts
-from drone_mesh.state.model import AreaStatus
-from drone_mesh.state.observation import describe_fence
 from drone_mesh.web.access import access_for
 
 LAYOUTS = [
@@ -35,7 +31,7 @@ LAYOUTS = [
 ]
 
 
-def feed(mesh: InProcessMesh, store: FrameStore, fence: Sequence[AreaStatus], relief: bool) -> None:
+def feed(mesh: InProcessMesh, store: FrameStore, relief: bool) -> None:
     status, events = mesh.read()
     if relief:
         for node in status.nodes[1:]:
@@ -43,7 +39,7 @@ def feed(mesh: InProcessMesh, store: FrameStore, fence: Sequence[AreaStatus], re
         low, new, served = status.nodes[1:4]
         low.battery, low.time_left, new.relieves = 24.0, 48.0, low.id
         served.pad = "the crew swaps its battery: 12 s left"
-    store.update_mesh(replace(status, fence=fence), time.monotonic())
+    store.update_mesh(status, time.monotonic())
     if events:
         store.add_events(events)
 
@@ -97,7 +93,8 @@ def main(arguments: list[str] | None = None) -> None:
     whole = recorded(options) if options.recorded else None
     mesh.skip(options.skip)
     origin = Origin.parse(options.origin) if options.origin else None
-    fence = describe_fence(read_fence(options.fence, origin)) if options.fence else ()
+    if options.fence:
+        mesh.keep_to(rows_of_file(options.fence, origin))
     store = FrameStore(History() if whole is None else None, origin)
     access = access_for(options.address, options.token)
     server = ConsoleServer(
@@ -128,7 +125,7 @@ def main(arguments: list[str] | None = None) -> None:
     def feed_once() -> None:
         if options.haste and not mesh.paused:
             mesh.skip(FRAME_PERIOD_S * mesh.factor * options.haste)
-        feed(mesh, store, fence, options.relief)
+        feed(mesh, store, options.relief)
         server.show_packets(*mesh.packets(FRAME_PERIOD_S))
         is_fed.set()
 

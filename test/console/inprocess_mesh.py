@@ -10,8 +10,11 @@ from typing import Sequence
 
 from drone_mesh.console.controls import OrderRefused
 from drone_mesh.console.dots import Dot
+from drone_mesh.drone.fence import Fence
 from drone_mesh.drone.fleet import MAX_DRONES
-from drone_mesh.errors import PlaceTaken
+from drone_mesh.drone.flight_path import Point
+from drone_mesh.errors import ConfigurationError, GoalRefused
+from drone_mesh.fence_file import Row, fence_of
 from drone_mesh.formations.layouts import Layouts, Order, UnknownCase
 from drone_mesh.formations.missions import Mission
 from drone_mesh.formations.preview import FormationPreview, preview
@@ -44,6 +47,7 @@ class InProcessMesh:
         self._batcher = EventBatcher()
         self._told = 0
         self.factor, self.paused = 1.0, False
+        self._areas: dict[str, Row] = {}
 
     def _noted(self, packet: bytes) -> bool:
         carried = self._carry(packet)
@@ -107,7 +111,7 @@ class InProcessMesh:
                 taken = self._network.order(
                     node, x, y, round(z), allow_shared_place=allow_shared_place
                 )
-        except PlaceTaken as error:
+        except GoalRefused as error:
             raise OrderRefused(str(error)) from error
         if not taken:
             raise OrderRefused(f"the gateway has no route to drone {node}")
@@ -151,6 +155,25 @@ class InProcessMesh:
             add = self._network.add_gateway if gateway else self._network.add_router
             add(node, x, y, self._network.now_s())
         return f"added {'gateway' if gateway else 'router'} {node} at x {x:g} m, y {y:g} m"
+
+    def keep_to(self, areas: Sequence[Row]) -> None:
+        """Let all drones keep these areas."""
+        self._areas = {str(area["name"]): area for area in areas}
+        with self._lock:
+            self._network.set_fence(fence_of(areas) if areas else Fence())
+
+    def fence(
+        self, name: str, corners: Sequence[Point], inside: bool, max_height: float | None
+    ) -> str:
+        areas = {other: area for other, area in self._areas.items() if other != name}
+        if corners:
+            area = {"name": name, "inclusion": inside, "max_height": max_height}
+            areas[name] = {**area, "polygon": corners}
+        try:
+            self.keep_to(list(areas.values()))
+        except ConfigurationError as error:
+            raise OrderRefused(str(error)) from error
+        return f"fence of {len(areas)} areas"
 
     def mission(self, nodes: Sequence[int], mission: Mission) -> str:
         with self._lock:

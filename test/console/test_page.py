@@ -633,6 +633,42 @@ def test_a_relief_with_its_batteries_and_pads_is_told(start_console, visit):
         page.wait_for(fact, lambda fact=fact: fact in page.page.inner_text("#node-facts"))
 
 
+def test_an_area_that_is_drawn_is_kept_by_the_drones_and_goes_when_it_is_deleted(page):
+    for _ in range(2):
+        page.page.click("#zoom-out")
+    page.page.wait_for_timeout(500)  # until that is drawn
+    page.page.click("#fence")
+    assert page.page.is_disabled("#fence-save")
+    for corner in ((-4, 11), (2, 11), (2, 16), (-4, 16)):
+        page.page.mouse.click(*on_screen(page, *corner))
+    page.page.click("#fence-save")
+    page.wait_for("why", lambda: page.page.inner_text("#fence-error") == "give the area a name")
+    page.page.fill("#fence-name", "pond")
+    page.page.fill("#fence-top", "5")
+    page.page.click("#fence-save")
+    page.wait_for("it is told", lambda: "fence of 1" in page.page.inner_text("#toasts"))
+    page.wait_for("the legend", lambda: page.page.is_visible("#legend-outside"))
+    assert page.page.is_hidden("#fence-form")
+    why = "inside fence pond, which drones stay out of"  # drone 13 stands there
+    page.wait_for("its alarm", lambda: why in page.page.inner_text("#alarms"))
+    page.page.click("#nodes tr[data-id='17']")
+    page.page.fill("#fly-x", "0")
+    page.page.fill("#fly-y", "14")
+    page.answer_held("#held-now")
+    page.page.click("#fly-form button")
+    page.wait_for("a refusal", lambda: why in page.page.inner_text("#toasts"))
+    page.page.click("#fence")
+    page.page.click("#fence-delete")
+    page.page.click("#confirm [value=yes]")
+    page.wait_for("no legend", lambda: page.page.is_hidden("#legend-outside"))
+    assert page.page.is_hidden("#fence-areas")
+    page.page.mouse.click(*on_screen(page, 20, 20))
+    page.page.click("#add")  # one form at a time
+    assert page.page.is_hidden("#fence-form")
+    assert page.page.is_visible("#add-form")
+    assert page.unexpected() == []
+
+
 SHOWN_RATES = """async (whole) => {
   const { Charts } = await import("/static/charts.js");
   const { Mesh } = await import("/static/mesh.js");

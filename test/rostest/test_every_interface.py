@@ -22,7 +22,7 @@ from actionlib_msgs.msg import GoalStatus
 from diagnostic_msgs.msg import DiagnosticArray
 from rosgraph_msgs.msg import Clock, Log
 from rostest_support import WALL_LIMIT_S, LogWatch, MeshWatch, call, wait_for
-from std_msgs.msg import Bool, Float32
+from std_msgs.msg import Bool, Float32, String
 
 from drone_mesh import msg, srv
 
@@ -359,6 +359,41 @@ class EveryInterfaceTest(unittest.TestCase):
         self.wait_at(3, -1.0, 7.0)
         for drone in LAYOUT:
             self.assertTrue(self.stands_at(drone, *STARTS[drone]))
+
+    def test_14_all_keep_a_fence_that_changes(self) -> None:
+        self.listen("/DroneManager/fence", String)
+        name, order = "/DroneManager/setFence", "/DroneManager/orderFlight"
+        yard = "areas: [{name: yard, polygon: [[-9, -9], [20, -9], [20, 20], [-9, 20]]}]"
+        pond = '{"areas": [{"name": "pond", "inclusion": false, "center": [14, 0], "radius": 2}]}'
+        near = yard.replace("-9", "-4").replace("yard", "near")
+        change = {"areas": "", "keep": False, "remove": []}
+
+        def fly(x: float, y: float) -> Any:
+            place = {"longitude": x, "latitude": y, "height": 0, "allow_shared_place": True}
+            return self.ask(order, srv.OrderFlight, id=1, **place)
+
+        told = self.ask(name, srv.SetFence, **{**change, "areas": yard})
+        self.assertEqual(told.message, "fence: yard")
+        told = self.ask(name, srv.SetFence, **{**change, "areas": pond, "keep": True})
+        self.assertEqual(told.message, "fence: yard, pond")
+        with self.assertRaisesRegex(rospy.ServiceException, "inside fence pond"):
+            self.mesh.wait("its refusal", 30, lambda: not fly(14.0, 0.0).success)
+        self.assertTrue(fly(-8.0, 0.0).success)
+        self.mesh.wait("it flies", 60, lambda: self.node(1).position[2] > 1.0)
+        self.ask(name, srv.SetFence, **{**change, "areas": near})
+        given_up = self.wait_heard("/mesh/events", code=msg.MeshEvent.ORDER_GIVEN_UP)
+        self.assertIn("outside fence near", given_up.detail)
+        names = [area.name for area in self.heard["/mesh/state"][-1].fence]
+        self.assertEqual(names, ["near"])
+        self.assertGreater(self.node(1).position[0], -4.5)
+        for wrong in ({"remove": ["sea"], "keep": True}, {"areas": "areas: [{name: sea}]"}):
+            with self.assertRaisesRegex(rospy.ServiceException, "no area sea|expected a polygon"):
+                self.ask(name, srv.SetFence, **{**change, **wrong})
+        self.assertEqual(self.ask(name, srv.SetFence, **change).message, "fence: none")
+        self.mesh.wait("no fence", 30, lambda: not self.heard["/mesh/state"][-1].fence)
+        self.mesh.wait("all connected after it", 60, self.mesh.connected)
+        self.assertTrue(fly(*STARTS[1]).success)
+        self.wait_at(1, *STARTS[1])
 
     # Switches ----------------------------------------------------------------------------------
 

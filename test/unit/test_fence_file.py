@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 
 import pytest
+import yaml
 
 from drone_mesh.drone.geodesy import EarthPlace, Origin
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.fence_file import fence_of, read_fence
+from drone_mesh.fence_file import fence_of, read_fence, rows_of_text
 
 ORIGIN = Origin(52.0907, 5.1214, 3.0)
 DATE_LINE = Origin(-17.0, 179.9999, 0.0)
@@ -168,3 +169,8 @@ def test_degrees_need_an_origin(tmp_path):
 def test_an_area_without_a_name_has_its_number():
     rows = [{"polygon": [[0, 0], [9, 0], [9, 9]]}]
     assert fence_of(rows).why_not((20, 0, 0)) == "outside fence area 1"
+
+
+@pytest.mark.parametrize("text", [YARD, json.dumps(yaml.safe_load(YARD)), json.dumps(plan())])
+def test_a_text_without_a_name_is_read_as_what_it_looks_like(text):
+    assert len(fence_of(rows_of_text(text, "text", ORIGIN)).zones) == 2

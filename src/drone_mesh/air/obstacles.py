@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Iterator, Sequence
 
-from drone_mesh.drone.fence import CLEAR_M, Fence, Rule
+from drone_mesh.drone.fence import CLEAR_M, Fence, Rule, Turn
 from drone_mesh.drone.flight_path import FlightPath, Point, Vector
 from drone_mesh.drone.goal import MAX_HEIGHT_M
 from drone_mesh.drone.way_round import way_across
@@ -74,9 +74,9 @@ class Box:
         """Whether it is in the way from a to b."""
         return self.chord(a, b) is not None
 
-    def turns(self, _height_m: float) -> tuple[Point, ...]:
+    def turns(self, _height_m: float) -> list[Turn]:
         """Where a way round it may turn."""
-        return self.grown(BESIDE_M).corners
+        return list(map(Turn, self.grown(BESIDE_M).corners))
 
     def contains(self, point: Vector) -> bool:
         """Whether a point is inside or on its surface."""
@@ -157,9 +157,11 @@ class Obstacles:
         crosses lower than usual if only that is within the fence; from outside it first flies to
         the nearest place inside.
         """
+        usual = FlightPath(start, goal, start_s, speed_m_s, ceiling_m=self.cruise_m)
+        if not (self.boxes or self.fence):
+            return usual
         if not self.is_free(goal):
             return None
-        usual = FlightPath(start, goal, start_s, speed_m_s, ceiling_m=self.cruise_m)
         lower = (height_m - CLEAR_M for height_m in self.fence.ceilings)
         sinks = bool(self.fence.why_not(start))
         at = [

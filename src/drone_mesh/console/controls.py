@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, Mapping, Sequence
 
+from drone_mesh.drone.flight_path import Point
 from drone_mesh.errors import MeshError
 from drone_mesh.formations.layouts import Order
 from drone_mesh.formations.missions import Mission
@@ -62,6 +63,12 @@ class MeshControls:
     def pilots(self, action: str) -> str:
         """Pause, resume or stop all missions."""
         raise self._refusal("pilots")
+
+    def fence(
+        self, name: str, corners: Sequence[Point], inside: bool, max_height: float | None
+    ) -> str:
+        """Add this area to the fence, or replace the one of this name; no corners: delete it."""
+        raise self._refusal("fence")
 
     def _refusal(self, order: str) -> OrderRefused:
         return OrderRefused(self.WHY_NOT.get(order, self.WHY_NOTHING))

@@ -68,6 +68,7 @@ class GatewayControls(MeshControls):
             "remove": "a real drone leaves when it is switched off",
             "mission": _OWN_AUTOPILOT,
             "pilots": _OWN_AUTOPILOT,
+            "fence": "each node of a real mesh has its own fence: --fence",
         }
     )
 

@@ -10,6 +10,7 @@ from typing_extensions import Annotated
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.configuration import MAX_REAL_TIME_FACTOR
 from drone_mesh.console.controls import MeshControls, OrderRefused
+from drone_mesh.drone.fence import MOST_CORNERS
 from drone_mesh.drone.fleet import MAX_DRONES
 from drone_mesh.drone.flight_path import Vector
 from drone_mesh.drone.geodesy import Origin
@@ -18,6 +19,7 @@ from drone_mesh.drone.location import Location
 from drone_mesh.earth_files import Placemarks, is_earth_file, read_placemarks
 from drone_mesh.earth_files.plan import MAX_PLAN_CHARACTERS
 from drone_mesh.errors import ConfigurationError
+from drone_mesh.fence_file import MAX_NAME as MAX_AREA_NAME
 from drone_mesh.formations.layouts import MAX_CASE, MAX_NAME, Order, read_layout
 from drone_mesh.formations.mission_files import MOST_WAYPOINTS, is_mission_file, read_mission
 from drone_mesh.formations.missions import MAX_SPEED_M_S, Mission
@@ -37,6 +39,8 @@ NodeId = Annotated[int, Field(ge=0, le=MAX_NODE_ID)]
 NodeOrNone = Optional[NodeId]
 Coordinate = Annotated[float, Field(ge=-MAX_COORDINATE_M, le=MAX_COORDINATE_M, allow_inf_nan=False)]
 Height = Annotated[float, Field(ge=0, le=MAX_HEIGHT_M, allow_inf_nan=False)]
+HeightOrNone = Optional[Height]
+Corners = Annotated[List[Tuple[Coordinate, Coordinate]], Field(max_length=MOST_CORNERS)]
 NodeIds = Annotated[List[NodeId], Field(min_length=1, max_length=MAX_DRONES)]
 Gateways = Annotated[List[NodeId], Field(max_length=MAX_DRONES)]
 Waypoints = Annotated[
@@ -194,6 +198,16 @@ class _Pilots(PageOrder):
     action: Literal["pause", "resume", "stop"]
 
 
+class _Fence(PageOrder):
+    """Add an area to the fence, in place of one of its name; without corners, delete that one."""
+
+    do: Literal["fence"]
+    name: str = Field(min_length=1, max_length=MAX_AREA_NAME)
+    corners: Corners
+    inside: bool = False
+    max_height: HeightOrNone = None
+
+
 class ReadPlaces(_Answered):
     """The page sends a file and asks for the positions of its drones."""
 
@@ -303,6 +317,7 @@ Request = Union[
     _Remove,
     _Mission,
     _Pilots,
+    _Fence,
 ]
 
 _REQUESTS: TypeAdapter[Request] = TypeAdapter(Annotated[Request, Field(discriminator="do")])

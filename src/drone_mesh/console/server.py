@@ -73,7 +73,7 @@ EVENT_WITHIN_S = 5.0  # wall: after the answer to an order; hosts report every s
 ALIVE_PERIOD_S = 0.5  # a page takes two seconds without a message for silence
 MOST_LATE_S = 3.0  # an order of a page that has heard nothing for longer is refused
 ALL_ACTIONS = (
-    "fly", "power", "layout", "formation", "speed", "add", "remove", "mission",
+    "fly", "power", "layout", "formation", "speed", "add", "remove", "mission", "fence",
     "demonstrate", "packets",
 )  # fmt: skip
 COOKIE = "drone_mesh_token"

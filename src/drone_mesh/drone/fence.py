@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Iterable, Iterator, Sequence, Tuple
+from typing import Iterable, Iterator, NamedTuple, Sequence, Tuple
 
 from drone_mesh.drone.flight_path import Point, Vector, between
 from drone_mesh.errors import ConfigurationError
@@ -25,6 +25,31 @@ _SHORT_M = 1e-6  # a shorter piece of a way is rounding
 _SHARPEST = 1.0 / 3.0  # at a sharper corner, ways round keep 3 * CLEAR_M from its tip
 
 
+_PART = 16  # edges that are looked at, or left out, together
+
+_Part = Tuple[Tuple[float, float, float, float], Sequence[Tuple[Point, Point]]]
+"""Edges that follow each other, and least and greatest x and y of them."""
+
+
+class Turn(NamedTuple):
+    """Where a way round something may turn."""
+
+    at: Point
+    beside: tuple[Point, Point] | None = None  # corners to both sides; None: it may turn anyhow
+
+    def is_touched_from(self, other: Point) -> bool:
+        """Whether a straight way from there passes both of them on one side.
+
+        A shortest way touches what it goes round: it has no other pieces.
+        """
+        if self.beside is None:
+            return True
+        (x, y), (dx, dy) = self.at, (self.at[0] - other[0], self.at[1] - other[1])
+        one, two = (dx * (v - y) - dy * (u - x) for u, v in self.beside)
+        slack = _SHORT_M * (abs(dx) + abs(dy))
+        return max(one, two) <= slack or min(one, two) >= -slack
+
+
 @dataclass(frozen=True)
 class Zone:
     """An area between two heights. A point within an odd number of its rings is inside."""
@@ -33,10 +58,11 @@ class Zone:
     rings: tuple[Ring, ...]
     lowest_m: float = -math.inf
     highest_m: float = math.inf
-    turns: tuple[Point, ...] = ()  # where ways round it may turn; empty: outside each corner
+    turns: tuple[Turn, ...] = ()  # of ways round it; empty: outside each corner
     edges: tuple[tuple[Point, Point], ...] = field(init=False, repr=False, compare=False)
     beside: tuple[Point, ...] = field(init=False, repr=False, compare=False)
     """Points at CLEAR_M from each corner, on either side: first where it is the tip."""
+    _parts: tuple[_Part, ...] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Raise ConfigurationError, which does not name the zone, for what is no area."""
@@ -44,18 +70,22 @@ class Zone:
             raise ConfigurationError("its least height is not below its greatest")
         edges: list[tuple[Point, Point]] = []
         beside: list[Point] = []
+        turns: list[Turn] = []
         for ring in self.rings:
             # Programs close a ring with its first corner, or do not.
             corners = [p for p, before in zip(ring, (*ring[-1:], *ring)) if p != before]
             if len(corners) < 3:
                 raise ConfigurationError(f"{len(corners)} different corners: an area needs 3")
             edges += _closed(corners)
-            beside += _beside(corners)
+            both = list(_beside(corners))
+            beside += both
+            turns += _turns(both[::2], corners)
         if len(edges) > MOST_CORNERS:
             raise ConfigurationError(f"{len(edges)} corners: at most {MOST_CORNERS} are allowed")
         object.__setattr__(self, "edges", tuple(edges))
         object.__setattr__(self, "beside", tuple(beside))
-        object.__setattr__(self, "turns", self.turns or tuple(beside[::2]))
+        object.__setattr__(self, "_parts", tuple(_parts(edges)))
+        object.__setattr__(self, "turns", self.turns or tuple(turns))
         for number, (start, end) in enumerate(edges):
             if any(True for _ in _meetings(start, end, edges[:number], inset=1e-9)):
                 raise ConfigurationError("its edges cross: which side is inside is not clear")
@@ -77,13 +107,14 @@ class Zone:
         reach_m = radius_m if inside else radius_m / math.cos(math.pi / CIRCLE_CORNERS)
         turn_m = (reach_m + CLEAR_M) / math.cos(math.pi / CIRCLE_TURNS)
         rings = (_around(center, reach_m, CIRCLE_CORNERS),)
-        return cls(name, rings, *heights, turns=_around(center, turn_m, CIRCLE_TURNS))
+        turns = _around(center, turn_m, CIRCLE_TURNS)
+        return cls(name, rings, *heights, turns=tuple(_turns(turns, rings[0])))
 
     def surrounds(self, place: Vector) -> bool:
         """Whether this place is inside, seen from above."""
         x, y, _z = place
         inside = False
-        for (x1, y1), (x2, y2) in self.edges:
+        for (x1, y1), (x2, y2) in self._edges_within(x, math.inf, y, y):
             if (y1 > y) != (y2 > y) and x < x1 + (y - y1) * (x2 - x1) / (y2 - y1):
                 inside = not inside
         return inside
@@ -94,10 +125,20 @@ class Zone:
 
     def cuts(self, a: Vector, b: Vector) -> Iterator[float]:
         """Where the way from a to b passes its sides, floor or ceiling: shares of that way."""
-        yield from _meetings(a[:2], b[:2], self.edges)
+        (x1, y1, _z1), (x2, y2, _z2) = a, b
+        box = min(x1, x2), max(x1, x2), min(y1, y2), max(y1, y2)
+        yield from _meetings(a[:2], b[:2], self._edges_within(*box))
         if a[2] != b[2]:
             for height_m in (self.lowest_m, self.highest_m):
                 yield (height_m - a[2]) / (b[2] - a[2])
+
+    def _edges_within(
+        self, left: float, right: float, low: float, high: float
+    ) -> Iterator[tuple[Point, Point]]:
+        """Its edges that reach into this rectangle, and others near them."""
+        for (x1, x2, y1, y2), edges in self._parts:
+            if x1 <= right and left <= x2 and y1 <= high and low <= y2:
+                yield from edges
 
     def nearest(self, place: Vector) -> Iterator[Point]:
         """The points of its edges nearest to a place, moved by CLEAR_M to either side."""
@@ -117,13 +158,16 @@ class Rule:
 
     zones: tuple[Zone, ...]
     inside: bool
-    _turns: tuple[Point, ...] = field(init=False, repr=False, compare=False)
+    _turns: tuple[Turn, ...] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        turns = [point for zone in self.zones for point in zone.turns]
+        turns = [turn for zone in self.zones for turn in zone.turns]
         if self.inside:
-            turns += self._passages()
-        object.__setattr__(self, "_turns", tuple(turns))
+            if len(self.zones) > 1:  # a corner beside a turn may lie within another zone
+                turns = [Turn(turn.at) for turn in turns]
+            turns += map(Turn, self._passages())
+        possible = (turn for turn in turns if self._surrounds((*turn.at, 0.0)) is self.inside)
+        object.__setattr__(self, "_turns", tuple(possible))
 
     @property
     def names(self) -> str:
@@ -141,20 +185,16 @@ class Rule:
 
     def meets(self, a: Vector, b: Vector) -> bool:
         """Whether the straight way from a to b breaks it anywhere."""
-        length_m = math.dist(a, b)
-        if length_m <= _SHORT_M:
-            return not self.allows(a)
-        inner = (share for zone in self.zones for share in zone.cuts(a, b) if 0.0 < share < 1.0)
-        shares = [0.0, *sorted(inner), 1.0]
-        return any(
-            (end - start) * length_m > _SHORT_M
-            and not self.allows(between(a, b, (start + end) / 2.0))
-            for start, end in zip(shares, shares[1:])
-        )
+        return any(not self.allows(middle) for _share, middle in _pieces(self.zones, a, b))
 
-    def turns(self, height_m: float) -> list[Point]:
+    def turns(self, height_m: float) -> Sequence[Turn]:
         """Where ways round it may turn, at this height."""
-        return [point for point in self._turns if self.allows((*point, height_m))]
+        if len(self.zones) == 1:
+            return self._turns
+        return [turn for turn in self._turns if self.allows((*turn.at, height_m))]
+
+    def _surrounds(self, place: Vector) -> bool:
+        return any(zone.surrounds(place) for zone in self.zones)
 
     def _passages(self) -> Iterator[Point]:
         """Points around where two zones overlap or touch, through which ways lead."""
@@ -246,14 +286,8 @@ class Fence:
 
     def outside_share(self, a: Vector, b: Vector) -> float:
         """The share of the straight way from a to b that breaks any rule."""
-        cuts = (share for zone, _inside in self.zones for share in zone.cuts(a, b))
-        shares = [0.0, *sorted(share for share in cuts if 0.0 < share < 1.0), 1.0]
-        return sum(
-            end - start
-            for start, end in zip(shares, shares[1:])
-            if (end - start) * math.dist(a, b) > _SHORT_M or a == b
-            if self.why_not(between(a, b, (start + end) / 2.0))
-        )
+        pieces = _pieces([zone for zone, _inside in self.zones], a, b)
+        return sum(share for share, middle in pieces if self.why_not(middle))
 
     def nearest_inside(self, place: Vector) -> Vector | None:
         """The nearest place at the same height that keeps all rules; None: there is none."""
@@ -269,8 +303,25 @@ def called(names: str) -> str:
     return names if names.startswith(OF_AUTOPILOT) else f"fence {names}"
 
 
+def _pieces(zones: Iterable[Zone], a: Vector, b: Vector) -> Iterator[tuple[float, Vector]]:
+    """The straight way from a to b between the borders of zones: shares of it, and the middles."""
+    cuts = (share for zone in zones for share in zone.cuts(a, b) if 0.0 < share < 1.0)
+    length_m = math.dist(a, b)
+    shares = [0.0, *(sorted(cuts) if length_m > _SHORT_M else ()), 1.0]
+    for start, end in zip(shares, shares[1:]):
+        if (end - start) * length_m > _SHORT_M or length_m <= _SHORT_M:
+            yield end - start, between(a, b, (start + end) / 2.0)
+
+
 def _closed(corners: Sequence[Point]) -> list[tuple[Point, Point]]:
     return list(zip(corners, (*corners[1:], corners[0])))
+
+
+def _parts(edges: Sequence[tuple[Point, Point]]) -> Iterator[_Part]:
+    for start in range(0, len(edges), _PART):
+        part = edges[start : start + _PART]
+        xs, ys = zip(*(corner for edge in part for corner in edge))
+        yield (min(xs), max(xs), min(ys), max(ys)), part
 
 
 def _meetings(
@@ -287,6 +338,13 @@ def _meetings(
             share = (gx * ey - gy * ex) / spread
             if inset <= (gx * dy - gy * dx) / spread <= 1.0 - inset and inset <= share <= 1 - inset:
                 yield share
+
+
+def _turns(points: Sequence[Point], ring: Sequence[Point]) -> Iterator[Turn]:
+    """Turns at these points: one off each corner of this ring, or off every few of them."""
+    for number, at in enumerate(points):
+        corner = number * len(ring) // len(points)
+        yield Turn(at, (ring[corner - 1], ring[(corner + 1) % len(ring)]))
 
 
 def _around(center: Point, radius_m: float, corners: int) -> Ring:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import abc
 
 from drone_mesh.drone.fence import Fence
+from drone_mesh.drone.flight_path import FlightPath, Vector
 from drone_mesh.drone.location import Location
 
 
@@ -64,6 +65,10 @@ class IDroneEngine(abc.ABC):
         hovering instead of landing.
         """
         self.set_goal(latitude, longitude, height)
+
+    def plan(self, start: Vector, goal: Vector, now_s: float) -> FlightPath | None:
+        """How it would fly there, as far as known; None: not at all."""
+        return FlightPath(start, goal, now_s)
 
     def frame_digest(self) -> int:
         """A number 1..65535 for the origin of its positions; 0: it has none.

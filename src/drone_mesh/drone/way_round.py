@@ -6,7 +6,7 @@ import heapq
 import math
 from typing import Protocol, Sequence
 
-from drone_mesh.drone.fence import Fence
+from drone_mesh.drone.fence import Fence, Turn
 from drone_mesh.drone.flight_path import Point, Vector
 
 MOST_MET = 10  # on one path; the search time grows with the cube
@@ -18,7 +18,7 @@ class InTheWay(Protocol):
     def meets(self, a: Vector, b: Vector) -> bool:
         """Whether it is in the way from a to b."""
 
-    def turns(self, height_m: float) -> Sequence[Point]:
+    def turns(self, height_m: float) -> Sequence[Turn]:
         """Where ways round it may turn."""
 
 
@@ -77,12 +77,13 @@ def _shortest(
 
     That is asked only of legs that the shortest way may have: it takes most of the time.
     """
-    points = [start, goal, *(c for one in obstacles for c in one.turns(height_m))]
+    turns = [Turn(start), Turn(goal), *(c for one in obstacles for c in one.turns(height_m))]
     came_from: dict[int, int] = {}
     waiting = [(0.0, 0.0, 0, 0)]  # least total length, length so far, point, previous point
     while waiting:
         _least, metres, here, before = heapq.heappop(waiting)
-        leg = points[before], points[here]
+        at = turns[here].at
+        leg = turns[before].at, at
         if here in came_from or any(_is_met(one, *leg, height_m) for one in obstacles if here):
             continue
         came_from[here] = before
@@ -90,11 +91,13 @@ def _shortest(
             way = [1]
             while way[-1] != 0:
                 way.append(came_from[way[-1]])
-            return tuple(points[index] for index in reversed(way))
-        for other, point in enumerate(points):
-            if other not in came_from:
-                until = metres + math.dist(points[here], point)
-                heapq.heappush(waiting, (until + math.dist(point, goal), until, other, here))
+            return tuple(turns[index].at for index in reversed(way))
+        for other, turn in enumerate(turns):
+            if other in came_from or not turn.is_touched_from(at):
+                continue
+            if turns[here].is_touched_from(turn.at):
+                until = metres + math.dist(at, turn.at)
+                heapq.heappush(waiting, (until + math.dist(turn.at, goal), until, other, here))
     return None
 
 

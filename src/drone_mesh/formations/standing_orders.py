@@ -251,6 +251,10 @@ class StandingOrders:
             for drone, part in sorted(order.parts.items(), reverse=True):
                 if not part.is_followed or (part.state is PartState.ARRIVED and not is_moving):
                     continue
+                why_not = rules.fence.why_not(part.goal.to_vector()) if rules.fence else ""
+                if why_not and part.state.is_open:  # until the fence changes again
+                    part.stay(PartState.REFUSED, why_not)
+                    continue
                 if self._follow(part, nodes.get(drone), order.at_once, mesh.stamp_s):
                     if part.sent_to is not None:
                         wanted[drone] = part.sent_to

@@ -41,6 +41,7 @@ _WARNINGS = {
     MeshEventKind.DISCONNECTED, MeshEventKind.POWER_OFF, MeshEventKind.BATTERY_LOW,
     MeshEventKind.CANNOT_FLY, MeshEventKind.NO_ROUTE, MeshEventKind.GOAL_REFUSED,
     MeshEventKind.ORDER_REFUSED, MeshEventKind.ORDER_GIVEN_UP, MeshEventKind.ORDER_LOST_CONTACT,
+    MeshEventKind.OUTSIDE_FENCE,
 }  # fmt: skip
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from drone_mesh.air.obstacles import Obstacles, no_path
 from drone_mesh.drone.battery import LAND_AT_PERCENT, Battery
 from drone_mesh.drone.fence import Fence
-from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath, PlanFlight
+from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath, PlanFlight, Vector
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
@@ -48,6 +48,7 @@ class InProcessDrone(IDroneEngine):
         self.speed_m_s = SPEED_M_S  # of its next flight; experiments with wind change it
         # Returns None if there is no path; the drone then stays. Obstacles replace this planner.
         self.plan_flight: PlanFlight = FlightPath
+        self.refused = 0  # goals without a path
         self.battery: Battery | None = None  # None: it never runs low; experiments use it up
         if fence:
             self.plan_flight = Obstacles((), fence=fence).plan_flight
@@ -65,14 +66,38 @@ class InProcessDrone(IDroneEngine):
             return
         plan = self.plan_flight(here.to_vector(), goal, self._clock.now_s, self.speed_m_s)
         if plan is None:
+            self.refused += 1
             raise GoalRefused(self.fence.why_not(goal) or no_path(self.fence))
         self.under_pilot = False
         if self.path is None:
             self._on_flight(True)
+        self._set_out(plan)
+
+    def _set_out(self, plan: FlightPath) -> None:
         before, self.path = self.path, plan
         self._clock.call_at(self._clock.now_s + plan.duration_s, self._arrive, plan)
         for observer in self._observers:
             observer(before, plan)
+
+    def plan(self, start: Vector, goal: Vector, now_s: float) -> FlightPath | None:
+        """Round its fence, if it has one."""
+        if not self.fence:
+            return super().plan(start, goal, now_s)
+        return self.plan_flight(start, goal, now_s, self.speed_m_s)
+
+    def keep_to(self, fence: Fence) -> None:
+        """Keep this fence from now on: a flight that would break it goes another way, or ends."""
+        self.fence, path, now_s = fence, self.path, self._clock.now_s
+        self.plan_flight = Obstacles((), fence=fence).plan_flight
+        here = self.get_location()
+        if path is None or not fence.why_not_straight([here.to_vector(), *path.ahead(now_s)]):
+            return
+        plan = self.plan_flight(here.to_vector(), path.goal, now_s, self.speed_m_s)
+        if plan is None:
+            self._place, self.path = here, None
+            self._on_flight(False)
+        else:
+            self._set_out(plan)
 
     def observe(self, observer: OnPath) -> None:
         """Tell this observer of each flight from now on."""
@@ -137,12 +162,18 @@ class PositionReceiver(IDroneEngine):
         self, drone: InProcessDrone, clock: Clock, errors: PositionErrors, rng: random.Random
     ) -> None:
         self._drone, self._clock, self._errors, self._rng = drone, clock, errors, rng
-        self.fence = drone.fence
         self._error_m = (self._drawn(), self._drawn())
         self._drawn_s = 0.0
 
+    @property
+    def fence(self) -> Fence:  # type: ignore[override]
+        return self._drone.fence
+
     def set_goal(self, latitude: float, longitude: float, height: float) -> None:
         self._drone.set_goal(latitude, longitude, height)
+
+    def plan(self, start: Vector, goal: Vector, now_s: float) -> FlightPath | None:
+        return self._drone.plan(start, goal, now_s)
 
     def why_not_fly(self) -> str:
         return self._drone.why_not_fly()

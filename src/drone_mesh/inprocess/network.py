@@ -42,6 +42,7 @@ from drone_mesh.nrf24.emulator.links import LinkModel
 from drone_mesh.nrf24.emulator.space import RICIAN_K_DB
 from drone_mesh.nrf24.settings import DEFAULT_RATE
 from drone_mesh.state.model import EventRecord, MeshStatus
+from drone_mesh.state.observation import describe_fence
 
 ORACLE = "oracle"  # the repair strategy with global knowledge
 IDEAL_FIEDLER = "ideal_fiedler"  # the strategy `fiedler` with it
@@ -231,6 +232,13 @@ class Network:
         if antenna.powered != on:
             antenna.switch_power(on)
 
+    def set_fence(self, fence: Fence) -> None:
+        """All drones keep this fence from now on. Not for drones among boxes."""
+        self._fence = fence
+        for node in self.nodes.values():
+            node.drone.keep_to(fence)
+            node.submit(node.component.on_fence)
+
     def internet(self, gateway: int, works: bool) -> None:
         """Give a gateway its connection to the outside world, or take it."""
         self.nodes[gateway].submit(functools.partial(self._gateway(gateway).set_internet, works))
@@ -313,7 +321,8 @@ class Network:
             chosen if isinstance(chosen, str) else getattr(chosen, "__name__", "")
             for chosen in (self._routing, self._repair)
         )
-        return replace(state, routing=routing, repair_strategy=repair)
+        fence = describe_fence(self._fence)
+        return replace(state, routing=routing, repair_strategy=repair, fence=fence)
 
     def event_records(self) -> list[EventRecord]:
         """All events so far, like those on /mesh/events: for the story of the run."""

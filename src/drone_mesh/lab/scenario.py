@@ -19,7 +19,7 @@ from drone_mesh.drone.flight_path import SPEED_M_S
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.goal import MAX_HEIGHT_M
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.fence_file import fence_of
+from drone_mesh.fence_file import areas_json, fence_in, fence_of
 from drone_mesh.formations.relief import ReliefRules
 from drone_mesh.lab.scenario_parts import (
     Above0,
@@ -259,15 +259,14 @@ class FenceSettings(Part):
     @classmethod
     def _are_areas(cls, rows: List[Dict[str, Any]]) -> List[Dict[str, Any]]:
         try:
-            if rows:
-                fence_of(rows)
+            fence_of(rows)
         except ConfigurationError as error:
             raise ValueError(str(error)) from None
         return rows
 
     def fence(self) -> Fence:
         """The fence, which may be none."""
-        return fence_of(self.areas) if self.areas else Fence()
+        return fence_in(areas_json(self.areas))
 
 
 class Sequence(Part):

@@ -11,7 +11,6 @@ from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.communication.repair.options import RepairOptions
 from drone_mesh.communication.seals.keys import Keys, MeshKey
 from drone_mesh.communication.timing import MeshTiming
-from drone_mesh.drone.flight_path import FlightPath, Vector
 from drone_mesh.drone.location import Location
 from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.drone import PositionErrors
@@ -66,14 +65,11 @@ def _faded(steps: int, fading: str, k_db: float) -> float:
     return float(ncx2.sf(2 * (k + 1) * below, 2, 2 * k))
 
 
-def put_obstacles(network: Network, impairments: Impairments, scenario: Scenario) -> Planner | None:
-    """Apply boxes and fence to links and flights; None if there are none of them and no fading.
-
-    Call this before the nodes start.
-    """
+def put_obstacles(network: Network, impairments: Impairments, scenario: Scenario) -> None:
+    """Apply boxes and fence to links and flights. Call this before the nodes start."""
     part = scenario.obstacles
     if not (part.boxes or scenario.fence.areas) and part.fading == "none":
-        return None
+        return
     obstacles = obstacles_of(scenario)
     range_m = scenario.range_m
     if scenario.radio.kind != "disc":
@@ -90,10 +86,8 @@ def put_obstacles(network: Network, impairments: Impairments, scenario: Scenario
             return success(margin_db, part.fading, part.rician_k_db)
 
         impairments.arrives = arrives
-    planner = Planner(obstacles)
-    for node_id, node in network.nodes.items():
-        node.drone.plan_flight = functools.partial(planner.plan, node_id)
-    return planner
+    for node in network.nodes.values():
+        node.drone.plan_flight = obstacles.plan_flight
 
 
 def put_noise(network: Network, jam: Jam, range_m: float, rng: random.Random) -> Callable[[], None]:
@@ -115,23 +109,6 @@ class ChannelAir(Protocol):
     settings: RadioSettings
     airtime_s: float  # of all frames
     collisions: int  # receptions that another frame destroyed
-
-
-class Planner:
-    """Plans flights past the boxes, and records those without a path."""
-
-    def __init__(self, obstacles: Obstacles) -> None:
-        self.obstacles = obstacles
-        self.refused: list[int] = []  # node ids
-
-    def plan(
-        self, node: int, start: Vector, goal: Vector, start_s: float, speed_m_s: float
-    ) -> FlightPath | None:
-        """Like Obstacles.plan_flight."""
-        path = self.obstacles.plan_flight(start, goal, start_s, speed_m_s)
-        if path is None:
-            self.refused.append(node)
-        return path
 
 
 _KEY = MeshKey(b"the key of a lab")

@@ -40,7 +40,7 @@ from drone_mesh.lab.scenario_network import (
 from drone_mesh.lab.timeline import Timeline
 from drone_mesh.mobility import Track
 from drone_mesh.state.model import MeshStatus
-from drone_mesh.state.observation import describe_fence, describe_obstacles
+from drone_mesh.state.observation import describe_obstacles
 
 FLIGHT_SAMPLE_S = 0.25  # period of distance checks while a drone flies: 0.5 m at 2 m/s
 
@@ -63,7 +63,7 @@ class Simulation:
         self.impairments = Impairments(
             self.network, streams.generator, scenario.radio.loss, one_way
         )
-        self._planner = put_obstacles(self.network, self.impairments, scenario)
+        put_obstacles(self.network, self.impairments, scenario)
         self.flights = Flights(self.network)
         self.timeline = Timeline(
             scenario, self.network, self.impairments, self.flights, streams, self._observing
@@ -91,10 +91,9 @@ class Simulation:
     def run(self, on_status: OnStatus | None = None) -> RunRecord:
         """Run to the end. `on_status` gets the state after each sample, for pictures."""
         boxes = describe_obstacles(obstacles_of(self.scenario).boxes)
-        fence = describe_fence(self.scenario.fence.fence())
         for _now_s in self.samples():
             if on_status is not None:
-                on_status(replace(self.network.status(), obstacles=boxes, fence=fence))
+                on_status(replace(self.network.status(), obstacles=boxes))
         return self.record()
 
     def samples(self) -> Iterator[float]:
@@ -155,7 +154,7 @@ class Simulation:
             frames=self.impairments.frames,
             formations=self.timeline.formations,
             endurance=self._endurance.finished() if self._endurance else None,
-            refused_flights=0 if self._planner is None else len(self._planner.refused),
+            refused_flights=sum(node.drone.refused for node in nodes.values()),
             cut_offs=[*self._cut_offs, *(ServiceGap(*gap, None) for gap in self._cut_off.items())],
             in_the_air=frozenset(self.flights.in_the_air),
             grounded=frozenset(n for n, node in nodes.items() if node.drone.why_not_fly()),

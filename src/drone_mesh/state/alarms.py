@@ -155,6 +155,8 @@ class AlarmBook:
             found.append(another_radio(node.id))
         if node.battery <= LOW_BATTERY_PERCENT:  # false if it is not known
             found.append("low battery")
+        if node.outside_fence:
+            found.append(node.outside_fence)
         is_lost = condition is Condition.DISCONNECTED and node.role == Role.ROUTER
         if is_lost and node.id in self._was_connected:
             found.append("lost the gateway")

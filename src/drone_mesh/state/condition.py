@@ -87,6 +87,8 @@ def _worst_of(node: NodeStatus, by_id: Mapping[int, NodeStatus]) -> tuple[Severi
     if node.role == Role.ROUTER and not reaches_gateway(node.route, by_id):
         route = " > ".join(map(str, node.route))
         return Severity.WARN, f"its route breaks off: {route}" if route else "no route to a gateway"
+    if node.outside_fence:
+        return Severity.WARN, node.outside_fence
     if node.why_not_fly and math.isfinite(node.battery):
         return Severity.WARN, f"cannot fly: {node.why_not_fly}"
     return Severity.OK, ""

@@ -72,6 +72,7 @@ class NodeStatus:
     home: Sequence[float] = ()  # (3,) m, its pad, where crews swap its battery; empty: none
     pad: str = ""  # what they do for it, in words; empty: nothing
     relieves: int = NO_ROUTE  # the drone whose place it takes; NO_ROUTE: none
+    outside_fence: str = ""  # why its drone may not be where it is; empty: it may
 
 
 @dataclass(frozen=True)

@@ -176,6 +176,7 @@ def describe_component(
     status.data_received, status.data_bytes_received = data.messages_received, data.bytes_received
     status.data_sent_at, status.data_received_at = data.sent_s, data.received_s
     status.data_queued, status.data_given_up = data.messages_queued, data.messages_given_up
+    status.outside_fence = component.outside_fence
     repair = component.get_repair_status() if on else NOTHING_TO_REPAIR
     status.repair, status.repair_reason = repair.in_words(now_s), repair.reason
     status.jammed = repair.jammed

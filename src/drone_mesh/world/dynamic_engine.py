@@ -221,9 +221,15 @@ class DynamicEngine(DroneEngine):
             _log.warning("box %d stays: %s to %s", self._box, no_path(self.fence), goal.in_words())
             return
         self.pause_pilot(True)
-        self._route = self._route_of(path, here, goal)
-        self._hover = None
-        self._notify(position, path, now_s)
+        self._fly_anew(path, position, now_s)
+
+    def _fly_anew(self, path: FlightPath | None, position: Vector, now_s: float) -> None:
+        here = Location.from_vector(position)
+        self._hover = here if path is None else None
+        self._route = None
+        if path is not None:
+            self._route = self._route_of(path, here, Location.from_vector(path.goal))
+        super()._fly_anew(path, position, now_s)
 
     def _route_of(self, path: FlightPath, here: Location, goal: Location) -> Route:
         """As high as a kinematic drone would fly."""
@@ -241,7 +247,8 @@ class DynamicEngine(DroneEngine):
             pilot.wait(now_s)
         else:
             lift_m = self._half_height_m
-            x, y, z = pilot.move(held._replace(height=held.height - lift_m).to_vector(), now_s)
+            below = held._replace(height=held.height - lift_m).to_vector()
+            x, y, z = self._piloted(pilot, below, now_s)
             self._hover = Location.from_vector((x, y, z + lift_m))
         return True
 

@@ -10,6 +10,7 @@ from typing import Callable, NamedTuple
 from drone_mesh.air.obstacles import no_path
 from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.drone.battery import Endurance
+from drone_mesh.drone.fence import Fence
 from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath, PlanFlight, Vector
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine
@@ -128,6 +129,23 @@ class DroneEngine(IDroneEngine):
         self._goals.append(goal)
         self._world.wake(self)
 
+    def keep_to(self, fence: Fence) -> None:
+        """Keep this fence, as its planner does: fly another way, or stay. World's thread."""
+        self.fence = fence
+        (position, path, _), now_s = self._state, self._world.now_s
+        if path is None or self.why_not_fly():  # then it lands
+            return
+        way = [position, *path.ahead(now_s)]
+        why_not = fence.raised(self._half_height_m).why_not_straight(way)
+        if why_not:
+            plan = self._plan(position, path.goal, now_s)
+            self._fly_anew(plan, position, now_s)
+            if plan is None:
+                self._note(MeshEventKind.GOAL_REFUSED, f"it stays where it is: {why_not}")
+
+    def _fly_anew(self, path: FlightPath | None, position: Vector, now_s: float) -> None:
+        self._notify(position, path, now_s)
+
     def follow(self, centre: Vector) -> None:
         """Be at this position from the next step on; another node flies the drone. Any thread."""
         self._followed = centre
@@ -183,10 +201,20 @@ class DroneEngine(IDroneEngine):
         if now_s - self._piloted_s >= PILOT_STEP_S - self._world.tick_s / 2:
             self._piloted_s = now_s
             before = self.get_location().to_vector()
-            x, y, z = pilot.move(before, now_s)
+            x, y, z = self._piloted(pilot, before, now_s)
             if (x, y, z) != before:
                 self._move((x, y, z + self._half_height_m), None, now_s)
         return True
+
+    def _piloted(self, pilot: TrackPilot, held: Vector, now_s: float) -> Vector:
+        """Where its pilot wants it instead of there; at the fence the pilot pauses."""
+        place = pilot.move(held, now_s)
+        why_not = self.fence.why_not(place) if self.fence else ""
+        if not why_not:
+            return place
+        self.pause_pilot(True)
+        self._note(MeshEventKind.GOAL_REFUSED, f"its pilot pauses: {why_not}")
+        return held
 
     def _move(self, position: Vector, path: FlightPath | None, now_s: float) -> None:
         self._world.move_box(self._box, position)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import functools
 import math
+from dataclasses import replace
 from typing import ClassVar, Sequence
 
 from drone_mesh.air.obstacles import Obstacles
@@ -97,22 +97,35 @@ class DroneFactory:
         self._world = world
         self._wind = wind
         self._limits, self._crews = limits, crews
-        self._for_flights: Obstacles | None = None
-        self._plan_flight: PlanFlight = functools.partial(FlightPath, ceiling_m=cruise_height_m)
-        self._fence = Fence() if obstacles is None else obstacles.fence
-        if obstacles is not None:
-            self._for_flights = obstacles.for_flights(HALF_WIDTH_M, HALF_HEIGHT_M)
-            for place in fleet:
-                if not _is_free(place, self._for_flights):
-                    raise ConfigurationError(
-                        f"obstacles: drone {place.node_id} would start in or against a box, at "
-                        f"x {place.longitude:g} m, y {place.latitude:g} m; move the box, or change "
-                        "spacing and gridsize"
-                    )
-            self._plan_flight = self._for_flights.plan_flight
-            for box in obstacles.boxes:
-                world.add_obstacle(box)
+        self._obstacles = obstacles or Obstacles((), cruise_m=cruise_height_m)
+        self._for_flights = self._obstacles.for_flights(HALF_WIDTH_M, HALF_HEIGHT_M)
+        for place in fleet:
+            if not _is_free(place, self._for_flights):
+                raise ConfigurationError(
+                    f"obstacles: drone {place.node_id} would start in or against a box, at "
+                    f"x {place.longitude:g} m, y {place.latitude:g} m; move the box, or change "
+                    "spacing and gridsize"
+                )
+        for box in self._obstacles.boxes:
+            world.add_obstacle(box)
         self.drones: tuple[VirtualDrone, ...] = tuple(self._make(place) for place in fleet)
+
+    @property
+    def fence(self) -> Fence:
+        """What all drones keep. Any thread."""
+        return self._obstacles.fence
+
+    def keep_to(self, fence: Fence) -> None:
+        """Let all drones, and later ones, keep this fence from now on. World's thread."""
+        self._obstacles = replace(self._obstacles, fence=fence)
+        self._for_flights = self._obstacles.for_flights(HALF_WIDTH_M, HALF_HEIGHT_M)
+        for drone in self.drones:
+            drone.engine.keep_to(fence)
+
+    def _plan(
+        self, start: Vector, goal: Vector, start_s: float, speed_m_s: float
+    ) -> FlightPath | None:
+        return self._for_flights.plan_flight(start, goal, start_s, speed_m_s)
 
     def get(self, node_id: int) -> VirtualDrone | None:
         """The present drone with this id; None: there is none. Any thread."""
@@ -169,9 +182,9 @@ class DroneFactory:
 
     def _make(self, place: StartPlace) -> VirtualDrone:
         drone = _KINDS[place.role](
-            self._world, place, self._wind, self._plan_flight, self._limits, self._crews
+            self._world, place, self._wind, self._plan, self._limits, self._crews
         )
-        drone.engine.fence = self._fence
+        drone.engine.fence = self.fence
         return drone
 
     def _check_place(self, place: StartPlace) -> None:
@@ -179,7 +192,7 @@ class DroneFactory:
             check_goal(place.latitude, place.longitude, 0.0)
         except GoalRefused as error:
             raise FleetRefused(f"invalid place: {error}") from None
-        if self._for_flights is not None and not _is_free(place, self._for_flights):
+        if not _is_free(place, self._for_flights):
             raise FleetRefused(
                 f"invalid place: x {place.longitude:g} m, y {place.latitude:g} m is in or against "
                 "an obstacle"

@@ -143,8 +143,8 @@ def run(scenario: Callable[[ConsoleServer, FrameStore], Awaitable[None]]) -> Non
 
 
 ACTIONS = [
-    "fly", "power", "layout", "formation", "speed", "add", "remove", "mission", "demonstrate",
-    "packets",
+    "fly", "power", "layout", "formation", "speed", "add", "remove", "mission", "fence",
+    "demonstrate", "packets",
 ]  # fmt: skip
 KINDS = ["heartbeat", "introduction", "position", "repair", "order", "report", "data", "other"]
 

@@ -8,7 +8,7 @@ import random
 import pytest
 
 from drone_mesh.air.obstacles import Box, Obstacles
-from drone_mesh.drone.fence import CLEAR_M, Fence, Zone
+from drone_mesh.drone.fence import CLEAR_M, Fence, Turn, Zone
 from drone_mesh.drone.flight_path import FlightPath
 from drone_mesh.drone.way_round import way_round
 from drone_mesh.errors import ConfigurationError
@@ -141,6 +141,33 @@ def test_a_way_round_many_corners_asks_of_few_legs():
     way = way_round([Asked()], (-40.0, 0.0), (40.0, 0.0), 5.0)
     assert way is not None
     assert len(asked) < 1200  # of the 2145 between two of its corners
+
+
+def test_the_shortest_way_is_found_among_ways_that_touch_corners(monkeypatch):
+    rng = random.Random(3)
+    found = []
+    for _ in range(40):
+        zones = [
+            Zone(str(n), (tuple(_jagged(rng, rng.uniform(0, 60), rng.uniform(0, 60))),))
+            for n in range(4)
+        ]
+        ends = [(rng.uniform(-5, 65), rng.uniform(-5, 65)) for _ in "ab"]
+        found.append((Fence.of([], zones).rules, *ends))
+    ways = [way_round(rules, a, b, 5.0) for rules, a, b in found]
+    monkeypatch.setattr(Turn, "is_touched_from", lambda *_places: True)
+    for way, (rules, a, b) in zip(ways, found):
+        assert _metres(a, way, b) == pytest.approx(_metres(a, way_round(rules, a, b, 5.0), b))
+
+
+def _jagged(rng, x, y):
+    for n in range(12):
+        metres = rng.uniform(3.0, 12.0)
+        yield x + metres * math.cos(n * math.tau / 12), y + metres * math.sin(n * math.tau / 12)
+
+
+def _metres(start, way, end):
+    places = [start, *way, end] if way is not None else []
+    return sum(map(math.dist, places, places[1:]))
 
 
 def test_without_a_fence_flights_are_as_before():

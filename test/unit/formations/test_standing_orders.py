@@ -6,9 +6,11 @@ import struct
 
 import pytest
 
+from drone_mesh.drone.fence import Fence, Zone
 from drone_mesh.drone.fleet import ids_in_words
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
+from drone_mesh.formations.departures import FlightRules
 from drone_mesh.formations.layouts import Layouts
 from drone_mesh.formations.standing_orders import PartState, StandingOrders
 from drone_mesh.inprocess.network import Network
@@ -192,6 +194,18 @@ def test_a_refusal_is_shown_with_its_reason_and_tried_again():
     orders.on_event(EventRecord(1.0, 0, "order refused", (4,), "battery at 9 %", 3, EAST))
     assert words(orders) == ["0 of 1 at their place, 4 refused: battery at 9 %"]
     assert orders.update(state(6.0, drone(4))) == [(4, EAST)]
+
+
+def test_a_place_that_the_fence_has_taken_is_named_and_flown_to_once_it_is_free_again():
+    orders = StandingOrders()
+    orders.give("layout 7", {4: EAST, 5: NORTH}, now_s=0.0)
+    pond = Fence.of([], [Zone.circle("pond", (6.0, 0.0), 2.0, inside=False)])
+    drones = drone(4), drone(5, at=NORTH)
+    for now_s in (6.0, 60.0):
+        assert orders.update(state(now_s, *drones), FlightRules(fence=pond)) == []
+    why = "inside fence pond, which drones stay out of"
+    assert words(orders) == [f"1 of 2 at their places, 4 refused: {why}"]
+    assert orders.update(state(61.0, *drones)) == [(4, EAST)]
 
 
 def test_drones_that_do_not_exist_are_named():

@@ -20,6 +20,7 @@ from drone_mesh.formations.missions import Mission
 from drone_mesh.formations.preview import preview
 from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.drone import PositionErrors
+from drone_mesh.state.condition import find_trouble
 from drone_mesh.world.factory import DroneFactory
 from drone_mesh.world.worlds import World
 
@@ -62,7 +63,6 @@ def test_an_order_outside_is_refused_by_the_gateway_and_by_a_drone_whose_gateway
 
 def test_a_drone_with_a_receiver_keeps_the_fence_of_its_network():
     network = fenced(positions=PositionErrors(sigma_m=0.1))
-    network.nodes[0].drone.fence = Fence()
     with pytest.raises(GoalRefused, match="pond"):
         network.order(1, 8.0, 0.0)
 
@@ -101,9 +101,7 @@ def test_a_repair_ends_at_the_nearest_place_inside(repair):
     """Its relay dies above the pond, where it may not fly."""
     network = fenced(((0.0, 0.0), (8.0, 0.0), (16.0, 0.0)), fence=Fence(), repair=repair)
     assert network.all_connected()
-    for node in network.nodes.values():
-        node.drone.fence = FENCE
-        node.drone.plan_flight = Obstacles((), fence=FENCE).plan_flight
+    network.set_fence(FENCE)
     network.power(1, False)
     for _ in range(600):
         network.run_for(0.25)
@@ -168,3 +166,55 @@ def test_a_drone_of_the_world_refuses_a_goal_outside_and_flies_lower_than_usual(
 def test_the_engine_of_a_pi_has_the_fence_of_its_options():
     engine = create_engine(1, None, FlightOptions(fence=FENCE))
     assert engine.fence.why_not((31.0, 0.0, 0.0)) == "outside fence yard"
+
+
+HALL = Zone("hall", (((-10, -10), (9, -10), (9, 10), (-10, 10)),))
+WALL = Zone("wall", (((9, -9), (10, -9), (10, 9), (9, 9)),))
+DITCH = Zone("ditch", (((8, -40), (9, -40), (9, 40), (8, 40)),))
+
+
+@pytest.mark.parametrize(
+    ("fence", "state", "words"),
+    [
+        (Fence.of([HALL], []), OrderState.GIVEN_UP, "outside fence hall; "),
+        (Fence.of([YARD], [DITCH]), OrderState.GIVEN_UP, "its way passes fence ditch; "),
+        (Fence.of([], [WALL]), OrderState.ARRIVED, ""),  # round it
+        (Fence(), OrderState.ARRIVED, ""),
+    ],
+)
+@pytest.mark.parametrize("flown_s", [0.1, 2.0])
+def test_a_fence_that_changes_ends_an_order_by_name_or_its_flight_leads_round(
+    fence, state, words, flown_s
+):
+    network = fenced(((0.0, 0.0), (4.0, 0.0)), Fence(), max_distance_m=30.0)
+    network.order(1, 12.0, 0.0)
+    network.run_for(flown_s)
+    network.set_fence(fence)
+    places = []
+    for _ in range(400):
+        network.run_for(0.1)
+        places.append(network.location(1).to_vector())
+    (order,) = network.nodes[0].component.get_orders()
+    assert (order.state, order.reason[: len(words)]) == (state, words)
+    assert not any(map(fence.why_not, places))
+    if state is OrderState.GIVEN_UP:
+        assert places[0] == places[-1]  # it stayed
+        network.set_fence(Fence())
+        network.order(1, 12.0, 0.0)
+        network.run_for(30.0)
+        assert network.location(1) == Location(0.0, 12.0, 0.0)
+
+
+def test_a_drone_that_a_new_fence_leaves_outside_is_told_at_once():
+    network = fenced(((0.0, 0.0), (4.0, 0.0)), Fence(), positions=PositionErrors(sigma_m=0.01))
+    network.set_fence(Fence.of([], [Zone.circle("pond", (4.0, 0.0), 2.0, inside=False)]))
+    why = "inside fence pond, which drones stay out of"
+    told = [one for one in network.events if one.kind is MeshEventKind.OUTSIDE_FENCE]
+    assert [(one.node, one.detail) for one in told] == [(1, why)]
+    assert [(one.node, one.text) for one in find_trouble(network.status().nodes)] == [(1, why)]
+    with pytest.raises(GoalRefused, match="pond"):
+        network.order(1, 5.0, 0.0)
+    network.order(1, 8.0, 0.0)
+    network.run_for(30.0)
+    assert network.location(1) == Location(0.0, 8.0, 0.0)
+    assert find_trouble(network.status().nodes) == []

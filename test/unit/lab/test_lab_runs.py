@@ -17,7 +17,7 @@ from drone_mesh.lab.places import draw_places
 from drone_mesh.lab.plan import Plan
 from drone_mesh.lab.record import RunRecord
 from drone_mesh.lab.scenario import Layout, Scenario, Streams
-from drone_mesh.lab.scenario_network import success
+from drone_mesh.lab.scenario_network import obstacles_of, success
 from drone_mesh.lab.simulation import Simulation
 from drone_mesh.state.model import MeshStatus
 
@@ -491,8 +491,7 @@ def test_drones_and_repairs_keep_out_of_the_boxes() -> None:
     for repetition in range(4):
         simulation = Simulation(Scenario.model_validate(content), Streams(1, repetition))
         record = simulation.run()
-        assert simulation._planner is not None
-        free = simulation._planner.obstacles.is_free
+        free = obstacles_of(simulation.scenario).is_free
         for leg in record.legs:
             flown += 1
             for share in range(51):

@@ -42,6 +42,10 @@ class Flight:
         self._was_flying = False  # as its engine says
         self._unanswered = 0
 
+    def begin_anew(self, start: Location, now_s: float) -> None:
+        """It goes another way from here, or will not set out."""
+        self._start, self._last, self._ordered_s = start, None, now_s
+
     def is_over(
         self, location: Location | None, is_flying: bool | None, can_fly: bool, now_s: float
     ) -> bool:
@@ -139,6 +143,15 @@ class Pilot:
         except GoalRefused as error:  # the flight ends as soon as the drone stands still
             flight.may_begin = False
             self._complaints.add("goal refused", str(error), self._deadlines.now_s)
+
+    def on_fence(self) -> None:
+        """The fence has changed: a flight goes another way, or ends where the drone is."""
+        flight, here, now_s = self._flight, self.place(), self._deadlines.now_s
+        if flight is not None and here is not None:
+            ends = here.to_vector(), flight.goal.to_vector()
+            why_not = self._engine.fences().why_not(ends[1])
+            flight.begin_anew(here, now_s)
+            flight.may_begin = not why_not and self._engine.plan(*ends, now_s) is not None
 
     def _begin(self, goal: Location) -> Flight:
         here = self.location()

@@ -47,6 +47,7 @@ class MeshEventKind(enum.Enum):
     # Of an order, too
     ORDER_REPLACED = "order replaced"
     ORDER_LOST_CONTACT = "order lost contact"
+    OUTSIDE_FENCE = "outside the fence"  # of the drone; detail: which area, and on which side
 
 
 class MeshEvent(NamedTuple):

@@ -122,6 +122,7 @@ class MeshnetworkComponent(NodeSnapshots, IMeshNetwork, IControlHost):
         )
         self._engine = engine
         self._pilot = Pilot(node_id, engine, deadlines, complaints)
+        self.outside_fence = ""  # why the drone may not be where it is; empty: it may
         node = ControlledNode(
             node_id=node_id,
             host=self,
@@ -292,6 +293,12 @@ class MeshnetworkComponent(NodeSnapshots, IMeshNetwork, IControlHost):
         else:
             self._antenna_is_off()
 
+    def on_fence(self, now_s: float) -> None:
+        """The fence of its engine has changed."""
+        self._deadlines.now_s = now_s
+        self._pilot.on_fence()
+        self._look_at_fence()
+
     def _look_at_fence(self) -> None:
         """Say so if the drone is outside; it may then only fly inside."""
         fence = self._engine.fences()
@@ -299,6 +306,9 @@ class MeshnetworkComponent(NodeSnapshots, IMeshNetwork, IControlHost):
         why_not = "" if here is None else fence.why_not(here.to_vector())
         if why_not:
             self.complaints.add("the drone is where it may not be", why_not, self._deadlines.now_s)
+            if not self.outside_fence:
+                self._report(MeshEventKind.OUTSIDE_FENCE, detail=why_not)
+        self.outside_fence = why_not
 
     @receives(MessageType.SEAL_CHALLENGE)
     def _on_seal_challenge(self, payload: bytes, creator: int, _from: int) -> None:

@@ -204,7 +204,10 @@ class OrderIntake:
             if off_m <= ARRIVED_WITHIN_M:
                 self._reply(order, OrderOutcome.ARRIVED)
                 continue
-            why = engine.why_ended() or engine.why_not_fly() or pilot.flight_end
+            why = engine.why_ended() or engine.why_not_fly()
+            if not why and here is not None:
+                why = engine.fences().why_not_straight([here.to_vector(), order.goal.to_vector()])
+            why = why or pilot.flight_end
             where = "its place is not known" if here is None else f"{off_m:.1f} m from the goal"
             self._reply(order, OrderOutcome.GIVEN_UP, f"{why}; {where}")
 

@@ -56,6 +56,7 @@ class ConnectionRepair(RepairActions):
             self._places,
             self._options,
             lambda place: not self.why_not_there(place),
+            self._engine.plan,
         )
         again_s = self.medium.policy.ask_sealed_s if self._has_key else ASK_AGAIN_S
         self._ask_again_s = self.medium.stretched(again_s)

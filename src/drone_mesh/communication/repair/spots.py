@@ -14,7 +14,7 @@ from drone_mesh.communication.control.places import KnownPlaces
 from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.repair.options import LostPlace, RepairOptions
 from drone_mesh.communication.timing import Deadlines
-from drone_mesh.drone.flight_path import FlightPath
+from drone_mesh.drone.flight_path import FlightPath, Vector
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused
@@ -240,6 +240,7 @@ class TakenPlaces:
     _places: KnownPlaces
     _options: RepairOptions
     allows: Allows = everywhere
+    plan: Callable[[Vector, Vector, float], FlightPath | None] = FlightPath  # IDroneEngine.plan
 
     def all(self) -> list[Location]:
         """Where each other node was last heard, and the gateway's place."""
@@ -272,8 +273,9 @@ class TakenPlaces:
         )
 
     def way(self, start: Location, end: Location) -> FlightPath:
-        """How a drone that sets out now flies: up, across and down."""
-        return FlightPath(start.to_vector(), end.to_vector(), self._deadlines.now_s)
+        """How the drone flies if it sets out now; straight if it would not."""
+        ends_s = start.to_vector(), end.to_vector(), self._deadlines.now_s
+        return self.plan(*ends_s) or FlightPath(*ends_s)
 
     def aside(self, here: Location, end: Location) -> Location:
         """A free place from where no other is in the way to `end`, nor on the way there, or `end`.

@@ -4,6 +4,7 @@ import { Alarms } from "./alarms.js";
 import { Charts } from "./charts.js";
 import { Connection } from "./connection.js";
 import { chartsCsv, chartsPicture, nodesCsv, nodesPicture, placesYaml, save } from "./files.js";
+import { Fences } from "./fences.js";
 import { Fleet } from "./fleet.js";
 import { assigned, Formations } from "./formations.js";
 import { Groups } from "./groups.js";
@@ -103,6 +104,14 @@ const panel = new NodePanel(
 const fleet = new Fleet(mesh, map, order);
 const missions = new Missions(mesh, map, order);
 const formations = new Formations(mesh, map, (moves, what) => flights.hold(moves, what));
+const fences = new Fences(mesh, map, order);
+const forms = { add: fleet, mission: missions, "group-formation": formations, fence: fences };
+for (const [button, own] of Object.entries(forms))
+  byId(button).addEventListener(
+    "click",
+    () => Object.values(forms).forEach((form) => form === own || form.close()),
+    true, // first: one form at a time has the clicks on the map
+  );
 new Groups(mesh, () => table.shown, toast);
 
 function lasso(on) {
@@ -207,7 +216,7 @@ mesh.addEventListener("layouts", () => {
   const offers = (action) => mesh.actions.includes(action);
   byId("pause").hidden = byId("speed").parentElement.hidden = !offers("speed");
   byId("power").hidden = !offers("power");
-  for (const action of ["demonstrate", "add", "remove", "mission"])
+  for (const action of ["demonstrate", "add", "remove", "mission", "fence"])
     byId(action).hidden = !offers(action);
 });
 
@@ -286,6 +295,7 @@ function flyAlong(name, ways, speed, notes) {
     return toast(`${mission}. Missions cannot be flown from here`, true);
   toast(mission, false);
   fleet.close();
+  fences.close();
   missions.open(ways[0], speed, notes);
 }
 
@@ -508,8 +518,8 @@ const KEYS = {
   p: () => mesh.canOrder && panel.switchPower(),
   g: () => panel.focusGoal(),
   f: () => map.fit(),
-  a: () => missions.close() || fleet.open(),
-  m: () => fleet.close() || missions.open(),
+  a: () => missions.close() || fences.close() || fleet.open(),
+  m: () => fleet.close() || fences.close() || missions.open(),
   l: () => lasso(!map.lasso),
   Delete: () => fleet.remove(),
   z: () => undo(),
@@ -519,6 +529,7 @@ const KEYS = {
     fleet.close() ||
     missions.close() ||
     formations.close() ||
+    fences.close() ||
     flights.undo() ||
     (map.lasso && !lasso(false)) ||
     mesh.select(null),

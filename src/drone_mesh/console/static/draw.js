@@ -330,7 +330,7 @@ function drawObstacle(context, camera, box, colours) {
 }
 
 /** An area of the fence; its name and heights stand at the highest of its corners that are in view, below `top`, px. */
-function drawArea(context, camera, { name, inside, low, high, rings }, colours, top) {
+export function drawArea(context, camera, { name, inside, low, high, rings }, colours, top) {
   context.beginPath();
   let at = null;
   for (const ring of rings) {

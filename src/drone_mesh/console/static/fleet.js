@@ -42,7 +42,7 @@ export class Fleet {
   close() {
     const adding = this.adding;
     if (adding && this.form.contains(document.activeElement)) byId("add").focus();
-    this.#setOpen(false);
+    if (adding) this.#setOpen(false); // otherwise another form may have the clicks on the map
     return adding;
   }
 

@@ -38,6 +38,7 @@ const SENTENCES = {
   "order given up": ["bad", "PEERS gave up an order|orders of NODE"],
   "order replaced": ["", "PEERS has|have a later order of NODE"],
   "order lost contact": ["bad", "PEERS is|are out of contact during an order|orders of NODE"],
+  "outside the fence": ["bad", "NODE is|are where the fence does not allow it"],
   "took off": ["flight", "NODE took off"],
   "cannot fly": ["bad", "NODE cannot fly"],
   "can fly again": ["good", "NODE can fly again"],

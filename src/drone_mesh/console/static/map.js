@@ -3,6 +3,7 @@
 import { Camera } from "./camera.js";
 import { batteryOf } from "./mesh.js";
 import {
+  drawArea,
   drawLasso,
   drawMark,
   drawMesh,
@@ -58,6 +59,7 @@ export class MapView {
     this.shownMoves = []; // [{id, x, y}] of a formation that is planned
     this.lasso = null; // the corners [x, y], px, while the user draws it; []: before the first
     this.mission = [];
+    this.area = null; // of which `mission` has the corners
     this.options = { known: true, ranges: false, trails: false };
     this.colours = readColours();
     this.drag = null;
@@ -133,9 +135,10 @@ export class MapView {
     this.redraw();
   }
 
-  /** Shows the waypoints [x, y] of a mission that is being drawn. */
-  showMission(waypoints) {
+  /** Shows the waypoints [x, y] of a mission that is being drawn, or the corners of an area to stay `inside` or out of. */
+  showMission(waypoints, inside = null) {
     this.mission = waypoints;
+    this.area = inside === null ? null : { name: "", inside, low: null, high: null };
     this.redraw();
   }
 
@@ -241,6 +244,8 @@ export class MapView {
     const options = { ...this.options, top: this.#covered(), cast: this.stage.cast };
     const drawn = drawMesh(context, this.camera, this.mesh, this.colours, options, this.#goals());
     this.radius = drawn.radius;
+    if (this.area && this.mission.length > 2)
+      drawArea(context, this.camera, { ...this.area, rings: [this.mission] }, this.colours, 0);
     drawMission(context, this.camera, this.mission, this.colours);
     if (this.lasso?.length) drawLasso(context, this.lasso, this.colours);
     for (const mark of this.marks) drawMark(context, mark, this.colours);

@@ -9,14 +9,16 @@ from typing import Callable, TypeVar
 
 import rospkg
 import rospy
+from std_msgs.msg import String
 
 from drone_mesh.air.obstacle_file import read_obstacles
 from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.configuration import FactoryConfiguration, load_configuration
+from drone_mesh.drone.fence import Fence
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError, naming_argument
-from drone_mesh.fence_file import read_fence
+from drone_mesh.fence_file import areas_json, fence_in, rows_of_file
 from drone_mesh.formations.layouts import Layouts
 from drone_mesh.formations.missions import Mission, read_missions
 from drone_mesh.ros.graph import names
@@ -52,13 +54,30 @@ def configured_obstacles(configuration: FactoryConfiguration) -> Obstacles | Non
     boxes = _read_named_file(
         "obstacles", configuration.obstacles, lambda path: read_obstacles(path, blocks)
     )
-    fence = _read_named_file(
-        "fence", configuration.fence, lambda path: read_fence(path, earth_origin(""))
-    )
-    if fence is None:
+    fence = fence_in(fence_areas(configuration))
+    if not fence:
         return boxes
     cruise_m = configuration.cruise_height
     return replace(boxes or Obstacles(()), fence=fence, cruise_m=cruise_m)
+
+
+def fence_areas(configuration: FactoryConfiguration) -> str:
+    """The areas of the fence as JSON: those of the configuration, or what they were changed to.
+
+    Raises ConfigurationError.
+    """
+    changed = str(rospy.get_param(names.FENCE_PARAM, ""))
+    read = _read_named_file(
+        "fence",
+        "" if changed else configuration.fence,
+        lambda path: rows_of_file(path, earth_origin("")),
+    )
+    return changed or areas_json(read or ())
+
+
+def told_fence(told: String) -> Fence | None:
+    """The fence that the drone manager tells; None: it tells what held in an earlier world."""
+    return fence_in(told.data) if told.data == rospy.get_param(names.FENCE_PARAM, "") else None
 
 
 def configured_missions(configuration: FactoryConfiguration) -> dict[int, Mission]:

@@ -11,7 +11,7 @@ from typing import Any, Callable
 import rospy
 
 from drone_mesh.air.obstacles import Obstacles, no_path
-from drone_mesh.drone.flight_path import SPEED_M_S, Vector
+from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath, Vector
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused, LocationUnknown
@@ -116,9 +116,9 @@ class RosDroneEngineConnector(IDroneEngine):
         The engine decides, but the topic of its goals has no reply, so goals that it
         would refuse are refused here as well.
         """
-        self._obstacles = obstacles
+        self._obstacles: Obstacles | None = None
         if obstacles is not None:
-            self.fence = obstacles.fence
+            self.keep_to(obstacles)
         self._node_id = node_id
         self._why_not_fly = why_not_fly
         self._gps = PersistentService(names.gps_service(node_id), RequestGPS)
@@ -132,6 +132,16 @@ class RosDroneEngineConnector(IDroneEngine):
             queue_size=10,
             latch=True,
         )
+
+    def keep_to(self, obstacles: Obstacles) -> None:
+        """Refuse goals that these boxes and this fence make unreachable."""
+        self._obstacles, self.fence = obstacles, obstacles.fence
+
+    def plan(self, start: Vector, goal: Vector, now_s: float) -> FlightPath | None:
+        """Round the fence, if there is one."""
+        if self._obstacles is None or not self.fence:
+            return super().plan(start, goal, now_s)
+        return self._obstacles.plan_flight(start, goal, now_s, SPEED_M_S)
 
     def connect(self) -> None:
         """Connect before the first request, so that the number of connections stays constant."""

@@ -5,8 +5,11 @@ from __future__ import annotations
 import functools
 import logging
 import time
+from dataclasses import replace
 from typing import Callable, Mapping
 
+from drone_mesh.air.obstacles import Obstacles
+from drone_mesh.drone.fence import Fence
 from drone_mesh.drone.roles import Role
 from drone_mesh.errors import MeshError
 from drone_mesh.execution import ExecutorSlot, MeshExecutor
@@ -122,6 +125,13 @@ class MeshHost:
                 _log.info("ended node %d", node_id)
 
         self.executor.submit(end)  # runs after the start of this node
+
+    def keep_to(self, fence: Fence) -> None:
+        """Let all nodes, and those that start later, know this fence from now on."""
+        obstacles = replace(self._settings.obstacles or Obstacles(()), fence=fence)
+        self._settings = replace(self._settings, obstacles=obstacles)
+        for node in list(self.nodes.values()):
+            node.slot.submit(functools.partial(node.keep_to, obstacles))
 
     def stop(self) -> None:
         """Stop all threads; returns when they have ended. Nodes not started yet never start."""

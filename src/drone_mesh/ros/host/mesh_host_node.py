@@ -9,6 +9,7 @@ from typing import Callable, Collection
 
 import rospy
 from rosgraph_msgs.msg import Clock
+from std_msgs.msg import String
 
 from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.arguments import is_whole
@@ -28,7 +29,7 @@ from drone_mesh.ros.graph.fleet_parameter import (
 from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
 from drone_mesh.ros.graph.master import NO_ANSWER, MasterWatch
 from drone_mesh.ros.graph.orderly_stop import OrderlyStop
-from drone_mesh.ros.graph.parameters import configured_obstacles, or_exit
+from drone_mesh.ros.graph.parameters import configured_obstacles, or_exit, told_fence
 from drone_mesh.ros.graph.simulation import PresentDrones, Run, run_headers, run_of
 from drone_mesh.ros.graph.waiting import comes_true
 from drone_mesh.ros.host.engines import ReportedPlaces
@@ -198,6 +199,13 @@ def main() -> None:
         )
         places = ReportedPlaces()
         host = MeshHost(settings, lambda: clock.now_s, stop.fail, places.place_of)
+
+        def keep_to(told: String) -> None:
+            fence = told_fence(told)
+            if fence is not None:
+                host.keep_to(fence)
+
+        rospy.Subscriber(names.FENCE_TOPIC, String, keep_to)
         # The world waits for declared hosts only.
         rospy.set_param(names.host_param(rospy.get_name()), [ids.start, ids.stop - 1])
         MasterWatch(names.host_param(rospy.get_name())).start()

@@ -123,6 +123,11 @@ class VirtualRaspberryPi(abc.ABC):
         self.component.start(now_s)
         self.slot.drive(self.component)
 
+    def keep_to(self, obstacles: Obstacles, now_s: float) -> None:
+        """These boxes and this fence hold from now on."""
+        self.engine.keep_to(obstacles)
+        self.component.on_fence(now_s)
+
     def stop(self, _now_s: float) -> None:
         """Switch off."""
         self._users_of_node.stop()

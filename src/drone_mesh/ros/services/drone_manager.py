@@ -28,6 +28,7 @@ from drone_mesh.ros.graph.orderly_stop import OrderlyStop
 from drone_mesh.ros.graph.parameters import manager_layouts, or_exit
 from drone_mesh.ros.graph.simulation import PresentDrones
 from drone_mesh.ros.graph.waiting import comes_true
+from drone_mesh.ros.services.fence_service import FenceService
 from drone_mesh.ros.services.order_answers import OrderAnswers, Outcomes
 from drone_mesh.ros.services.order_summary import OrderSummary
 from drone_mesh.ros.services.standing_layouts import LayoutStart, StandingLayouts, flight_rules
@@ -51,12 +52,14 @@ class DroneManager:
                 /DroneManager/orderFlight (OrderFlight), /DroneManager/orderLayout (OrderLayout),
                 /DroneManager/orderFormation (OrderFormation), /DroneManager/previewLayout
                 (PreviewLayout), /DroneManager/withdrawLayout (WithdrawLayout)
-    Standing orders: see StandingLayouts
+    Standing orders: see StandingLayouts; the fence: see FenceService
     """
 
     # The handlers may run in parallel: the layouts never change, StandingLayouts has its own lock.
 
-    def __init__(self, layouts: Layouts, on_other_run: Callable[[], None]) -> None:
+    def __init__(
+        self, layouts: Layouts, on_other_run: Callable[[], None], watch: MasterWatch
+    ) -> None:
         """`on_other_run` is called, by a thread of rospy, when the world was replaced."""
         self._layouts = layouts
         self._gateways, self._sharing = (
@@ -71,6 +74,7 @@ class DroneManager:
             self._order_case,
             on_other_run,
         )
+        FenceService(watch)
         for name in (names.REQUEST_MOVEMENT_SERVICE, names.SHORT_REQUEST_MOVEMENT_SERVICE):
             rospy.Service(name, srv.RequestDroneFlight, self._request_movement)
         for name in (names.SET_TO_CASUS_SERVICE, names.SHORT_SET_TO_CASUS_SERVICE):
@@ -327,8 +331,9 @@ def main() -> None:
         start_node(DroneManager.__doc__, "DroneManager", disable_signals=True)
         show_library_logs_on_rosout()
         layouts = or_exit(lambda: manager_layouts("~casus"))
-        DroneManager(layouts, stop.begin_anew)
+        watch = MasterWatch()
+        DroneManager(layouts, stop.begin_anew, watch)
         file = rospy.get_param("~casus", "") or "config/casus.yaml of this package"
         _log.info("%d layouts: built-in ones, and those of %s", len(layouts.cases), file)
-        MasterWatch().start()
+        watch.start()
         stop.wait()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import logging
 from typing import Protocol, Sequence
 
@@ -9,6 +10,7 @@ import rospy
 
 from drone_mesh import srv
 from drone_mesh.console.controls import MeshControls, OrderRefused
+from drone_mesh.drone.flight_path import Point
 from drone_mesh.drone.location import Location as Place
 from drone_mesh.formations.layouts import Order
 from drone_mesh.formations.missions import Mission
@@ -80,6 +82,16 @@ class RosControls(MeshControls):
 
     def remove(self, node: int) -> str:
         return _done(_call(names.REMOVE_DRONE_SERVICE, srv.RemoveDrone, id=node))
+
+    def fence(
+        self, name: str, corners: Sequence[Point], inside: bool, max_height: float | None
+    ) -> str:
+        area = {"name": name, "inclusion": inside, "polygon": corners, "max_height": max_height}
+        text = json.dumps({"areas": [area]}, ensure_ascii=False) if corners else ""
+        gone = [] if corners else [name]
+        return _call(
+            names.SET_FENCE_SERVICE, srv.SetFence, areas=text, keep=True, remove=gone
+        ).message
 
     def mission(self, nodes: Sequence[int], mission: Mission) -> str:
         request = mission_request(mission)

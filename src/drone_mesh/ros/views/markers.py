@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Dict, Sequence, Tuple
+from typing import Any, Collection, Dict, Sequence, Tuple
 
 from geometry_msgs.msg import Point
 from std_msgs.msg import ColorRGBA
@@ -124,7 +124,7 @@ class MarkerMaker:
                 if marker:
                     marker.mesh_resource = mesh
                     marker.pose.position = _point(positions[node.id])
-        self._delete_gone(("frames", "lamps"), nodes)
+        self._delete_gone(("frames", "lamps"), [node.id for node in nodes])
 
     def _add_rotors(
         self, nodes: Sequence[NodeStatus], positions: _Positions, time_s: float
@@ -162,7 +162,9 @@ class MarkerMaker:
             self._add_lines(f"fence: stay {side}", lines, colour, FENCE_WIDTH_M)
         for number, area in enumerate(areas):
             place = (*area.corners[:2], max(_heights_m(area)))
-            self._add_text("fence names", number, [place], area.name, LABEL_M, LABEL_M)
+            content = [place, area.name]
+            self._add_text("fence names", number, content, area.name, LABEL_M, LABEL_M)
+        self._delete_gone(("fence names",), range(len(areas)))
 
     def _add_lines(
         self, name: str, lines: Sequence[_Line], colour: Colour, width_m: float, opacity: float = 1
@@ -175,13 +177,13 @@ class MarkerMaker:
         for node in nodes:
             up = TIMES_LARGER * Role(node.role).size_m[2] + 1.2 * LABEL_M
             self._add_text("ids", node.id, [positions[node.id]], str(node.id), LABEL_M, up)
-        self._delete_gone(("ids",), nodes)
+        self._delete_gone(("ids",), [node.id for node in nodes])
 
     def _add_text(
         self,
         name: str,
         number: int,
-        content: Sequence[_Place],
+        content: Sequence[Any],
         text: str,
         height_m: float,
         up: float = 0.0,
@@ -201,8 +203,7 @@ class MarkerMaker:
                 swatch.pose.position = _point(row.place)
             self._add_text("legend", number, [row.text_place], row.text, row.height_m)
 
-    def _delete_gone(self, names: Sequence[str], nodes: Sequence[NodeStatus]) -> None:
-        present = {node.id for node in nodes}
+    def _delete_gone(self, names: Sequence[str], present: Collection[int]) -> None:
         for name, number in list(self._shown):
             if name in names and number not in present:
                 self._changed(name, number, [])

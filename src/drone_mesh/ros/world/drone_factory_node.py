@@ -80,6 +80,8 @@ class FactoryParameters:
             configuration.gridsize,
             configuration.spacing,
         )
+        if rospy.has_param(names.FENCE_PARAM):  # of a world that has ended
+            rospy.delete_param(names.FENCE_PARAM)
         obstacles = configured_obstacles(configuration)
         if configuration.obstacles and configuration.cruise_height < MAX_HEIGHT_M:
             raise ConfigurationError(
@@ -241,12 +243,13 @@ class RosSimulation:
             repair_strategy=str(configuration.node.repair),
             obstacles=describe_obstacles(obstacles.boxes if obstacles else ()),
             shape=configuration.shape,
-            fence=describe_fence(obstacles.fence) if obstacles else (),
         )
 
         def read() -> WorldView:
             now_s, factor = self._world.now_s, runner.wanted_factor
-            now = replace(settings, stamp_s=now_s, real_time_factor=factor, paused=runner.paused)
+            fence = describe_fence(self._factory.fence)
+            now = replace(settings, stamp_s=now_s, real_time_factor=factor, fence=fence)
+            now = replace(now, paused=runner.paused)
             return now, drone_views(self._factory.drones, now_s)
 
         return read

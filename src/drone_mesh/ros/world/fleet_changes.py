@@ -9,12 +9,15 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Mapping
 
 import rospy
+from std_msgs.msg import String
 
 from drone_mesh import srv
+from drone_mesh.drone.fence import Fence
 from drone_mesh.drone.roles import Role
 from drone_mesh.errors import FleetRefused
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.master import MasterWatch
+from drone_mesh.ros.graph.parameters import told_fence
 from drone_mesh.ros.graph.simulation import PresentDrones
 from drone_mesh.ros.graph.waiting import comes_true
 from drone_mesh.ros.host.emulated_radios import EmulatedRadios
@@ -33,6 +36,7 @@ _log = logging.getLogger(__name__)
 class FleetChanges:
     """Services: /DroneFactory/addDrone (AddDrone), /DroneFactory/removeDrone (RemoveDrone).
 
+    Subscribes: /DroneManager/fence (String), which all drones keep from then on
     Sets /drone_mesh/drones, from which other processes learn of each change.
 
     One thread makes all changes in sequence; the first request starts it. Threads of rospy wait for
@@ -65,11 +69,13 @@ class FleetChanges:
             rospy.Service(names.ADD_DRONE_SERVICE, srv.AddDrone, self._add_requested),
             rospy.Service(names.REMOVE_DRONE_SERVICE, srv.RemoveDrone, self._remove_requested),
         )
+        self._fence = rospy.Subscriber(names.FENCE_TOPIC, String, self._fence_told)
 
     def stop(self) -> None:
         """Withdraw the services; returns when the thread has ended."""
         for service in self._services:
             service.shutdown()
+        self._fence.unregister()
         self._worker.shutdown()
 
     # Threads of rospy ------------------------------------------------------------------------
@@ -85,6 +91,9 @@ class FleetChanges:
             return self._worker.submit(self._remove, request.id).result()
         except FleetRefused as error:
             return srv.RemoveDroneResponse(success=False, message=str(error))
+
+    def _fence_told(self, told: String) -> None:
+        self._worker.submit(self._keep_to, told_fence(told))
 
     # The thread of the changes ---------------------------------------------------------------
 
@@ -131,6 +140,14 @@ class FleetChanges:
         message = f"removed {drone.role.word} {node_id}"
         _log.info("%s", message)
         return srv.RemoveDroneResponse(success=True, message=message)
+
+    def _keep_to(self, fence: Fence | None) -> None:
+        if fence is None:
+            return
+        self._runner.between_steps(functools.partial(self._factory.keep_to, fence))
+        if self._host is not None:
+            self._host.keep_to(fence)
+        _log.info("fence: %s", fence.names or "none")
 
     def _least_busy_host(self) -> str:
         """The host with the fewest added drones; empty: there is none."""

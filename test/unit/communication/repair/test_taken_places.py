@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import pytest
 
+from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.communication.control.places import KnownPlaces
 from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.repair.options import RepairOptions
 from drone_mesh.communication.repair.spots import Landing, TakenPlaces
 from drone_mesh.communication.timing import UNDISTURBED, Deadlines
+from drone_mesh.drone.fence import Fence, Zone
 from drone_mesh.drone.location import Location
 
 
@@ -53,3 +55,21 @@ def test_a_way_aside_and_a_spot_beside_are_on_the_side_that_the_fence_allows(sid
     assert allows(aside)
     gone = Location(latitude=-side * 0.2, longitude=15.0, height=0.0)
     assert allows(taken.at_or_beside(gone, Landing(here)))
+
+
+def test_a_way_that_leads_round_a_fence_is_judged_where_it_leads():
+    pond = Zone("pond", (((8.0, -9.0), (12.0, -9.0), (12.0, 3.0), (8.0, 3.0)),))
+    plan = Obstacles((), fence=Fence.of([], [pond])).plan_flight
+    here, end = Location(0.0, 0.0, 0.0), Location(0.0, 20.0, 0.0)
+    for beside, is_clear in (((0.0, 10.0, 10.0), True), ((3.5, 10.0, 10.0), False)):
+        neighbours = Neighbours(UNDISTURBED, 30.0, 9.0)
+        neighbours.set_place(7, Location(*beside), 0.0)
+        taken = TakenPlaces(
+            1,
+            Deadlines(),
+            neighbours,
+            KnownPlaces(),
+            RepairOptions(clearance_m=1.0, range_m=30.0),
+            plan=lambda start, goal, now_s: plan(start, goal, now_s, 2.0),
+        )
+        assert taken.is_clear(taken.way(here, end)) is is_clear

@@ -1,0 +1,77 @@
+"""A fence that changes while drones of the world fly, kinematic and with physics."""
+
+from __future__ import annotations
+
+import pytest
+
+from drone_mesh.air.obstacles import Box, Obstacles
+from drone_mesh.communication.events.observer import MeshEventKind
+from drone_mesh.drone.fence import Fence, Zone
+from drone_mesh.drone.fleet import StartPlace
+from drone_mesh.drone.roles import Role
+from drone_mesh.errors import FleetRefused, GoalRefused
+from drone_mesh.formations.missions import Mission
+from drone_mesh.world.bullet_world import BulletWorld
+from drone_mesh.world.factory import DroneFactory
+
+PLACE = StartPlace(0, Role.ROUTER, 0.0, 0.0)
+HALL = Zone("hall", (((-9, -9), (9, -9), (9, 9), (-9, 9)),))
+WALL = Zone("wall", (((6, -9), (7, -9), (7, 9), (6, 9)),))
+
+
+@pytest.fixture(params=[None, (0.0, 0.0, 0.0)], ids=["kinematic", "dynamic"])
+def factory(request):
+    with BulletWorld() as world:
+        boxes = Obstacles([Box((0.0, 30.0, 1.0), (2.0, 2.0, 2.0))])
+        factory = DroneFactory(world, [PLACE], request.param, boxes)
+        factory.world, factory.noted = world, []
+        factory.drones[0].engine.observe(lambda *event: factory.noted.append(event))
+        yield factory
+
+
+def fly(factory, seconds):
+    """The drone's places."""
+    places = []
+    for _ in range(round(seconds * 100)):
+        factory.world.step()
+        places.append(factory.drones[0].engine.get_location().to_vector())
+    return places
+
+
+@pytest.mark.parametrize(
+    ("fence", "end", "words"),
+    [
+        (Fence.of([HALL], []), None, "outside fence hall"),
+        (Fence.of([], [WALL]), (12.0, 0.0), ""),
+        (Fence(), (12.0, 0.0), ""),
+    ],
+)
+def test_a_flight_ends_where_it_is_or_leads_round(factory, fence, end, words):
+    engine = factory.drones[0].engine
+    engine.set_goal(0.0, 12.0, 0.0)
+    before = fly(factory, 1.5)[-1]
+    factory.keep_to(fence)
+    places = fly(factory, 40.0)
+    assert not any(map(fence.why_not, places))
+    assert places[-1][:2] == pytest.approx(end or before[:2], abs=0.5)
+    assert [words in detail for _kind, _now_s, detail in factory.noted] == [True] * bool(words)
+    assert engine.state.path is None
+    if words:
+        with pytest.raises(GoalRefused, match=words):
+            engine.set_goal(0.0, 12.0, 0.0)
+        with pytest.raises(FleetRefused, match="obstacle"):
+            factory.add(Role.ROUTER, 20.0, 20.0)
+    factory.keep_to(Fence())
+    engine.set_goal(0.0, 14.0, 0.0)
+    assert fly(factory, 40.0)[-1][:2] == pytest.approx((14.0, 0.0), abs=0.2)
+
+
+def test_a_pilot_pauses_at_the_fence(factory):
+    engine = factory.drones[0].engine
+    engine.fly_with(Mission([(0.0, 0.0, 2.0), (12.0, 0.0, 2.0)], 1.0, False).pilot())
+    fly(factory, 4.0)
+    factory.keep_to(Fence.of([HALL], []))
+    assert max(x for x, _y, _z in fly(factory, 30.0)) == pytest.approx(9.0, abs=0.3)
+    ((kind, _now_s, detail),) = factory.noted
+    assert (kind, detail) == (MeshEventKind.GOAL_REFUSED, "its pilot pauses: outside fence hall")
+    assert engine.pilot.paused
