@@ -15,6 +15,7 @@ class ServerGoalHandle:
 class ActionServer:
     status_list: list[Any]
     started: bool
+    lock: Any  # a threading.RLock
     goal_sub: rospy.Subscriber
     cancel_sub: rospy.Subscriber
     status_pub: rospy.Publisher
