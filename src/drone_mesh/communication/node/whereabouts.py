@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Container, NamedTuple
+from typing import NamedTuple
 
 from drone_mesh.communication.control.control_plane import IControlPlane
 from drone_mesh.communication.control.node_part import receives
@@ -64,11 +64,7 @@ class Whereabouts:
 
     @receives(MessageType.REQUESTLOCATION)
     def on_request(self, payload: bytes, creator: int, from_: int) -> None:
-        """Answer with this node's place, and where others were heard last.
-
-        A drone in flight is told who may be near its goal. A node that asks this one alone may step
-        back to it one day: it is told who is silent beside it.
-        """
+        """Answer with this node's place; to a drone in flight also with those of silent ones."""
         asker = messages.place_of_asker(payload)
         if asker is None or creator == self._node_id or self._frame.refuses(from_):
             self._answer(creator)
@@ -80,11 +76,8 @@ class Whereabouts:
         self._control.neighbours.set_place(creator, place, now_s, flies_there)
         self._is_taken(place)
         self._answer(creator)
-        here = self._pilot.place()
         if flies_there:
             self._tell_last_places(creator, place)
-        elif here is not None and messages.addressee(payload) == self._node_id:
-            self._tell_last_places(creator, here, self._control.neighbours.ids())
 
     def _is_taken(self, place: Location) -> None:
         """A node that asks for places is at `place` or flies there."""
@@ -105,12 +98,12 @@ class Whereabouts:
                 answer = extension.appended_to(answer)
         self._control.delivery.send_own(answer)
 
-    def _tell_last_places(self, asker: int, goal: Location, but: Container[int] = ()) -> None:
-        """Tell a node which others, `but` these, were last heard near a goal."""
+    def _tell_last_places(self, asker: int, goal: Location) -> None:
+        """Tell a drone in flight which nodes were last heard near its goal."""
         near = sorted(
             (heard.place.distance_m(goal), node, heard)
             for node, heard in self._control.neighbours.taken()
-            if node not in (asker, self._node_id) and node not in but
+            if node not in (asker, self._node_id)
         )
         for away_m, node, heard in near[:MOST_TOLD]:
             if away_m < NEAR_CLEARANCES * self._clearance_m:

@@ -1458,29 +1458,6 @@ def test_only_a_drone_in_flight_hears_who_was_last_heard_near_its_goal(flies, to
     assert rig.sent(LAST_PLACE) == told
 
 
-@pytest.mark.parametrize(
-    ("asked", "knows", "told"),
-    [
-        ("01", "", [packet("01 01 45 03 03 3c 00 05 00 00 00 40")]),
-        ("01", "05 05 03 01 fe 00 01", []),
-        ("fe", "", []),
-    ],
-    ids=["5 is silent", "5 is a neighbour", "a question to all"],
-)
-def test_who_asks_this_router_alone_hears_who_is_silent_beside_it(asked, knows, told):
-    """It may step back to the place of this router one day."""
-    rig = Rig()
-    rig.know_neighbour(3)
-    rig.hear("05 03 02 01 01 00 00 00 40 00 00 00 00 01 00")  # 5 asks, from latitude 2
-    rig.hear("06 03 02 01 01 00 00 80 40 00 00 00 00 01 00")  # 6 asks, from latitude 4
-    rig.wait(60.0)
-    if knows:
-        rig.hear(knows)
-    rig.forget()
-    rig.hear(f"03 03 02 01 {asked} 00 00 e0 40 00 00 00 00 01 00")  # 3 asks, from latitude 7
-    assert rig.sent(LAST_PLACE) == told
-
-
 class Impatient(Thesis):
     """Notes when it is asked for its patience."""
 

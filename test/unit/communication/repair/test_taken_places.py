@@ -28,16 +28,6 @@ def test_a_spot_that_is_clear_of_a_rounded_place_is_clear_of_the_drone_itself():
     assert taken.is_free(Location(latitude=-0.1, longitude=0.0, height=0.0))
 
 
-def test_a_spot_beside_one_drone_is_clear_of_the_rounded_place_of_another():
-    neighbours = Neighbours(UNDISTURBED, 10.0, 9.0)
-    gone, told = Location(0.0, 0.0, 0.0), Location(latitude=0.0, longitude=2.1, height=0.0)
-    neighbours.set_place(7, gone, 0.0)
-    neighbours.set_place(8, told, 0.0)  # of a drone at 2.05
-    taken = TakenPlaces(1, Deadlines(), neighbours, KnownPlaces(), RepairOptions(clearance_m=1.0))
-    spot = taken.at_or_beside(gone, Landing(Location(latitude=0.0, longitude=5.0, height=0.0)))
-    assert spot.distance_m(told._replace(longitude=2.05)) >= 1.0
-
-
 @pytest.mark.parametrize("side", [1, -1])
 def test_a_way_aside_and_a_spot_beside_are_on_the_side_that_the_fence_allows(side):
     neighbours = Neighbours(UNDISTURBED, 30.0, 9.0)
