@@ -10,6 +10,10 @@ class Bool(Message):
     data: bool
     def __init__(self, data: bool = ...) -> None: ...
 
+class String(Message):
+    data: str
+    def __init__(self, data: str = ...) -> None: ...
+
 class Float32(Message):
     data: float
     def __init__(self, data: float = ...) -> None: ...

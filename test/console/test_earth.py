@@ -7,12 +7,11 @@ from pathlib import Path
 
 import pytest
 from conftest import Visit
-from test_page import PLACES
+from test_page import PLACES, X, Y
 
 from drone_mesh.drone.geodesy import EarthPlace, Origin
 from drone_mesh.drone.location import Location
 
-X, Y = 9, 10  # columns of the table
 AT = "52.0907,5.1214,3"
 ORIGIN = Origin.parse(AT)
 
