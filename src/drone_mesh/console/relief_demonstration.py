@@ -15,7 +15,9 @@ from drone_mesh.console.demonstration import Casting, Demonstration, free_places
 from drone_mesh.console.put_back import FAST, FleetBefore, Script, rounded
 from drone_mesh.drone.battery import LAND_AT_PERCENT, READY_PERCENT
 from drone_mesh.drone.roles import Role
-from drone_mesh.formations.relief import BESIDE_M, CARRIES_S, IN_AIR_M
+from drone_mesh.formations.posts import BESIDE_M
+from drone_mesh.formations.relief import CARRIES_S
+from drone_mesh.formations.reserves import IN_AIR_M
 from drone_mesh.state.model import MeshStatus, NodeStatus, position_is_known
 from drone_mesh.state.repair_story import and_
 

@@ -74,25 +74,27 @@ class SpareFirst(IReliefPolicy):
 
 
 class NamedBackup(IReliefPolicy):
-    """Each spare is the backup of some drones, named beforehand, and relieves only these.
+    """Each spare is the backup of some drones, and relieves only these.
 
-    After PADRA (Akkaya et al. 2010), which names a backup for each drone that the mesh needs.
+    After PADRA (Akkaya et al. 2010), which names a backup for each drone that the mesh needs. Named
+    are they when the first one is needed: before, all stand on the ground.
     """
 
     def __init__(self) -> None:
         self._group: dict[int, int] = {}  # drone -> the first spare of its group
 
     def choose(self, view: ReliefView) -> Pair | None:
-        if not self._group and view.spares:
-            self._group = {spare: spare for spare in view.spares}
-            for count, drone in enumerate(sorted(view.left_s)):
+        late = [old for old, left_s in view.left_s.items() if left_s <= 0.0]
+        if late and view.spares:
+            for spare in view.spares:
+                self._group.setdefault(spare, spare)
+            for count, drone in enumerate(sorted(view.left_s.keys() - self._group.keys())):
                 self._group[drone] = view.spares[count % len(view.spares)]
-        for old, left_s in view.left_s.items():
-            if left_s <= 0.0:
-                backups = [d for d in view.ready if self._group.get(d) == self._group.get(old)]
-                pair = view.with_one_of(old, backups)
-                if pair:
-                    return pair
+        for old in late:
+            backups = [d for d in view.ready if self._group.get(d) == self._group.get(old)]
+            pair = view.with_one_of(old, backups)
+            if pair:
+                return pair
         return None
 
 

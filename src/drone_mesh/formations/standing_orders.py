@@ -187,7 +187,7 @@ class StandingOrders:
         with self._lock:
             order = self._orders.get(number)
             parts = order.parts.values() if order else ()
-            return bool(order) and all(part.state is not PartState.REPLACED for part in parts)
+            return bool(parts) and all(part.state is not PartState.REPLACED for part in parts)
 
     def is_bound(self, drone: int, at: Location, now_s: float) -> bool:
         """Whether an order may still move this drone, which stands there."""
@@ -209,7 +209,12 @@ class StandingOrders:
     def withdraw(self, number: int) -> StandingProgress | None:
         """Order no drone of this layout any more; returns its progress, None if it is unknown."""
         order = self._orders.pop(number, None)
-        return None if order is None else order.progress()
+        if order is None:
+            return None
+        progress = order.progress()
+        for part in order.parts.values():
+            part.replace()  # for an `update` that plans now
+        return progress
 
     def end(self, number: int) -> None:
         """Like withdraw, but its last progress, which is over, is still shown to who watches it."""
@@ -241,9 +246,55 @@ class StandingOrders:
         mesh: MeshStatus,
         rules: FlightRules = FlightRules(),  # noqa: B008 (immutable)
     ) -> list[tuple[int, Location]]:
-        """Compare the goals with the state of the mesh; returns the orders to give now."""
+        """Compare the goals with the state of the mesh; returns the orders to give now.
+
+        One thread at a time may call it: it plans without the lock, which others need meanwhile.
+        """
+        with self._lock:
+            again, together, due = self._to_order(mesh, rules)
+            goals = self.goals(mesh)
+            sent = {
+                drone: part.sent_to.as_ordered()
+                for order in self._orders.values()
+                for drone, part in order.parts.items()
+                if part.state.is_open and part.sent_to is not None
+            }
+            latest = self._orders[max(self._orders)].parts if self._orders else {}
+            first = {drone for drone, part in latest.items() if part.is_followed}
+        wanted = {drone: part.sent_to or part.goal for drone, part in again.items()}
+        refused: dict[int, str] = {}
+        if together or due:
+            departures = Departures(mesh, goals, sent, rules, first)
+            taken = {drone: departures.taken_by(drone) for drone in together}
+            wanted.update(
+                {drone: part.goal for drone, part in together.items() if not taken[drone]}
+            )
+            back = {drone for drone, part in due.items() if part.arrived}
+            cut_off = {drone: CUT_OFF for drone in back if not departures.is_in_reach(drone)}
+            choice = departures.choose(due.keys() - cut_off.keys())
+            wanted.update(choice.set_out)
+            refused = {**taken, **cut_off, **choice.blocked}
+        with self._lock:
+            parts = {
+                n: part for n, part in {**again, **together, **due}.items() if part.is_followed
+            }
+            for drone, reason in refused.items():
+                if reason and drone in parts:
+                    parts[drone].stay(PartState.REFUSED, reason)
+            wanted = {drone: to for drone, to in wanted.items() if drone in parts}
+            for drone, to in wanted.items():
+                if parts[drone].state is PartState.REFUSED:
+                    parts[drone].state = PartState.LATER
+                parts[drone].send(to, mesh.stamp_s)
+                self._sent[drone] = to, mesh.stamp_s
+        return list(wanted.items())
+
+    def _to_order(
+        self, mesh: MeshStatus, rules: FlightRules
+    ) -> tuple[dict[int, _Part], dict[int, _Part], dict[int, _Part]]:
+        """The drones that must be ordered: as before, all together, and in turn."""
         nodes = {node.id: node for node in mesh.nodes}
-        wanted: dict[int, Location] = {}
+        again: dict[int, _Part] = {}
         together: dict[int, _Part] = {}
         due: dict[int, _Part] = {}
         for order in self._orders.values():
@@ -254,44 +305,12 @@ class StandingOrders:
                 why_not = rules.fence.why_not(part.goal.to_vector()) if rules.fence else ""
                 if why_not and part.state.is_open:  # until the fence changes again
                     part.stay(PartState.REFUSED, why_not)
-                    continue
-                if self._follow(part, nodes.get(drone), order.at_once, mesh.stamp_s):
+                elif self._follow(part, nodes.get(drone), order.at_once, mesh.stamp_s):
                     if part.sent_to is not None:
-                        wanted[drone] = part.sent_to
-                        part.send(part.sent_to, mesh.stamp_s)
+                        again[drone] = part
                     else:
                         (together if order.at_once else due)[drone] = part
-        if together or due:
-            departures = self._departures(mesh, rules)
-            taken = {drone: departures.taken_by(drone) for drone in together}
-            free = {drone: part.goal for drone, part in together.items() if not taken[drone]}
-            back = {drone for drone, part in due.items() if part.arrived}
-            cut_off = {drone: CUT_OFF for drone in back if not departures.is_in_reach(drone)}
-            choice = departures.choose(due.keys() - cut_off.keys())
-            together.update(due)
-            for drone, reason in [*taken.items(), *cut_off.items(), *choice.blocked.items()]:
-                if reason:
-                    together[drone].stay(PartState.REFUSED, reason)
-            for drone, to in [*free.items(), *choice.set_out.items()]:
-                if together[drone].state is PartState.REFUSED:
-                    together[drone].state = PartState.LATER
-                together[drone].send(to, mesh.stamp_s)
-                wanted[drone] = to
-        self._sent.update({drone: (to, mesh.stamp_s) for drone, to in wanted.items()})
-        return list(wanted.items())
-
-    def _departures(self, mesh: MeshStatus, rules: FlightRules) -> Departures:
-        sent = {
-            drone: part.sent_to.as_ordered()
-            for order in self._orders.values()
-            for drone, part in order.parts.items()
-            if part.state.is_open and part.sent_to is not None
-        }
-        first = {d for d, part in self._latest().items() if part.is_followed}
-        return Departures(mesh, self.goals(mesh), sent, rules, first)
-
-    def _latest(self) -> Mapping[int, _Part]:
-        return self._orders[max(self._orders)].parts
+        return again, together, due
 
     def goals(self, mesh: MeshStatus) -> dict[int, Location]:
         """The places that drones still have to reach, or have reached and keep."""
@@ -364,7 +383,8 @@ class StandingOrders:
                 "goals": {
                     str(drone): list(part.goal)
                     for drone, part in order.parts.items()
-                    if part.state.is_open or order.relieves is not None
+                    if part.state.is_open
+                    or (part.state is PartState.ARRIVED and order.relieves is not None)
                 },
             }
             for order in self._orders.values()

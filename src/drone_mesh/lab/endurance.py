@@ -22,8 +22,10 @@ from drone_mesh.drone.fleet import MAX_DRONES
 from drone_mesh.drone.flight_path import SPEED_M_S
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError, GoalRefused
-from drone_mesh.formations.relief import BESIDE_M, CARRIES_S, MARGIN_PERCENT, Relief, ReliefRules
+from drone_mesh.formations.posts import BESIDE_M
+from drone_mesh.formations.relief import CARRIES_S, Relief, ReliefRules
 from drone_mesh.formations.relief_policies import relief_policy
+from drone_mesh.formations.reserves import MARGIN_PERCENT
 from drone_mesh.formations.standing_orders import StandingOrders
 from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.node import event_records

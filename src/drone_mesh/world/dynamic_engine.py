@@ -294,15 +294,17 @@ class DynamicEngine(DroneEngine):
 
     def _come_down(self, position: Vector) -> None:
         """With its last fifth: to its pad if there are crews, else to the ground below."""
-        here = Location.from_vector(position)
-        ground, path = here._replace(height=self._half_height_m), None
-        if self._crews is not None:
-            path = self._plan(position, self._home.to_vector(), self._world.now_s)
-        self._note(MeshEventKind.BATTERY_LOW, "it lands" if path is None else "it goes home")
-        self._hover = None
-        self._route = Route(here, ground, here.height, lands=False, speed_m_s=SPEED_M_S)
-        if path is not None:
-            self._route = self._route_of(path, here, self._home)
+        now_s, path, does = self._world.now_s, self._state.path, "it goes home"
+        if self._crews is None:
+            path = None
+        elif self._route is None or self._route.end.distance_m(self._home) > AT_HOME_M:
+            path = self._plan(position, self._home.to_vector(), now_s)
+        if path is None:
+            ground: Vector = (position[0], position[1], self._half_height_m)
+            path, does = FlightPath(position, ground, now_s, ceiling_m=position[2]), "it lands"
+        self._note(MeshEventKind.BATTERY_LOW, does)
+        if path is not self._state.path:
+            self._fly_anew(path, position, now_s)
 
     def _ask_for_battery(self, position: Vector, now_s: float) -> None:
         if self._crews is None:

@@ -6,10 +6,13 @@ import json
 
 import pytest
 
+from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.configuration import FactoryConfiguration
+from drone_mesh.drone.fence import Fence, Zone
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
 from drone_mesh.errors import ConfigurationError
+from drone_mesh.formations.departures import FlightRules
 from drone_mesh.formations.relief import Relief, ReliefRules
 from drone_mesh.formations.relief_policies import POLICIES, ReliefView, relief_policy
 from drone_mesh.formations.standing_orders import StandingOrders
@@ -61,6 +64,13 @@ def test_the_rotation_sends_the_fullest_neighbour_that_the_mesh_does_not_need():
     assert relief_policy("rotate").choose(view(left_s, places=places)) is None
 
 
+def test_backups_are_named_when_the_first_is_needed_and_not_while_all_stand_on_the_ground():
+    policy = relief_policy("named_backup")
+    assert policy.choose(view({}, [1, 2, 7])) is None
+    assert policy.choose(view({1: 0.0, 2: 5.0}, [7])) == (1, 7)
+    assert policy.choose(view({3: 0.0}, [7])) == (3, 7)  # it was sent up later
+
+
 def test_the_policies_have_the_same_names_everywhere():
     for name in POLICIES:
         assert Endurance(relief=name).relief == FactoryConfiguration(seed=1, relief=name).relief
@@ -76,6 +86,7 @@ class Mesh:
         self.holder = NodeStatus(1, connected=True, position=POST.to_vector(), battery=100.0)
         self.spare = NodeStatus(2, connected=True, position=HOME.to_vector(), battery=100.0)
         self.relief = Relief(relief_policy("spare_first"), ReliefRules(), {1: OTHER, 2: HOME})
+        self.others, self.rules = [], FlightRules()
 
     def hover(self, node, percent):
         """Until its battery has so much left."""
@@ -87,11 +98,15 @@ class Mesh:
         sent = {}
         for _ in range(seconds):
             gateway = NodeStatus(0, Role.GATEWAY, connected=True, position=(0.0, 0.0, 4.0))
-            mesh = MeshStatus(self.now_s, [gateway, self.holder, self.spare])
-            self.relief.update(mesh, self.orders)
+            mesh = MeshStatus(self.now_s, [gateway, self.holder, self.spare, *self.others])
+            self.relief.update(mesh, self.orders, self.rules)
             sent.update(dict(self.orders.update(mesh)))
             self.now_s += 1.0
         return sent
+
+    def posts(self):
+        """Their places, by holder."""
+        return {post["holder"]: post["places"] for post in self.relief.saved()["posts"]}
 
 
 def test_the_old_drone_leaves_when_the_new_one_beside_it_has_been_connected_for_a_while():
@@ -222,7 +237,7 @@ def test_a_restart_amid_a_relief_makes_no_second_post():
     assert mesh.sent(6) == {1: OTHER}
     mesh.holder.position, mesh.holder.battery = OTHER.to_vector(), 100.0
     assert mesh.sent(5) == {}
-    assert [holder for holder, _post in mesh.relief.saved()["posts"]] == [2]
+    assert list(mesh.posts()) == [2]
 
 
 @pytest.mark.parametrize("before", [True, False])
@@ -244,7 +259,7 @@ def test_a_drone_that_a_user_sends_elsewhere_takes_its_post_along_and_its_relief
     fly(mesh, mesh.spare, place)
     sent = fly(mesh, mesh.holder, AWAY)
     assert (sent.get(1), sent[2]) == (None, HOME)
-    posts = dict(mesh.relief.saved()["posts"])
+    posts = mesh.posts()
     assert posts[1][0] == AWAY
     assert 2 not in posts
 
@@ -254,7 +269,7 @@ def test_a_drone_that_fails_while_its_relief_comes_is_left_alone_and_its_post_is
     mesh.holder.position, mesh.holder.crashed = (0.0, 6.0, 0.0), True
     assert fly(mesh, mesh.spare, place) == {}
     assert mesh.sent(10) == {}
-    assert [holder for holder, _post in mesh.relief.saved()["posts"]] == [2]
+    assert list(mesh.posts()) == [2]
 
 
 def test_a_drone_that_has_another_order_is_no_spare():
@@ -273,4 +288,110 @@ def test_a_drone_that_is_sent_elsewhere_on_its_way_home_holds_a_post_there():
     mesh.holder.battery = 60.0
     mesh.orders.ordered(1, AWAY, mesh.now_s)
     fly(mesh, mesh.holder, AWAY)
-    assert {holder for holder, _post in mesh.relief.saved()["posts"]} == {1, 2}
+    assert mesh.posts().keys() == {1, 2}
+
+
+def test_a_post_that_is_far_away_is_relieved_too():
+    mesh = Mesh()
+    mesh.holder.position = (0.0, 300.0, 4.0)
+    mesh.sent()
+    mesh.hover(mesh.holder, 50.0)
+    ((_drone, place),) = mesh.sent().items()
+    mesh.spare.position, mesh.spare.path = (0.0, 8.0, 4.0), place.to_vector()
+    assert mesh.sent(140) == {}  # it flies for 148 s
+    mesh.spare.position, mesh.spare.path = place.to_vector(), ()
+    assert mesh.sent(7) == {1: OTHER}
+
+
+def test_nobody_is_sent_to_a_post_whose_drone_flies_elsewhere():
+    mesh = Mesh()
+    mesh.sent()
+    mesh.holder.path, mesh.holder.battery = AWAY.to_vector(), 25.0
+    mesh.sent(20)
+    assert mesh.orders.all_progress() == []
+
+
+def test_a_battery_that_recovers_by_a_percent_is_used_as_fast_as_before():
+    mesh = Mesh()
+    mesh.spare.battery = 50.0
+    mesh.sent()
+    for percent in (80.0, 60.0, 50.0):
+        mesh.holder.battery = percent
+        mesh.now_s += 10.0
+        mesh.sent()
+    mesh.holder.battery, mesh.spare.battery = 51.0, 100.0  # the usual pace leaves 348 s, this 20
+    assert list(mesh.sent()) == [2]
+
+
+def fence(west):
+    """To the west of this no drone may be."""
+    zone = Zone("yard", (((-50.0, -50.0), (west, -50.0), (west, 50.0), (-50.0, 50.0)),))
+    keep = Fence.of([], [zone])
+    return FlightRules(Obstacles((), fence=keep).plan_flight, fence=keep)
+
+
+@pytest.mark.parametrize("later", [True, False])
+def test_the_place_beside_is_within_the_fence_that_there_is_or_comes(later):
+    mesh = Mesh()
+    mesh.holder.position = (6.0, 0.0, 4.0)
+    mesh.relief = Relief(relief_policy("spare_first"))  # its home is beyond the fence
+    if later:
+        mesh.sent()
+        (before,) = mesh.posts().values()
+        assert before[1].longitude < 5.8
+    mesh.rules = fence(5.8)
+    mesh.sent()
+    (places,) = mesh.posts().values()
+    assert places[1].longitude > 5.8
+
+
+def test_a_neighbour_without_a_known_home_relieves_nobody():
+    mesh = Mesh()
+    mesh.relief = Relief(relief_policy("rotate"), homes={1: OTHER})
+    mesh.spare.position = (4.0, 4.0, 4.0)
+    mesh.sent()
+    mesh.hover(mesh.holder, 23.0)
+    assert mesh.sent() == {}
+
+
+def test_a_place_is_taken_by_a_drone_that_flies_there_and_has_fallen_silent():
+    mesh, place = relief_on_its_way()
+    mesh.spare.on = False
+    mesh.others = [NodeStatus(3, connected=True, position=(0.0, 12.0, 0.0), battery=100.0)]
+    mesh.sent(20)
+    assert {"3"} & {drone for order in mesh.orders.saved() for drone in order["goals"]} == set()
+
+
+def test_a_relief_reaches_a_post_between_whole_metres_of_height():
+    mesh = Mesh()
+    mesh.holder.position = (0.0, 6.0, 4.5)
+    mesh.sent()
+    mesh.hover(mesh.holder, 26.0)
+    ((_drone, place),) = mesh.sent().items()
+    mesh.spare.position = place.as_ordered()._replace(height=4.03).to_vector()  # orders say 4 m
+    assert mesh.sent(7) == {1: OTHER}
+
+
+@pytest.mark.parametrize(
+    ("was_connected", "neighbour_m", "is_replaced"),
+    [(True, 5.0, True), (False, 5.0, False), (True, 20.0, False)],
+)
+def test_a_drone_that_is_on_but_mute_is_replaced_and_goes_home_when_it_is_heard_again(
+    was_connected, neighbour_m, is_replaced
+):
+    """Not one that nobody could hear, nor one that was never heard there."""
+    mesh = Mesh()
+    mesh.holder.position = (0.0, -14.0, 4.0)
+    neighbour = (0.0, -14.0 + neighbour_m, 0.0)
+    mesh.others = [NodeStatus(3, connected=True, position=neighbour, battery=50.0)]
+    mesh.holder.connected = was_connected
+    mesh.sent(2)
+    mesh.holder.connected = False
+    assert mesh.sent(10) == {}
+    sent = mesh.sent(2)
+    assert list(sent) == [2] * is_replaced
+    if is_replaced:
+        mesh.spare.position = sent[2].to_vector()
+        assert mesh.sent(7) == {}
+        mesh.holder.connected = True
+        assert mesh.sent(2) == {1: OTHER}

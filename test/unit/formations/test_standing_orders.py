@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import struct
+import threading
 
 import pytest
 
 from drone_mesh.drone.fence import Fence, Zone
 from drone_mesh.drone.fleet import ids_in_words
+from drone_mesh.drone.flight_path import FlightPath
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
 from drone_mesh.formations.departures import FlightRules
@@ -287,3 +290,40 @@ def test_no_drone_is_sent_to_the_place_of_one_that_stays_there():
     assert orders.update(state(1.0, drone(4), drone(5), *there)) == []
     refused = "0 of 1 at their place, {} refused: drone {} is in the way"
     assert words(orders) == [refused.format(4, 6), refused.format(5, 7)]
+
+
+@pytest.mark.parametrize("change", ["ordered elsewhere", "withdrawn"])
+def test_while_it_plans_others_may_change_the_orders_and_what_they_did_counts(change):
+    lock = threading.RLock()
+    orders = StandingOrders(lock)
+    number = orders.give("layout 7", {4: EAST, 5: NORTH}, now_s=0.0)
+    planned = []
+
+    def other_thread():
+        with lock:
+            if change == "withdrawn":
+                orders.withdraw(number)
+            else:
+                orders.ordered(4, HOME, now_s=1.0)
+
+    def plan(*args):
+        if not planned:
+            other = threading.Thread(target=other_thread, daemon=True)
+            other.start()
+            other.join(5.0)
+            planned.append(other.is_alive())
+        return FlightPath(*args)
+
+    wanted = orders.update(state(1.0, gateway(), drone(4), drone(5, at=NORTH)), FlightRules(plan))
+    assert planned == [False]
+    assert 4 not in dict(wanted)
+
+
+def test_a_relief_that_a_user_ended_before_a_restart_is_not_taken_up_again():
+    orders = StandingOrders()
+    number = orders.give("relief", {4: EAST}, now_s=0.0, relieves=5)
+    orders.ordered(4, NORTH, now_s=1.0)
+    restarted = StandingOrders()
+    restarted.restore(json.loads(json.dumps(orders.saved())))
+    assert restarted.update(state(2.0, drone(4, at=NORTH))) == []
+    assert not restarted.stands(number)

@@ -152,6 +152,30 @@ def test_a_drone_that_runs_low_flies_home_where_there_are_crews_and_flies_again(
     assert engine.get_location().height > 1.9
 
 
+@pytest.mark.parametrize("home_at_s", [44.0, 90.0])
+def test_its_last_flight_home_is_seen_and_not_begun_anew_on_the_way(world, home_at_s):
+    engine = drone(world, limits=BodyLimits(power=PowerModel(hover_s=60.0)), crews=Crews(90.0))
+    engine.set_goal(0.0, 6.0, 4)
+    flights, heights = [], {}
+
+    def note(state):
+        heights[state.now_s] = state.position[2]
+        if state.path and state.path not in flights:
+            flights.append(state.path)
+
+    engine.add_listener(note)
+    run(world, min(home_at_s, 50.0))  # it runs low after 48 s
+    if home_at_s < 48.0:
+        engine.set_goal(0.0, 0.0, 0)
+        run(world, 3.8)
+    high_m = engine.get_location().height
+    run(world, 30.0)
+    assert [path.goal for path in flights] == [(6.0, 0.0, 4.0 + HALF_M), (0.0, 0.0, HALF_M)]
+    assert engine.get_location().height < 0.05
+    if home_at_s < 48.0:
+        assert max(heights[now_s] for now_s in heights if now_s > 47.8) < high_m + 0.5
+
+
 @pytest.mark.parametrize(
     "go",
     [

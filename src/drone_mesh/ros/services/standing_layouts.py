@@ -81,8 +81,8 @@ class StandingLayouts:
     Action:     /DroneManager/layout (Layout)
     Parameter:  /DroneManager/standing, what is left to order, for the next start
 
-    `_lock` guards the orders and the actions; nothing is published or stored while it is held, and
-    no relief is looked for: the relief belongs to the thread of the states.
+    `_lock` guards the orders and the actions; nothing is published, stored or planned while it is
+    held. Who plans holds `_planning`; the relief belongs to the thread of the states.
     One thread publishes and stores, in the order in which it was told under the lock: what was
     said last is what a latched topic keeps. It ends with the process.
     """
@@ -103,6 +103,7 @@ class StandingLayouts:
         self._begin = begin
         self._on_other_run = on_other_run
         self._lock = threading.RLock()
+        self._planning = threading.Lock()
         self._orders = StandingOrders(self._lock)
         self._reporter = ThreadPoolExecutor(max_workers=1, thread_name_prefix="standing layouts")
         self._relief: Relief | None = None  # made as soon as there is a fleet
@@ -147,13 +148,17 @@ class StandingLayouts:
             number = self._orders.give(name, dict(orders), rospy.get_time(), at_once)
             if handle is not None:
                 self._handles[number] = handle
-            first = orders
-            if self._mesh is not None:
-                first = [Order(*one) for one in self._orders.update(self._mesh, rules)]
             (progress,) = [p for p in self._orders.all_progress() if p.number == number]
-            start = LayoutStart(progress, first, self._mesh is not None)
+        mesh = self._mesh
+        first = orders if mesh is None else self._plan(mesh, rules)
+        with self._lock:
+            now = [p for p in self._orders.all_progress() if p.number == number]
         self._show()
-        return start
+        return LayoutStart(now[0] if now else progress, first, mesh is not None)
+
+    def _plan(self, mesh: MeshStatus, rules: FlightRules) -> list[Order]:
+        with self._planning:
+            return [Order(*one) for one in self._orders.update(mesh, rules)]
 
     def preview(self, orders: Sequence[Order], at_once: bool) -> FormationPreview | None:
         """Preview an order to these drones; None: the state of the mesh is unknown."""
@@ -206,10 +211,8 @@ class StandingLayouts:
         if relief and relief.is_active:
             relief.update(mesh, self._orders, rules)
             self._relief_left = relief.saved()
-        with self._lock:
-            self._mesh = mesh
-            wanted = [Order(*one) for one in self._orders.update(mesh, rules)]
-        self._order(wanted)
+        self._mesh = mesh
+        self._order(self._plan(mesh, rules))
         self._show()
 
     def _goal_came(self, handle: actionlib.ServerGoalHandle) -> None:
@@ -319,8 +322,11 @@ def relief_of_fleet(left: Mapping[str, Any] | None) -> Relief | None:
         return None
     rules = ReliefRules(fleet.swap_time, fleet.swaps_at_once, 60.0 * fleet.hover_minutes)
     relief = Relief(relief_policy(fleet.relief), rules)
-    if left is not None:
-        relief.restore(left)
+    try:
+        if left is not None:
+            relief.restore(left)
+    except (KeyError, TypeError, ValueError) as error:
+        _log.warning("the reliefs in parameter %s are ignored: %s", names.STANDING_PARAM, error)
     return relief
 
 
