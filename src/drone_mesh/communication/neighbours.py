@@ -182,8 +182,11 @@ class Neighbours:
                 self._out_of_reach.add(node)
 
     def out_of_reach(self) -> frozenset[int]:
-        """Former neighbours that live, but no longer have a link to this node where it stands."""
-        return frozenset(self._out_of_reach)
+        """Former neighbours that live, but no longer have a link to this node where it stands.
+
+        While it hears none, nobody tells it who died: all that fell silent.
+        """
+        return frozenset(self._out_of_reach if self._heard_s else self._fell_silent_s)
 
     def heard_s(self) -> dict[int, float]:
         """A copy: for each neighbour the time of its last packet, in seconds."""

@@ -25,6 +25,12 @@ def test_one_that_others_know_long_after_is_out_of_reach(neighbours):
     assert neighbours.out_of_reach() == {3}
 
 
+def test_a_node_that_hears_none_takes_all_that_fell_silent_for_out_of_reach(neighbours):
+    assert neighbours.out_of_reach() == set()
+    neighbours.lost(2, 150.0)
+    assert neighbours.out_of_reach() == {2, 3}
+
+
 def test_one_that_others_still_name_at_first_may_be_dead(neighbours):
     neighbours.note_known_elsewhere((3,), 159.0)
     assert neighbours.out_of_reach() == set()

@@ -67,6 +67,17 @@ def test_a_goal_that_was_replaced_in_flight_was_never_reached():
     assert approaches(record(places, *legs), 1.0) == []
 
 
+def test_one_that_turns_in_the_air_does_not_rest_there():
+    """1 passes 2 just when that turns."""
+    turned = FlightPath((5, 5, 0), (5, -5, 0), 0.0).position_at(2.5)
+    legs = (
+        flight(1, (0, 0, 0), (10, 0, 0)),
+        flight(2, (5, 5, 0), (5, -5, 0), replaced_s=2.5),
+        flight(2, turned, (5, 5, 0), start_s=2.5),
+    )
+    assert close_ones(record({1: (0, 0, 0), 2: (5, 5, 0)}, *legs)) == (0, 1)
+
+
 def test_an_ordered_flight_is_no_repair():
     places = {1: (0, 0, 0), 2: (10, 0, 0)}
     assert approaches(record(places, flight(1, (0, 0, 0), (10, 0, 0)), kind=ORDERED), 1.0) == []

@@ -297,6 +297,8 @@ class BeaconPlane(IControlPlane):
         self._choose()
         if creator == routes.parent:
             self._show()
+        if beacon.parent == self._me:
+            self._host.on_leads(creator)
         if beacon.looks and routes.hops != NO_ROUTE:
             self._trickle.answer(now_s, alone=False)
         if self._courier.holds:

@@ -48,6 +48,9 @@ class IControlHost:
     def on_neighbour_lost(self, node: int) -> None:
         """A neighbour is out of reach; the routes are already updated."""
 
+    def on_leads(self, neighbour: int) -> None:
+        """A neighbour shows that this node is its next hop; only if no question for places does."""
+
     def on_node_heard(self, node: int, hops: int) -> None:
         """At a gateway: a packet of `node` proves a path of so many hops."""
 

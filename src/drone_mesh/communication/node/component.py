@@ -335,6 +335,9 @@ class MeshnetworkComponent(NodeSnapshots, IMeshNetwork, IControlHost):
 
     # For the control plane -------------------------------------------------------------------
 
+    def on_leads(self, neighbour: int) -> None:
+        self._whereabouts.on_leads(neighbour)
+
     def on_node_missing(self, node: int, told: bool) -> None:
         self.data.on_node_missing(node)
 

@@ -64,6 +64,7 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
             control,
             deadlines,
             self._pilot,
+            antenna,
             self.places,
             self._frame,
             self._options.clearance_m,

@@ -63,6 +63,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
             control,
             deadlines,
             pilot,
+            antenna,
             self.places,
             self._frame,
             self._options.clearance_m,

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Container, NamedTuple
 
 from drone_mesh.communication.control.control_plane import IControlPlane
 from drone_mesh.communication.control.node_part import receives
 from drone_mesh.communication.control.pilot import Pilot
 from drone_mesh.communication.control.places import Claims, CommonFrame, KnownPlaces
-from drone_mesh.communication.interfaces import BROADCAST
+from drone_mesh.communication.interfaces import BROADCAST, IWirelessCommunication
 from drone_mesh.communication.repair.connection_repair import ConnectionRepair
 from drone_mesh.communication.timing import Deadlines
 from drone_mesh.communication.wire import messages
@@ -23,6 +23,8 @@ from drone_mesh.drone.location import Location
 
 NEAR_CLEARANCES = 3.0  # a drone that moves aside once is still within that
 MOST_TOLD = 4  # more drones do not stand that near to one place
+TELL_AGAIN_S = 60.0  # a node that was told may have been restarted, or not have heard it
+LOOK_AGAIN_S = 10.0  # beacons come every 2 s
 
 
 @dataclass(eq=False)
@@ -33,10 +35,14 @@ class Whereabouts:
     _control: IControlPlane
     _deadlines: Deadlines
     _pilot: Pilot
+    _antenna: IWirelessCommunication
     _places: KnownPlaces
     _frame: CommonFrame
     _clearance_m: float
     _has_key: bool
+
+    def __post_init__(self) -> None:
+        self._tell_s: dict[int, float] = {}  # when to tell each of those behind this node
 
     @receives(MessageType.LOCATION)
     def on_location(self, payload: bytes, creator: int, from_: int) -> None:
@@ -77,7 +83,28 @@ class Whereabouts:
         self._is_taken(place)
         self._answer(creator)
         if flies_there:
-            self._tell_last_places(creator, place)
+            for packet in self._last_places(place, creator, but=(creator, self._node_id)):
+                self._control.delivery.send_own(packet)
+        elif creator == from_ and messages.addressee(payload) == self._node_id:
+            self.on_leads(creator)
+
+    def on_leads(self, neighbour: int) -> None:
+        """`neighbour` goes on through this node, and may step back to its place one day.
+
+        Who is silent beside that, this node alone may know. It tells all: nobody else asks.
+        While drones move by themselves, those have mostly gone on.
+        """
+        now_s, here = self._deadlines.now_s, self._pilot.place()
+        if here is None or now_s < self._tell_s.get(neighbour, -math.inf):
+            return
+        self._tell_s[neighbour] = now_s + LOOK_AGAIN_S
+        neighbours = self._control.neighbours
+        if neighbours.motion.moved_since(now_s - neighbours.motion.within_s):
+            return
+        near = neighbours.ids()
+        for packet in self._last_places(here, BROADCAST, but={*near, self._node_id}):
+            self._antenna.broadcast_message(packet)
+            self._tell_s = dict.fromkeys(near, now_s + TELL_AGAIN_S)
 
     def _is_taken(self, place: Location) -> None:
         """A node that asks for places is at `place` or flies there."""
@@ -98,17 +125,19 @@ class Whereabouts:
                 answer = extension.appended_to(answer)
         self._control.delivery.send_own(answer)
 
-    def _tell_last_places(self, asker: int, goal: Location) -> None:
-        """Tell a drone in flight which nodes were last heard near its goal."""
+    def _last_places(self, goal: Location, to: int, but: Container[int]) -> list[bytes]:
+        """Packets that tell `to` which nodes, `but` these, were last heard near a goal."""
+        me, now_s = self._node_id, self._deadlines.now_s
         near = sorted(
             (heard.place.distance_m(goal), node, heard)
             for node, heard in self._control.neighbours.taken()
-            if node not in (asker, self._node_id)
+            if node not in but
         )
-        for away_m, node, heard in near[:MOST_TOLD]:
-            if away_m < NEAR_CLEARANCES * self._clearance_m:
-                last = LastPlace(node, heard.place, self._deadlines.now_s - heard.heard_s)
-                self._control.delivery.send_own(last.packet(self._node_id, asker))
+        return [
+            LastPlace(node, heard.place, now_s - heard.heard_s).packet(me, to)
+            for away_m, node, heard in near[:MOST_TOLD]
+            if away_m < NEAR_CLEARANCES * self._clearance_m
+        ]
 
     @receives(MessageType.LAST_PLACE)
     def on_last_place(self, payload: bytes, _creator: int, _from: int) -> None:

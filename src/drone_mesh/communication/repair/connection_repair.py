@@ -337,7 +337,7 @@ class ConnectionRepair(RepairActions):
     def _rivals(self, step: Step) -> list[int]:
         """Drones out of reach that may fly to the same place, because it is within their range."""
         neighbours = self._neighbours
-        others = neighbours.out_of_reach() - {step.owner}
+        others = neighbours.out_of_reach() - {step.owner, self._control.gateway}
         places = {node: neighbours.place_of(node) for node in others}
         return [
             node

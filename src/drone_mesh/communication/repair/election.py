@@ -127,6 +127,9 @@ def highest_plausible(own: Location | None, gateway: Location | None, range_m: f
     return own.distance_m(gateway) + MAX_NODE_ID * range_m
 
 
+MOST_DOUBLINGS = 6  # of the time between two drones that look for a gateway: to half a day
+
+
 class FlightNews:
     """Which drones took off, and where they looked for the gateway."""
 
@@ -172,6 +175,11 @@ class FlightNews:
             return False
         self._failed_s[node] = now_s
         if (node, place) not in self._failures:
+            doublings = min(len(self._failures), MOST_DOUBLINGS)  # the gateway is off, it seems
             self._failures.add((node, place))
-            self.tries(place, now_s, keep_s)
+            self.tries(place, now_s, keep_s * 2**doublings)
         return True
+
+    def in_vain(self) -> frozenset[int]:
+        """The nodes that reported it."""
+        return frozenset(self._failed_s)

@@ -161,7 +161,7 @@ class GroupRepair(LoneRepair):
                         reason = "is where it was connected last, and knows no other place"
                 continue
             occupant = NO_ROUTE if alone else self._occupant(step)
-            if occupant != NO_ROUTE:
+            if occupant != NO_ROUTE and not (step.home and occupant in self._news.in_vain()):
                 reason = f"the place of {step.owner} is occupied by {occupant}"
             elif step.home and not alone and self._news.is_tried(step.place, now_s, near_m):
                 reason = "another drone flew to the gateway without success"
@@ -188,7 +188,12 @@ class GroupRepair(LoneRepair):
         return NO_ROUTE
 
     def _is_second_choice(self, step: Step) -> bool:
-        return step.home and self.mesh.lost_next_hop not in (step.owner, NO_ROUTE)
+        """Those who had a link to the gateway itself look for it first, and the others after them.
+
+        If one of these has looked in vain, its link may have failed, as theirs: then the others.
+        """
+        others = self.mesh.lost_next_hop not in (step.owner, NO_ROUTE)
+        return step.home and others is not bool(self._news.in_vain())
 
     # Election --------------------------------------------------------------------------------
 

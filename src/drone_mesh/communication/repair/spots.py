@@ -61,6 +61,7 @@ BLOCKS = (2, 4, BLOCK)  # each divides the next one
 FLOORS = 4  # BLOCK * BLOCK * FLOORS spots: one for each of the 256 ids
 WITHIN_REACH = 0.9  # of the range: how far behind a node that moved a drone stays
 PITCH = 1.1  # distance of spots in clearances, with a margin for rounding
+ROUNDING_M = 0.09  # a place in a beacon has tenths of a metre, on three axes
 NEAR = 1.5  # in clearances: a drone so near to a place has taken it
 DIRECTIONS = 24  # that are compared for spots, and for ways round others
 
@@ -137,12 +138,17 @@ def _first_clear(
     spots: Sequence[Location], clearance_m: float, occupied: Iterable[Location], allows: Allows
 ) -> Location:
     occupied = list(occupied)
-    free = (
-        spot
-        for spot in spots
-        if allows(spot) and all(spot.distance_m(other) >= clearance_m for other in occupied)
-    )
+    free = (spot for spot in spots if allows(spot) and _is_clear_of(spot, occupied, clearance_m))
     return next(free, spots[0])
+
+
+def _is_clear_of(spot: Location, others: Iterable[Location], clearance_m: float) -> bool:
+    """Whether a drone may rest there; one above the other do so in whole metres."""
+    return all(
+        spot.distance_m(other) >= clearance_m + ROUNDING_M
+        or abs(spot.height - other.height) >= clearance_m
+        for other in others
+    )
 
 
 def free_spot(
@@ -165,7 +171,7 @@ def free_spot(
         if not allows(spot):
             if spot.distance_m(place) > options.range_m:
                 return place
-        elif all(spot.distance_m(other) >= options.clearance_m for other in occupied):
+        elif _is_clear_of(spot, occupied, options.clearance_m):
             if skip == 0:
                 return spot
             skip -= 1
@@ -220,7 +226,6 @@ def _at(place: Location, distance_m: float, bearing: float) -> Location:
     )
 
 
-ROUNDING_M = 0.09  # a place in a beacon has tenths of a metre, on three axes
 TOUCH_M = 1e-3  # of sums
 ASIDE = 3.0  # clearances: half of that is how high it climbs, over drones on the ground
 FRESH_S = 5.0  # with EXACT, a drone that was silent for longer takes no place

@@ -65,7 +65,8 @@ def _way(run: RunRecord, node: int, place: Place) -> Iterator[_Piece]:
     for leg in run.legs:
         if leg.node != node:
             continue
-        yield _Piece(now_s, leg.path.start_s, place, place, False)
+        if now_s < leg.path.start_s:  # it did not only turn in the air
+            yield _Piece(now_s, leg.path.start_s, place, place, False)
         yield from _pieces(leg, _is_repair(run, leg))
         now_s, place = leg.end_s, leg.path.position_at(leg.end_s)
     yield _Piece(now_s, max(now_s, run.end_s), place, place, False)

@@ -8,7 +8,12 @@ from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.communication.control.places import KnownPlaces
 from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.repair.options import RepairOptions
-from drone_mesh.communication.repair.spots import Landing, TakenPlaces
+from drone_mesh.communication.repair.spots import (
+    Landing,
+    TakenPlaces,
+    own_spot,
+    spot_beside_rivals,
+)
 from drone_mesh.communication.timing import UNDISTURBED, Deadlines
 from drone_mesh.drone.fence import Fence, Zone
 from drone_mesh.drone.location import Location
@@ -26,6 +31,22 @@ def test_a_spot_that_is_clear_of_a_rounded_place_is_clear_of_the_drone_itself():
     assert spot.distance_m(told) > 1.0 > 0.96
     assert not taken.is_free(spot)
     assert taken.is_free(Location(latitude=-0.1, longitude=0.0, height=0.0))
+
+
+def test_a_spot_beside_one_drone_is_clear_of_the_rounded_place_of_another():
+    neighbours = Neighbours(UNDISTURBED, 10.0, 9.0)
+    gone, told = Location(0.0, 0.0, 0.0), Location(latitude=0.0, longitude=2.1, height=0.0)
+    neighbours.set_place(7, gone, 0.0)
+    neighbours.set_place(8, told, 0.0)  # of a drone at 2.05
+    options, landing = RepairOptions(clearance_m=1.0), Landing(Location(0.0, 5.0, 0.0))
+    taken = TakenPlaces(1, Deadlines(), neighbours, KnownPlaces(), options)
+    others, east = [gone, told], Location(0.0, 3.0, 0.0)
+    for spot in (
+        taken.at_or_beside(gone, landing),
+        spot_beside_rivals(Location(0.0, 1.2, 0.0), 1, [2], landing, options, others),
+        own_spot(east, 1, 1.0, [*others, Location(0.0, 2.15, 0.0)]),  # its own spot: 1.1
+    ):
+        assert spot.distance_m(told._replace(longitude=2.05)) >= 1.0
 
 
 @pytest.mark.parametrize("side", [1, -1])
