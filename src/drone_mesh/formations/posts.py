@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass
 from typing import Any, Collection, Iterable, Mapping, Sequence
 
 from drone_mesh.drone.flight_path import SPEED_M_S
@@ -38,15 +38,10 @@ class Post:
     holder: int | None = None
     turn: Turn | None = None
     heard_s: float | None = None  # when its holder was connected, if it has ever been, or could not
-    left: list[int] = field(default_factory=list)  # drones that fell silent here
-
-    def saved(self) -> dict[str, Any]:
-        """Plain values that `restored` reads."""
-        return asdict(self)
 
     @classmethod
     def restored(cls, saved: Mapping[str, Any]) -> Post:
-        """What `saved` returned. Raises KeyError, TypeError or ValueError."""
+        """What `asdict` returned. Raises KeyError, TypeError or ValueError."""
         post, turn = cls(**saved), saved["turn"]
         post.places = tuple(Location(*place) for place in post.places)
         post.turn = turn and Turn(**{**turn, "to": Location(*turn["to"])})

@@ -7,6 +7,7 @@ standing orders: Departures lets drones set out one after the other, clear of ea
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any, Mapping, NamedTuple
 
 from drone_mesh.drone.battery import READY_PERCENT, PowerModel
@@ -52,17 +53,21 @@ class Relief:
 
     def __init__(
         self,
-        policy: IReliefPolicy,
+        policy: IReliefPolicy | None,
         rules: ReliefRules = ReliefRules(),  # noqa: B008 (immutable)
         homes: Mapping[int, Location] | None = None,
     ) -> None:
-        """`homes`: where drones stand on their pads; others where they are first seen standing."""
+        """`policy` None: it sends nobody anywhere.
+
+        `homes`: where drones stand on their pads; others where they are first seen standing.
+        """
         self._policy, self._rules = policy, rules
         self._reserves = Reserves(rules.hover_s, homes or {})
         self._posts: list[Post] = []
         self._homing: dict[int, int | None] = {}  # ordered home, by which order
+        self._silent: set[int] = set()  # they fell silent at a post, or on the way to one
         self._fence = Fence()
-        self.is_active = policy.is_active
+        self.is_active = policy is not None
         self.reliefs = 0  # drones that left when another one carried their traffic
 
     def update(
@@ -82,7 +87,8 @@ class Relief:
         nodes = [node for node in known.values() if node.role != Role.GATEWAY]
         for node in nodes:
             self._reserves.look(node, mesh.stamp_s)
-            if not is_in_air(node) or self._is_called_away(node, orders):
+            number, homes = self._homing.get(node.id), self._reserves.homes
+            if not is_in_air(node) or (number and _is_off(node, homes[node.id], number, orders)):
                 self._homing.pop(node.id, None)
         for post in list(self._posts):
             self._watch_holder(post, look)
@@ -102,12 +108,6 @@ class Relief:
 
     # What the drones do ----------------------------------------------------------------------
 
-    def _is_called_away(self, node: NodeStatus, orders: StandingOrders) -> bool:
-        """Whether somebody else has sent it elsewhere on its way home."""
-        number = self._homing.get(node.id)
-        is_over = number is not None and not orders.stands(number)
-        return is_over and not leads_to(node, [self._reserves.homes[node.id]])
-
     def _watch_holder(self, post: Post, look: _Look) -> None:
         """Whether it is still there; who was sent elsewhere takes its post along."""
         if post.holder is None:
@@ -122,7 +122,7 @@ class Relief:
         is_mute = post.heard_s is not None and look.mesh.stamp_s - post.heard_s > SILENT_S
         is_lost = node is None or not node.on or node.crashed or is_mute
         if node is None or is_lost or (is_low(node) and not is_there):
-            post.left.append(post.holder)
+            self._silent.add(post.holder)
             post.holder = post.heard_s = None
         elif not is_there or not is_in_air(node):
             self._call_back(post, look)
@@ -132,29 +132,30 @@ class Relief:
             post.places = self._places_at(node, look)
 
     def _settle(self, node: NodeStatus, look: _Look) -> None:
-        """Who hovers holds a post, there or the one where it was silent, if that is free."""
-        for post in self._posts:
-            if node.id in post.left and not is_in_air(node):
-                post.left.remove(node.id)
+        """Who hovers holds a post; who was silent does if its post is free, or goes home."""
+        is_ours = any(leads_to(node, post.places) for post in self._posts)
+        if not is_in_air(node) or (len(node.path) and not is_ours):
+            self._silent.discard(node.id)
         turns = [post.turn.new for post in self._posts if post.turn is not None]
         if node.id in [*self._homing, *turns, *(post.holder for post in self._posts)]:
             return
         is_able = node.on and not node.crashed and not len(node.heading)
         if not is_able or not is_in_air(node) or len(node.path):
             return
-        at = [post for post in self._posts if is_at(node, *post.places)]
-        left = next((post for post in at if post.holder is None or node.id in post.left), None)
-        if left is None:
+        free = [p for p in self._posts if p.holder is None and is_at(node, *p.places)]
+        if not free and node.id not in self._silent:
             self._posts.append(Post(self._places_at(node, look), node.id))
-        elif left.holder is not None:
-            self._send_home(node.id, look)
         elif node.connected:
-            left.holder = node.id
+            self._silent.discard(node.id)
+            if free:
+                free[0].holder = node.id
+            else:
+                self._send_home(node.id, look)
 
     def _is_in_reach(self, node: NodeStatus, look: _Look) -> bool:
         """Whether somebody who is connected could hear it."""
         here, range_m = place_of(node), look.mesh.max_distance
-        others = [other for other in look.known.values() if other.connected and other is not node]
+        others = [n for n in look.known.values() if n.on and n.connected and n is not node]
         return any(place_of(other).distance_m(here) < range_m for other in others)
 
     def _places_at(self, node: NodeStatus, look: _Look) -> list[Location]:
@@ -213,7 +214,7 @@ class Relief:
             range_m=look.mesh.max_distance,
             can_fly=lambda new, old: new in homes and ways.to(homes[new], held[old]) is not None,
         )
-        pair = self._policy.choose(view)
+        pair = self._policy.choose(view) if self._policy else None
         to = None if pair is None else ways.to(homes[pair.new], held[pair.old])
         if pair is None or to is None:
             return False
@@ -232,8 +233,8 @@ class Relief:
         new, now_s = look.known.get(turn.new), look.mesh.stamp_s
         if new is None or not new.on or new.crashed:
             self._end(post, look)
-            post.left.append(turn.new)
-        elif self._is_off(turn, new, look.orders):
+            self._silent.add(turn.new)
+        elif _is_off(new, turn.to, None if turn.arrived else turn.number, look.orders):
             self._end(post, look)
         elif now_s - turn.begin_s > GIVE_UP_S + self._reserves.flight_s(turn.new, turn.to):
             self._call_back(post, look)
@@ -249,11 +250,6 @@ class Relief:
                 if old is not None:
                     self.reliefs += 1
                     self._send_home(old, look)
-
-    def _is_off(self, turn: Turn, new: NodeStatus, orders: StandingOrders) -> bool:
-        """Whether somebody else has sent the new one elsewhere, or a repair took it there."""
-        is_ours = not turn.arrived and orders.stands(turn.number)
-        return not is_ours and not leads_to(new, [turn.to])
 
     def _end(self, post: Post, look: _Look) -> None:
         if post.turn is not None:
@@ -278,11 +274,20 @@ class Relief:
 
     def saved(self) -> dict[str, Any]:
         """Its posts and reliefs, as plain values that `restore` reads."""
-        posts = [post.saved() for post in self._posts]
-        return {"posts": posts, "homing": list(self._homing.items())}
+        posts, homing = list(map(asdict, self._posts)), list(self._homing.items())
+        return {"posts": posts, "homing": homing, "silent": sorted(self._silent)}
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """Go on with what `saved` returned. Raises KeyError, TypeError or ValueError."""
         posts = [Post.restored(post) for post in saved["posts"]]
         self._homing = {int(drone): number for drone, number in saved["homing"]}
-        self._posts = posts
+        self._posts, self._silent = posts, set(saved["silent"])
+
+
+def _is_off(node: NodeStatus, to: Location, number: int | None, orders: StandingOrders) -> bool:
+    """Whether somebody else has sent it elsewhere, or a repair took it there.
+
+    `number`: the order that sends it there; None: it has been there.
+    """
+    is_ours = number is not None and orders.stands(number)
+    return not is_ours and not leads_to(node, [to])

@@ -38,20 +38,9 @@ class ReliefView:
 class IReliefPolicy(abc.ABC):
     """Decides which drone is relieved next, and by which. Relief carries it out."""
 
-    is_active = True  # False: no drone is ever sent anywhere
-
     @abc.abstractmethod
     def choose(self, view: ReliefView) -> Pair | None:
         """The next relief that must begin now; None: there is none."""
-
-
-class NoRelief(IReliefPolicy):
-    """Nobody is relieved."""
-
-    is_active = False
-
-    def choose(self, view: ReliefView) -> Pair | None:
-        return None
 
 
 class SpareFirst(IReliefPolicy):
@@ -116,16 +105,16 @@ class Rotate(IReliefPolicy):
         return view.with_one_of(old, sorted(free, key=lambda drone: -view.left_s[drone]))
 
 
-POLICIES: dict[str, type[IReliefPolicy]] = {
-    "none": NoRelief,
+POLICIES: dict[str, Callable[[], IReliefPolicy | None]] = {
+    "none": lambda: None,
     "spare_first": SpareFirst,
     "named_backup": NamedBackup,
     "rotate": Rotate,
 }
 
 
-def relief_policy(name: str) -> IReliefPolicy:
-    """The policy of this name. Raises ConfigurationError."""
+def relief_policy(name: str) -> IReliefPolicy | None:
+    """The policy of this name; None: nobody is relieved. Raises ConfigurationError."""
     if name not in POLICIES:
         raise ConfigurationError(f"unknown relief {name}: use {', '.join(POLICIES)}")
     return POLICIES[name]()

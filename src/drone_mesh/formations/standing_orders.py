@@ -49,6 +49,7 @@ class _Part:
     """The goal of one drone."""
 
     goal: Location
+    at_once: bool = False
     state: PartState = PartState.WAITING
     reason: str = ""  # of a refusal
     pause_s: float = FIRST_PAUSE_S
@@ -175,7 +176,7 @@ class StandingOrders:
         place is taken; the order then lasts until `end`. The first orders are those of the next
         `update`.
         """
-        parts = {drone: _Part(goal) for drone, goal in goals.items()}
+        parts = {drone: _Part(goal, at_once) for drone, goal in goals.items()}
         with self._lock:
             self._replace(goals)
             number = self._last_number = self._last_number + 1
@@ -251,7 +252,7 @@ class StandingOrders:
         One thread at a time may call it: it plans without the lock, which others need meanwhile.
         """
         with self._lock:
-            again, together, due = self._to_order(mesh, rules)
+            parts = self._to_order(mesh, rules)
             goals = self.goals(mesh)
             sent = {
                 drone: part.sent_to.as_ordered()
@@ -261,23 +262,20 @@ class StandingOrders:
             }
             latest = self._orders[max(self._orders)].parts if self._orders else {}
             first = {drone for drone, part in latest.items() if part.is_followed}
-        wanted = {drone: part.sent_to or part.goal for drone, part in again.items()}
+        wanted = {drone: part.sent_to for drone, part in parts.items() if part.sent_to is not None}
+        new = {drone: part for drone, part in parts.items() if drone not in wanted}
         refused: dict[int, str] = {}
-        if together or due:
+        if new:
             departures = Departures(mesh, goals, sent, rules, first)
-            taken = {drone: departures.taken_by(drone) for drone in together}
-            wanted.update(
-                {drone: part.goal for drone, part in together.items() if not taken[drone]}
-            )
-            back = {drone for drone, part in due.items() if part.arrived}
-            cut_off = {drone: CUT_OFF for drone in back if not departures.is_in_reach(drone)}
-            choice = departures.choose(due.keys() - cut_off.keys())
+            taken = {n: departures.taken_by(n) for n, part in new.items() if part.at_once}
+            wanted.update({n: new[n].goal for n, others in taken.items() if not others})
+            back = {n for n, part in new.items() if part.arrived and not part.at_once}
+            cut_off = {n: CUT_OFF for n in back if not departures.is_in_reach(n)}
+            choice = departures.choose(new.keys() - taken.keys() - cut_off.keys())
             wanted.update(choice.set_out)
             refused = {**taken, **cut_off, **choice.blocked}
         with self._lock:
-            parts = {
-                n: part for n, part in {**again, **together, **due}.items() if part.is_followed
-            }
+            parts = {drone: part for drone, part in parts.items() if part.is_followed}
             for drone, reason in refused.items():
                 if reason and drone in parts:
                     parts[drone].stay(PartState.REFUSED, reason)
@@ -289,14 +287,10 @@ class StandingOrders:
                 self._sent[drone] = to, mesh.stamp_s
         return list(wanted.items())
 
-    def _to_order(
-        self, mesh: MeshStatus, rules: FlightRules
-    ) -> tuple[dict[int, _Part], dict[int, _Part], dict[int, _Part]]:
-        """The drones that must be ordered: as before, all together, and in turn."""
+    def _to_order(self, mesh: MeshStatus, rules: FlightRules) -> dict[int, _Part]:
+        """The drones that must be ordered, or ordered again."""
         nodes = {node.id: node for node in mesh.nodes}
-        again: dict[int, _Part] = {}
-        together: dict[int, _Part] = {}
-        due: dict[int, _Part] = {}
+        found: dict[int, _Part] = {}
         for order in self._orders.values():
             is_moving = order.is_moving()
             for drone, part in sorted(order.parts.items(), reverse=True):
@@ -305,12 +299,9 @@ class StandingOrders:
                 why_not = rules.fence.why_not(part.goal.to_vector()) if rules.fence else ""
                 if why_not and part.state.is_open:  # until the fence changes again
                     part.stay(PartState.REFUSED, why_not)
-                elif self._follow(part, nodes.get(drone), order.at_once, mesh.stamp_s):
-                    if part.sent_to is not None:
-                        again[drone] = part
-                    else:
-                        (together if order.at_once else due)[drone] = part
-        return again, together, due
+                elif self._follow(part, nodes.get(drone), mesh.stamp_s):
+                    found[drone] = part
+        return found
 
     def goals(self, mesh: MeshStatus) -> dict[int, Location]:
         """The places that drones still have to reach, or have reached and keep."""
@@ -324,7 +315,7 @@ class StandingOrders:
                     goals[drone] = goal
         return goals
 
-    def _follow(self, part: _Part, node: NodeStatus | None, at_once: bool, now_s: float) -> bool:
+    def _follow(self, part: _Part, node: NodeStatus | None, now_s: float) -> bool:
         """Update one drone's state; returns whether it may be ordered now."""
         if node is None:
             part.state = PartState.ABSENT
@@ -351,9 +342,9 @@ class StandingOrders:
             part.sent_to = None
         if part.state is not PartState.REFUSED:
             part.state = PartState.LATER if has_route or flies else PartState.WAITING
-        if at_once and part.sent_s == -math.inf:
+        if part.at_once and part.sent_s == -math.inf:
             return True  # a gateway may find a drone that seems lost
-        return now_s >= part.due_s and has_route and (at_once or not flies)
+        return now_s >= part.due_s and has_route and (part.at_once or not flies)
 
     def _may_leave(self, drone: int, goal: Location, now_s: float) -> bool:
         """Whether it may still follow an order to another place."""
@@ -372,9 +363,9 @@ class StandingOrders:
 
     # For a restart ---------------------------------------------------------------------------
 
-    def saved(self) -> list[dict[str, Any]]:
+    def saved(self) -> dict[str, Any]:
         """The orders that are left, as plain values that `restore` reads."""
-        return [
+        orders = [
             {
                 "number": order.number,
                 "name": order.name,
@@ -389,13 +380,14 @@ class StandingOrders:
             }
             for order in self._orders.values()
         ]
+        return {"last_number": self._last_number, "orders": orders}
 
-    def restore(self, saved: Iterable[Mapping[str, Any]]) -> None:
+    def restore(self, saved: Mapping[str, Any]) -> None:
         """Go on with what `saved` returned."""
-        for entry in saved:
-            parts = {int(n): _Part(Location(*goal)) for n, goal in entry["goals"].items()}
-            number = int(entry["number"])
-            name, at_once = str(entry["name"]), bool(entry["at_once"])
+        self._last_number = int(saved["last_number"])
+        for entry in saved["orders"]:
+            number, name = int(entry["number"]), str(entry["name"])
+            goals, at_once = entry["goals"].items(), bool(entry["at_once"])
+            parts = {int(n): _Part(Location(*goal), at_once) for n, goal in goals}
             order = _StandingOrder(number, name, parts, -math.inf, at_once, entry["relieves"])
             self._orders[number] = order
-            self._last_number = max(self._last_number, number)

@@ -128,8 +128,9 @@ class EnduranceRun:
             drone = drones[place.node_id]
             drone.put(drone.get_location()._replace(height=part.height_m))
         self._routers = sorted(drones.keys() - gateways_of(network))
-        for n in self._routers:
-            drones[n].battery = Battery(model)
+        self._batteries = {n: Battery(model) for n in self._routers}
+        for n, battery in self._batteries.items():
+            drones[n].battery = battery
         posts = [place.node_id for place in layout if not place.gateway]
         spares = [n for n in self._routers if n not in posts]
         stands = _stands(part, layout, len(self._routers))
@@ -154,7 +155,7 @@ class EnduranceRun:
             if not (self._use_battery(n) and self._is_home(n)):
                 self._crews.leave(n, self._pads[n])
             elif self._crews.serve(n, self._pads[n], now_s):
-                self._battery(n).swap()
+                self._batteries[n].swap()
         for event in event_records(network.events[self._events_read :]):
             self._orders.on_event(event)
         self._events_read = len(network.events)
@@ -165,17 +166,12 @@ class EnduranceRun:
         self._orders.forget_complete()
         network.clock.call_at(now_s + LOOK_S, self._look, None)
 
-    def _battery(self, n: int) -> Battery:
-        battery = self._network.nodes[n].drone.battery
-        assert battery is not None  # all routers have one
-        return battery
-
     def _is_home(self, n: int) -> bool:
         return self._network.location(n).distance_m(self._homes[n]) <= _HOME_M
 
     def _use_battery(self, n: int) -> bool:
         """Use up what the last LOOK_S took; returns whether the drone needs another battery."""
-        drone, battery = self._network.nodes[n].drone, self._battery(n)
+        drone, battery = self._network.nodes[n].drone, self._batteries[n]
         in_air = drone.path is not None or drone.get_location().height > 0.0
         before = battery.percent
         speed_m_s = 0.0 if drone.path is None else drone.speed_m_s
@@ -231,7 +227,7 @@ class EnduranceRun:
         grounded = [n for n in down if self._network.location(n).height <= 0.0]
         return replace(
             self.figures,
-            energy_wh=sum(self._battery(n).used_j for n in self._routers) / 3600.0,
+            energy_wh=sum(battery.used_j for battery in self._batteries.values()) / 3600.0,
             swaps=self._crews.swaps,
             reliefs=self._relief.reliefs,
             astray=[n for n in grounded if not self._is_home(n)],

@@ -38,7 +38,6 @@ def view(left_s, ready=(), spares=None, interval_s=100.0, places=None, blocked=(
 @pytest.mark.parametrize(
     ("name", "seen", "chosen"),
     [
-        ("none", view({1: -5.0}, [7]), None),
         ("spare_first", view({1: 250.0, 2: 350.0, 3: 450.0}, [7]), None),
         ("spare_first", view({1: 250.0, 2: 299.0}, [7]), (1, 7)),  # two and one more in 299 s
         ("spare_first", view({1: 50.0}, [7, 8], blocked=[(7, 1)]), (1, 8)),
@@ -359,7 +358,9 @@ def test_a_place_is_taken_by_a_drone_that_flies_there_and_has_fallen_silent():
     mesh.spare.on = False
     mesh.others = [NodeStatus(3, connected=True, position=(0.0, 12.0, 0.0), battery=100.0)]
     mesh.sent(20)
-    assert {"3"} & {drone for order in mesh.orders.saved() for drone in order["goals"]} == set()
+    assert {"3"} & {
+        drone for order in mesh.orders.saved()["orders"] for drone in order["goals"]
+    } == set()
 
 
 def test_a_relief_reaches_a_post_between_whole_metres_of_height():
@@ -395,3 +396,21 @@ def test_a_drone_that_is_on_but_mute_is_replaced_and_goes_home_when_it_is_heard_
         assert mesh.sent(7) == {}
         mesh.holder.connected = True
         assert mesh.sent(2) == {1: OTHER}
+
+
+def test_a_neighbour_that_falls_silent_before_it_sets_out_for_another_post_goes_home_later():
+    """Somebody holds the post that it left."""
+    mesh = Mesh()
+    mesh.relief = Relief(relief_policy("rotate"), homes={1: OTHER, 2: HOME})
+    mesh.others = [NodeStatus(3, connected=True, position=(0.0, 12.0, 0.0), battery=100.0)]
+    mesh.spare.position = (4.0, 4.0, 4.0)
+    mesh.sent()
+    mesh.hover(mesh.holder, 23.0)
+    ((filler, place),) = mesh.sent().items()
+    assert filler == 3
+    mesh.spare.on = mesh.spare.connected = False
+    mesh.holder.battery = 90.0
+    mesh.others[0].position = place.to_vector()
+    mesh.sent(8)
+    mesh.spare.on = mesh.spare.connected = True
+    assert mesh.sent(2)[2] == HOME

@@ -323,7 +323,10 @@ def test_a_relief_that_a_user_ended_before_a_restart_is_not_taken_up_again():
     orders = StandingOrders()
     number = orders.give("relief", {4: EAST}, now_s=0.0, relieves=5)
     orders.ordered(4, NORTH, now_s=1.0)
+    assert orders.give("over", {}, now_s=1.0) == number + 1
+    orders.forget_complete()
     restarted = StandingOrders()
     restarted.restore(json.loads(json.dumps(orders.saved())))
     assert restarted.update(state(2.0, drone(4, at=NORTH))) == []
     assert not restarted.stands(number)
+    assert restarted.give("next", {}, now_s=2.0) == number + 2  # a relief may know the others

@@ -23,14 +23,15 @@ def lived_s(run: RunRecord) -> float:
     return NAN if it is None or it.lived_s is None else it.lived_s
 
 
-@less("drones", "drones whose battery ran empty in the air")
-def fell(run: RunRecord) -> float:
-    return NAN if run.endurance is None else len(run.endurance.fell)
-
-
-@less("drones", "drones on the ground elsewhere than on their pads at the end")
-def landed_astray(run: RunRecord) -> float:
-    return NAN if run.endurance is None else len(run.endurance.astray)
+@metrics(
+    "drones",
+    "less",
+    fell="drones whose battery ran empty in the air",
+    landed_astray="drones on the ground elsewhere than on their pads at the end",
+)
+def lost(run: RunRecord) -> tuple[float, float]:
+    it = run.endurance
+    return (NAN, NAN) if it is None else (len(it.fell), len(it.astray))
 
 
 @more("%", "least charge of a drone in the air")

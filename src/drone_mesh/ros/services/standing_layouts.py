@@ -275,7 +275,9 @@ class StandingLayouts:
 
     def _restore(self) -> None:
         try:
-            left = json.loads(rospy.get_param(names.STANDING_PARAM, '{"orders": []}'))
+            left = json.loads(rospy.get_param(names.STANDING_PARAM, "null"))
+            if left is None:
+                return
             with self._lock:
                 self._orders.restore(left["orders"])
             self._relief_left = left.get("relief")
