@@ -225,6 +225,9 @@ class DynamicEngine(DroneEngine):
 
     def _fly_anew(self, path: FlightPath | None, position: Vector, now_s: float) -> None:
         here = Location.from_vector(position)
+        if path is None and self.why_not_fly():
+            ground: Vector = (position[0], position[1], self._half_height_m)
+            path = FlightPath(position, ground, now_s, ceiling_m=position[2])
         self._hover = here if path is None else None
         self._route = None
         if path is not None:
@@ -294,16 +297,13 @@ class DynamicEngine(DroneEngine):
 
     def _come_down(self, position: Vector) -> None:
         """With its last fifth: to its pad if there are crews, else to the ground below."""
-        now_s, path, does = self._world.now_s, self._state.path, "it goes home"
+        now_s, path = self._world.now_s, self._state.path
         if self._crews is None:
             path = None
         elif self._route is None or self._route.end.distance_m(self._home) > AT_HOME_M:
             path = self._plan(position, self._home.to_vector(), now_s)
-        if path is None:
-            ground: Vector = (position[0], position[1], self._half_height_m)
-            path, does = FlightPath(position, ground, now_s, ceiling_m=position[2]), "it lands"
-        self._note(MeshEventKind.BATTERY_LOW, does)
-        if path is not self._state.path:
+        self._note(MeshEventKind.BATTERY_LOW, "it lands" if path is None else "it goes home")
+        if path is None or path is not self._state.path:
             self._fly_anew(path, position, now_s)
 
     def _ask_for_battery(self, position: Vector, now_s: float) -> None:

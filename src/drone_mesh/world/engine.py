@@ -133,7 +133,7 @@ class DroneEngine(IDroneEngine):
         """Keep this fence, as its planner does: fly another way, or stay. World's thread."""
         self.fence = fence
         (position, path, _), now_s = self._state, self._world.now_s
-        if path is None or self.why_not_fly():  # then it lands
+        if path is None:
             return
         way = [position, *path.ahead(now_s)]
         why_not = fence.raised(self._half_height_m).why_not_straight(way)

@@ -7,8 +7,10 @@ from typing import Iterator
 
 import pytest
 
+from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.drone.battery import LAND_AT_PERCENT, Crews, PowerModel
+from drone_mesh.drone.fence import Fence, Zone
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused
 from drone_mesh.world.bullet_world import BulletWorld
@@ -174,6 +176,23 @@ def test_its_last_flight_home_is_seen_and_not_begun_anew_on_the_way(world, home_
     assert engine.get_location().height < 0.05
     if home_at_s < 48.0:
         assert max(heights[now_s] for now_s in heights if now_s > 47.8) < high_m + 0.5
+
+
+def test_a_fence_that_closes_the_last_way_home_lets_it_land_where_it_is(world):
+    ring = ((-9.0, -9.0), (6.0, -9.0), (6.0, 9.0), (-9.0, 9.0))
+    fence = Fence.of([], [Zone("pads", (ring,))])
+    limits = BodyLimits(power=PowerModel(hover_s=60.0))
+
+    def plan(*flight):
+        return Obstacles((), fence=engine.fence).plan_flight(*flight)
+
+    engine = drone(world, limits=limits, crews=Crews(90.0), plan_flight=plan)
+    engine.set_goal(0.0, 12.0, 2)
+    run(world, 49.0)  # it has begun to fly home
+    engine.keep_to(fence)
+    run(world, 30.0)
+    place = engine.get_location()
+    assert (place.longitude > 7.0, place.height < 0.05) == (True, True)
 
 
 @pytest.mark.parametrize(
