@@ -40,7 +40,8 @@ HOT = {
     " queued_delivery",
     "communication/node": "component gateway router",
     "drone": "location",
-    "inprocess": "clock node radio shared_air shared_antenna",
+    "inprocess": "clock drone node radio shared_air shared_antenna",
+    "nrf24/emulator": "links",
 }
 
 

@@ -28,7 +28,7 @@ else:
 
 PACKAGE = Path(__file__).resolve().parent
 BUILDS = PACKAGE.parents[1] / "build" / "compiled"
-ROOMS = ("channel", "communication", "drone", "inprocess")  # that hold compiled modules
+ROOMS = ("channel", "communication", "drone", "inprocess", "nrf24")  # that hold compiled modules
 WISH = "DRONE_MESH_CORE"  # python: never a build; compiled: nothing else
 
 

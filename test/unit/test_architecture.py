@@ -107,6 +107,7 @@ def test_no_module_gives_a_name_twice():
         names = []
         for node in ast.parse(file.read_text(encoding="utf-8")).body:
             targets = node.targets if isinstance(node, ast.Assign) else []
+            targets = [node.target] if isinstance(node, ast.AnnAssign) else targets
             names += [target.id for target in targets if isinstance(target, ast.Name)]
         twice += [f"{file.name}: {name}" for name, times in Counter(names).items() if times > 1]
     assert twice == []

@@ -33,6 +33,7 @@ import enum
 import math
 import random
 from dataclasses import replace
+from typing import Final
 
 from drone_mesh.channel.access_rules import AccessRules
 from drone_mesh.channel.packet_queue import ALL_NODES, OutgoingPacket, PacketQueue
@@ -42,7 +43,7 @@ from drone_mesh.communication.interfaces import BROADCAST
 from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.packet_types import Priority
 
-_NO_SENDER = -1
+_NO_SENDER: Final = -1
 
 
 class InTrain(enum.Enum):
@@ -89,8 +90,10 @@ class Yielding:
 
 def place_in_train(payload: bytes, receiver: int) -> InTrain:
     """The place of a packet in its train, as `receiver` can tell."""
+    if not messages.is_data(payload):  # most packets
+        return InTrain.NO
     _creator, _from, kind, _to, addressee = messages.header(payload)
-    if not messages.is_data(payload) or addressee == BROADCAST:
+    if addressee == BROADCAST:
         return InTrain.NO
     if addressee == receiver or kind == packets.FRAGMENTS.start:
         return InTrain.PERHAPS
@@ -105,8 +108,8 @@ class Fate(enum.Enum):
     GIVEN_UP = "given up"
 
 
-_LEARNING = 0.1  # weight of the latest first try in the estimate of contention
-_MOST_CONTENTION = 0.9
+_LEARNING: Final = 0.1  # weight of the latest first try in the estimate of contention
+_MOST_CONTENTION: Final = 0.9
 
 
 class MediumAccess:

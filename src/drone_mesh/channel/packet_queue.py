@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from typing import Final
 
 from drone_mesh.communication.wire.packet_types import Priority
 
-ALL_NODES = -1  # receiver of a broadcast
+ALL_NODES: Final = -1  # receiver of a broadcast
 
 
 class OutgoingPacket:

@@ -9,16 +9,16 @@ from __future__ import annotations
 
 import abc
 import enum
-from typing import NamedTuple, Sequence
+from typing import Final, NamedTuple, Sequence
 
 from drone_mesh.communication.timing import UNDISTURBED, ChannelUse, Medium
 from drone_mesh.drone.fleet import MAX_DRONES
 from drone_mesh.drone.location import Location
 
-PAYLOAD_BYTES = 32  # nRF24L01+ Product Specification 1.0, 7.3.4: a payload is 0..32 bytes
+PAYLOAD_BYTES: Final = 32  # nRF24L01+ Product Specification 1.0, 7.3.4: a payload is 0..32 bytes
 MAX_NODE_ID = MAX_DRONES - 1  # docs/wire.md, "Identity"
-BROADCAST = 254  # final addressee: every node in range
-NO_ROUTE = 255  # "no such route", "no such node"
+BROADCAST: Final = 254  # final addressee: every node in range
+NO_ROUTE: Final = 255  # "no such route", "no such node"
 UNLIMITED_ROOM = 2**31
 
 

@@ -6,15 +6,15 @@ The table belongs to the control plane, which makes it; the parts of a node writ
 from __future__ import annotations
 
 import math
-from typing import Iterable, Iterator, NamedTuple
+from typing import Final, Iterable, Iterator, NamedTuple
 
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.timing import Medium
 from drone_mesh.drone.location import Location
 
-STEP = 0.1  # of the range: positions of satellites err by far less
-REPORTS = 3.0  # one may be lost
-FLIGHT_S = 10.0  # a repair flight asks for places each second, and some are lost
+STEP: Final = 0.1  # of the range: positions of satellites err by far less
+REPORTS: Final = 3.0  # one may be lost
+FLIGHT_S: Final = 10.0  # a repair flight asks for places each second, and some are lost
 
 
 class _Track(NamedTuple):
@@ -47,9 +47,9 @@ class SeenMotion:
             self._tracks[node] = _Track(place)
             return
         step_m = self._step_m
-        if place.distance_m(track.place) <= step_m:
+        if math.dist(place, track.place) <= step_m:
             return
-        is_third = track.before is not None and place.distance_m(track.before) > step_m
+        is_third = track.before is not None and math.dist(place, track.before) > step_m
         moves = is_third and now_s - track.stepped_s <= self.within_s
         moves_s = now_s if moves else track.moves_s
         self._tracks[node] = _Track(place, track.place, now_s, moves_s)
@@ -67,14 +67,16 @@ class SeenMotion:
         return any(track.moves_s >= since_s for track in self._tracks.values())
 
 
-NAMED_AFTER_DEATH_S = 60.0  # lists of six hops had a dead node for up to 59 s
+NAMED_AFTER_DEATH_S: Final = 60.0  # lists of six hops had a dead node for up to 59 s
 
 
-class HeardPlace(NamedTuple):
+class HeardPlace:
     """The place that a node reported."""
 
-    place: Location
-    heard_s: float
+    __slots__ = ("heard_s", "place")
+
+    def __init__(self, place: Location, heard_s: float) -> None:
+        self.place, self.heard_s = place, heard_s
 
 
 class Neighbours:
@@ -177,8 +179,8 @@ class Neighbours:
 
     def note_known_elsewhere(self, nodes: Iterable[int], now_s: float) -> None:
         """Another node knows these: one that fell silent long ago lives, its link here failed."""
-        for node in self._fell_silent_s.keys() & nodes:
-            if now_s - self._fell_silent_s[node] > NAMED_AFTER_DEATH_S:
+        for node in nodes if self._fell_silent_s else ():
+            if now_s - self._fell_silent_s.get(node, math.inf) > NAMED_AFTER_DEATH_S:
                 self._out_of_reach.add(node)
 
     def out_of_reach(self) -> frozenset[int]:
@@ -243,7 +245,9 @@ class Neighbours:
         """Where to look for `node`, seen at `place`: in flight, as high as it was at rest last."""
         if not flies:
             self._rested_m[node] = place.height
-        return place._replace(height=self._rested_m.get(node, place.height))
+            return place
+        height_m = self._rested_m.get(node, place.height)
+        return place if height_m == place.height else place._replace(height=height_m)
 
     def place_of(self, node: int) -> HeardPlace | None:
         """The last reported place of `node`."""

@@ -20,9 +20,7 @@ class Location(NamedTuple):
 
     def distance_m(self, other: Location) -> float:
         """Straight 3D distance to `other`."""
-        (a, b, c), (d, e, f) = self, other  # each beacon asks: by place, not by name
-        north, east, up = a - d, b - e, c - f
-        return math.sqrt(north * north + east * east + up * up)
+        return math.dist(self, other)
 
     def towards(self, end: Location, distance_m: float) -> Location:
         """The point `distance_m` away on the straight line to `end`, at most `end` itself."""

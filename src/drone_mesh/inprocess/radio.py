@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import random
 from typing import Callable, Iterable, Mapping
@@ -27,7 +28,7 @@ def _ignore(_payload: bytes) -> None:
 
 
 def _as_rows(places: Iterable[Location]) -> np.ndarray:
-    rows: np.ndarray = np.array(list(places)).reshape(-1, 3)
+    rows: np.ndarray = np.fromiter(itertools.chain.from_iterable(places), float).reshape(-1, 3)
     return rows
 
 

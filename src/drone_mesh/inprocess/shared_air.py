@@ -11,14 +11,16 @@ emulator.
 from __future__ import annotations
 
 import abc
+import itertools
 import math
 from dataclasses import dataclass
-from typing import Callable, Iterable, Iterator, NamedTuple
+from typing import Callable, Final, Iterable, Tuple
 
 import numpy as np
 
 from drone_mesh.channel.packet_queue import ALL_NODES, OutgoingPacket
 from drone_mesh.drone.interfaces import IDroneEngine
+from drone_mesh.drone.location import Location
 from drone_mesh.inprocess.clock import VirtualClock
 from drone_mesh.inprocess.interfaces import IInProcessAir, IInProcessAntenna
 from drone_mesh.nrf24.emulator.air import CAPTURE_DB, RPD_DBM, RPD_NS
@@ -27,18 +29,11 @@ from drone_mesh.nrf24.emulator.space import Space
 from drone_mesh.nrf24.registers import NS_PER_S
 from drone_mesh.nrf24.settings import RadioSettings
 
-ROUNDED = 1.000001  # factor on a distance: more than its last digits
-MOST_GAIN_DB = 10.0  # Rayleigh fading exceeds it once in 22,000 blocks
+ROUNDED: Final = 1.000001  # factor on a distance: more than its last digits
+MOST_GAIN_DB: Final = 10.0  # Rayleigh fading exceeds it once in 22,000 blocks
 
-
-class Link(NamedTuple):
-    """From one radio to another, without fading."""
-
-    distance_m: float
-    power_dbm: float
-
-
-NO_LINK = Link(math.inf, -math.inf)  # of a radio that is gone, and to itself
+Link = Tuple[float, float]
+"""From one radio to another, without fading: metres, dBm."""
 
 
 @dataclass(eq=False)
@@ -49,6 +44,7 @@ class Transmission:
     packet: OutgoingPacket
     answers: SharedRadio | None  # an acknowledgement for that radio; None: the packet itself
     start_s: float
+    start_ns: int
     end_s: float
     others: list[Transmission]  # that overlap with it
 
@@ -58,6 +54,7 @@ class SharedRadio(IInProcessAntenna):
 
     node_id: int
     drone: IDroneEngine
+    powered: bool
     listening_since_s: float | None  # None: it sends, switches over or has no power
 
     @abc.abstractmethod
@@ -109,6 +106,7 @@ class SharedAir(IInProcessAir):
         # What depends on places, until a radio moves: sender, receiver, of pairs at rest; in reach.
         self._links: dict[tuple[int, int], Link] = {}
         self._reached: dict[tuple[int, bool], list[SharedRadio]] = {}
+        self._where: dict[int, Location] = {}  # of those at rest
         self._places: np.ndarray | None = None  # (n, 3); those in flight may be anywhere: NaN
         self._flying: set[int] = set()
 
@@ -131,6 +129,7 @@ class SharedAir(IInProcessAir):
     def moved(self, _nodes: Iterable[int]) -> None:
         self._reached.clear()
         self._links.clear()
+        self._where.clear()
         self._places = None
 
     def in_range(self, node: int) -> dict[int, SharedRadio]:
@@ -148,7 +147,8 @@ class SharedAir(IInProcessAir):
         now_s = self.clock.now_s
         duration_s = self._packet_s if answers is None else self._answer_s
         others = list(self._active)
-        frame = Transmission(sender, packet, answers, now_s, now_s + duration_s, others)
+        start_ns, end_s = round(now_s * NS_PER_S), now_s + duration_s
+        frame = Transmission(sender, packet, answers, now_s, start_ns, end_s, others)
         for other in others:
             other.others.append(frame)
         self._active.append(frame)
@@ -174,19 +174,20 @@ class SharedAir(IInProcessAir):
         if since_s is None or since_s > frame.start_s or not receiver.recognises(frame):
             return
         sender_id, receiver_id = frame.sender.node_id, receiver.node_id
-        link = self._link(sender_id, receiver_id)
-        if link.power_dbm == -math.inf:
+        distance_m, power_dbm = self._link(sender_id, receiver_id)
+        if power_dbm == -math.inf:
             return  # obstacles block it
-        power_dbm = self._faded_dbm(sender_id, receiver_id, link)
+        if self.space.fading is not None:
+            power_dbm = self._faded_dbm(sender_id, receiver_id, power_dbm)
         hop = Hop(
             sender_id,
             receiver_id,
-            link.distance_m,
+            distance_m,
             power_dbm,
             self._bits_per_s,
             self._packet_bits if frame.answers is None else self._answer_bits,
             frame.packet if frame.answers is None else None,
-            round(frame.start_s * NS_PER_S),
+            frame.start_ns,
         )
         errors = self.space.links.bit_errors(hop)
         if errors is None:
@@ -207,15 +208,17 @@ class SharedAir(IInProcessAir):
 
     def _forget(self, node: int) -> None:
         self._reached.clear()
+        self._where.pop(node, None)
         self._places = None
         self._links = {pair: link for pair, link in self._links.items() if node not in pair}
 
     def _power(self, sender: int, receiver: int) -> float:
         """The power of a frame between two radios now."""
-        return self._faded_dbm(sender, receiver, self._link(sender, receiver))
+        _distance_m, power_dbm = self._link(sender, receiver)
+        return self._faded_dbm(sender, receiver, power_dbm)
 
-    def _faded_dbm(self, sender: int, receiver: int, link: Link) -> float:
-        fading, power_dbm = self.space.fading, link.power_dbm
+    def _faded_dbm(self, sender: int, receiver: int, power_dbm: float) -> float:
+        fading = self.space.fading
         if fading is None or power_dbm == -math.inf:
             return power_dbm
         radios = self._radios
@@ -235,17 +238,25 @@ class SharedAir(IInProcessAir):
     def _measured(self, sender: int, receiver: int) -> Link:
         radios = self._radios
         if sender == receiver or sender not in radios or receiver not in radios:
-            return NO_LINK
-        here, there = radios[sender].drone.get_location(), radios[receiver].drone.get_location()
-        distance_m, space = math.dist(here, there), self.space
+            return math.inf, -math.inf  # no link: to itself, or to a radio that is gone
+        here, there, space = self._place(sender), self._place(receiver), self.space
+        distance_m = math.dist(here, there)
         power_dbm = space.links.received_dbm(distance_m, self._sent_dbm, self._carrier_mhz)
         if space.obstacles is not None:
             power_dbm -= space.lost_db(here.to_vector(), there.to_vector())
-        return Link(distance_m, power_dbm)
+        return distance_m, power_dbm
+
+    def _place(self, node: int) -> Location:
+        place = self._where.get(node)
+        if place is None:
+            place = self._radios[node].drone.get_location()
+            if node not in self._flying:
+                self._where[node] = place
+        return place
 
     def _noise_exceeds(self, dbm: float, frame: Transmission, receiver: SharedRadio) -> bool:
         """Whether there was more noise than that at some time during the frame."""
-        span_ns = (round(frame.start_s * NS_PER_S), round(frame.end_s * NS_PER_S))
+        span_ns = (frame.start_ns, round(frame.end_s * NS_PER_S))
         place = receiver.drone.get_location().to_vector()
         noise_dbm = self.space.noise_dbm(place, self._carrier_mhz, self._bits_per_s, span_ns)
         return noise_dbm > dbm
@@ -276,29 +287,26 @@ class SharedAir(IInProcessAir):
                 self._reached[node, faded] = reached
         return reached
 
-    def _near(self, node: int, more_db: float) -> Iterator[SharedRadio]:
+    def _near(self, node: int, more_db: float) -> list[SharedRadio]:
         """The radios in reach, and a few others: a quick choice among many."""
         if node not in self._radios:
-            return
+            return []
         radios = list(self._radios.values())
         if self._places is None:
-            unknown = (math.nan,) * 3
-            self._places = np.array(
-                [
-                    unknown if radio.node_id in self._flying else radio.drone.get_location()
-                    for radio in radios
-                ]
-            )
-        away = self._places - self._radios[node].drone.get_location()
+            unknown = Location(math.nan, math.nan, math.nan)
+            flying, place = self._flying, self._place
+            places = [unknown if other in flying else place(other) for other in self._radios]
+            self._places = np.fromiter(itertools.chain.from_iterable(places), float).reshape(-1, 3)
+        away = self._places - self._place(node)
         furthest_m = ROUNDED * self.space.links.furthest_m(
             self._sent_dbm, self._carrier_mhz, self._bits_per_s, more_db
         )
         is_far = np.einsum("ij,ij->i", away, away) > furthest_m**2  # False for NaN
-        for row in np.flatnonzero(~is_far):
-            yield radios[row]
+        rows: list[int] = np.flatnonzero(~is_far).tolist()
+        return [radios[row] for row in rows]
 
     def _reaches(self, node: int, other: int, more_db: float) -> bool:
-        link = self._link(node, other)
-        return link.power_dbm > -math.inf and self.space.links.reaches(
-            link.distance_m, link.power_dbm + more_db, self._bits_per_s
+        distance_m, power_dbm = self._link(node, other)
+        return power_dbm > -math.inf and self.space.links.reaches(
+            distance_m, power_dbm + more_db, self._bits_per_s
         )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import random
+from typing import Final
 
 from drone_mesh.channel.medium_access import Fate, MediumAccess, place_in_train
 from drone_mesh.channel.packet_queue import ALL_NODES, OutgoingPacket
@@ -23,12 +24,12 @@ from drone_mesh.inprocess.shared_air import SharedAir, SharedRadio, Transmission
 from drone_mesh.nrf24.registers import FIFO_DEPTH, NS_PER_S, SETTLING_NS, ard_s
 from drone_mesh.nrf24.transceiver import CE_PULSE_S, TX_DELAY_S
 
-SETTLING_S = SETTLING_NS / NS_PER_S
+SETTLING_S: Final = SETTLING_NS / NS_PER_S
 # Durations of the driver's SPI transfers at 8 MHz, as counted by the emulator.
-PREPARE_S = 60e-6  # from a listening chip to the rise of CE, without the pause of TX_DELAY_S
-FINISH_S = 20e-6  # from TX_DS or MAX_RT to CE high again
-LOAD_S = 50e-6  # from TX_DS to the rise of CE for the next packet of a train
-READ_S = 80e-6  # from the end of a frame until its payload is in the driver
+PREPARE_S: Final = 60e-6  # from a listening chip to the rise of CE, without the pause of TX_DELAY_S
+FINISH_S: Final = 20e-6  # from TX_DS or MAX_RT to CE high again
+LOAD_S: Final = 50e-6  # from TX_DS to the rise of CE for the next packet of a train
+READ_S: Final = 80e-6  # from the end of a frame until its payload is in the driver
 
 
 class SharedAntenna(SharedRadio):
@@ -41,7 +42,7 @@ class SharedAntenna(SharedRadio):
         self.access = MediumAccess(air.settings.access_rules, rng)
         self._air = air
         self._clock: VirtualClock = air.clock
-        self._submit = host.submit
+        self._submit, self._hear = host.submit, host.hear
         self._settings = air.settings
         self._tx_delay_s = TX_DELAY_S[air.settings.data_rate]
         self._medium = air.settings.medium
@@ -245,8 +246,7 @@ class SharedAntenna(SharedRadio):
         self._unread -= 1
         self._counters.received += 1
         sender_id, packet = arrived
-        mesh = self._mesh
-        if mesh is None or not self.powered:
+        if self._mesh is None or not self.powered:
             return
         broadcast = packet.receiver == ALL_NODES
         train = place_in_train(packet.payload, self.node_id)
@@ -254,7 +254,7 @@ class SharedAntenna(SharedRadio):
         self.access.heard(sender_id, self._clock.now_s, broadcast=answers, train=train)
         payload = readdressed(packet.payload, self.node_id) if broadcast else packet.payload
         self._air.delivered += 1
-        self._submit(lambda now_s: mesh.on_msg(payload, now_s))
+        self._hear(payload)
 
 
 class SharedChannel(SharedAir):

@@ -63,6 +63,7 @@ class Rig:
                 node_id=node_id,
                 drone=GroundEngine(node_id, Location(0.0, x_m, 0.0)),
                 submit=lambda work: work(self.clock.now_s),
+                hear=lambda payload, mesh=mesh: mesh.on_msg(payload, self.clock.now_s),
             )
             antenna = self.air.antenna(host, random.Random(f"bench {node_id}"))
             antenna.start_antenna(mesh)

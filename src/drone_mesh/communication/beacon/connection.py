@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import random
 from dataclasses import dataclass
+from typing import Final
 
 from drone_mesh.communication.beacon.courier import Courier
 from drone_mesh.communication.beacon.own_beacons import OwnMotion
@@ -19,10 +20,10 @@ from drone_mesh.communication.events.observer import MeshEventKind, Reporter, in
 from drone_mesh.communication.interfaces import NO_ROUTE, IMeshSeals, IWirelessCommunication
 from drone_mesh.communication.wire import messages
 
-CHECK_S = 1.0  # how often a router without a gateway considers its repair
-ASKS_S = 10.0  # at most so often for the place of a gateway that moves
-PERIOD_S = 60.0  # a router and its gateway tell each other the nonces of their seals
-AGAIN_S = 5.0  # until the gateway has answered twice
+CHECK_S: Final = 1.0  # how often a router without a gateway considers its repair
+ASKS_S: Final = 10.0  # at most so often for the place of a gateway that moves
+PERIOD_S: Final = 60.0  # a router and its gateway tell each other the nonces of their seals
+AGAIN_S: Final = 5.0  # until the gateway has answered twice
 
 
 @dataclass(eq=False)

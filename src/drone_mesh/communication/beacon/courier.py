@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Callable, Hashable
+from typing import Callable, Final, Hashable
 
 from drone_mesh.communication.control.delivery import IDelivery
 from drone_mesh.communication.interfaces import NO_ROUTE, IWirelessCommunication
@@ -18,11 +18,12 @@ from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.messages import ROUTE_RECORD, ROUTE_RECORD_AT
 from drone_mesh.communication.wire.packet_types import MessageType
 
-HOLD, DROP = -1, -2  # verdicts; any other one is the next hop
-MOST_HELD = 64  # packets that wait for a next hop
-MOST_HOPS_TRIED = 8  # by one node for one packet
-REMEMBERED_S = 3.0  # longer than a packet is held
-SAME_S = 0.5  # a packet that comes again from the same neighbour within it is a copy
+HOLD: Final = -1  # a verdict; any that is not these two is the next hop
+DROP: Final = -2
+MOST_HELD: Final = 64  # packets that wait for a next hop
+MOST_HOPS_TRIED: Final = 8  # by one node for one packet
+REMEMBERED_S: Final = 3.0  # longer than a packet is held
+SAME_S: Final = 0.5  # a packet that comes again from the same neighbour within it is a copy
 
 
 @dataclass(eq=False)

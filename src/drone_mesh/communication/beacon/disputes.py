@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from typing import Final
 
 from drone_mesh.communication.beacon.neighbour import Neighbour
 
-REMEMBERED_S = 60.0  # who claims in turns is believed for the first part of so long a turn
+REMEMBERED_S: Final = 60.0  # who claims in turns is believed for the first part of so long a turn
 
 
 class Disputes:

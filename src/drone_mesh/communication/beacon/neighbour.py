@@ -4,29 +4,24 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Final, Tuple
 
 from drone_mesh.communication.beacon.packets import Beacon, Motion
 from drone_mesh.drone.location import Location
 
-WEIGHT = 0.1  # of one beacon in the moving mean
-LEAST = 0.05  # of the mean
-STEP = 0.5  # hops: small differences must not change the parent
-MOST = 3.0  # hops: of the loss of a link, whatever it loses
-FAR = 0.15  # assumed of a link that is longer than it should reach, until it shows more
-WRONG = 1.15  # of the range: a place further away errs, or fading adds to the power
-LUCKY = 2.3  # of the range: fading that adds 10 dB reaches so far; from further away a place errs
-STOOD = 0.05  # of the range: what both ends moved between two beacons, at most
-FORGOTTEN = 20.0  # intervals: after such a silence a neighbour is a new one
+WEIGHT: Final = 0.1  # of one beacon in the moving mean
+LEAST: Final = 0.05  # of the mean
+STEP: Final = 0.5  # hops: small differences must not change the parent
+MOST: Final = 3.0  # hops: of the loss of a link, whatever it loses
+FAR: Final = 0.15  # assumed of a link that is longer than it should reach, until it shows more
+WRONG: Final = 1.15  # of the range: a place further away errs, or fading adds to the power
+LUCKY: Final = 2.3  # of the range: fading that adds 10 dB reaches so far; beyond it a place errs
+STOOD: Final = 0.05  # of the range: what both ends moved between two beacons, at most
+FORGOTTEN: Final = 20.0  # intervals: after such a silence a neighbour is a new one
 
 
-class _Heard(NamedTuple):
-    """The last beacon of one neighbour."""
-
-    at_s: float
-    interval_s: float
-    own: Location
-    place: Location
+_Heard = Tuple[float, float, Location, Location]
+"""Of the last beacon of one neighbour: when, its interval, where this node was, and that one."""
 
 
 class Losses:
@@ -46,16 +41,16 @@ class Losses:
     ) -> float:
         """A beacon came; those that were due before it were lost. Returns the cost in hops."""
         before = self._heard.get(node)
-        self._heard[node] = _Heard(now_s, interval_s, own, place)
-        due = 1 if before is None else max(1, round((now_s - before.at_s) / before.interval_s))
+        self._heard[node] = now_s, interval_s, own, place
+        due = 1 if before is None else max(1, round((now_s - before[0]) / before[1]))
         if due == 1 and self._kept.get(node) == 1.0:
             return 0.0  # wherever it is
         if due > FORGOTTEN:
             before = None
-        is_far = WRONG < own.distance_m(place) / self._range_m <= LUCKY
+        is_far = WRONG < math.dist(own, place) / self._range_m <= LUCKY
         moved_m = 0.0
         if before is not None:
-            moved_m = own.distance_m(before.own) + place.distance_m(before.place)
+            moved_m = math.dist(own, before[2]) + math.dist(place, before[3])
         if before is not None and moved_m <= STOOD * self._range_m:
             kept = self._kept[node] * (1.0 - WEIGHT) ** due + WEIGHT
         elif not is_far:
@@ -67,10 +62,10 @@ class Losses:
         return min(MOST, again // STEP * STEP)
 
 
-FRESH = 2.5  # intervals: a neighbour that was silent for longer is none
-MOST_VAIN = 3  # nodes with which it brought no contact, before it counts as one that swallows
-MOST_REFUSED = 3  # packets that it did not take, since it last proved that it hears
-REFUSED_S = 3.0  # within which; a burst of losses is shorter
+FRESH: Final = 2.5  # intervals: a neighbour that was silent for longer is none
+MOST_VAIN: Final = 3  # nodes with which it brought no contact; then it counts as one that swallows
+MOST_REFUSED: Final = 3  # packets that it did not take, since it last proved that it hears
+REFUSED_S: Final = 3.0  # within which; a burst of losses is shorter
 
 
 @dataclass(eq=False)
@@ -117,7 +112,7 @@ class Neighbour:
         self.alive(now_s)
         if beacon.motion is not None:
             self.motion, self.reported_s = beacon.motion, now_s
-            self.apart_m = 0.0 if own is None else own.place.distance_m(beacon.motion.place)
+            self.apart_m = 0.0 if own is None else math.dist(own.place, beacon.motion.place)
         if beacon.near:
             self.near_s.update(dict.fromkeys(beacon.near, now_s))
         _after, listed, new = below = beacon.below

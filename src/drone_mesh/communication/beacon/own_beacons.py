@@ -5,12 +5,20 @@ docs/beacons.md, "Beacons".
 
 from __future__ import annotations
 
+import bisect
 import math
 from collections import deque
 from dataclasses import dataclass
-from typing import Callable
+from typing import Callable, Final, Iterable
 
-from drone_mesh.communication.beacon.packets import NOT_LISTED, Beacon, Below, Motion, ids_that_fit
+from drone_mesh.communication.beacon.packets import (
+    NOT_LISTED,
+    Beacon,
+    Below,
+    Motion,
+    apart_m,
+    ids_that_fit,
+)
 from drone_mesh.communication.beacon.routes import BeaconRoutes
 from drone_mesh.communication.control.places import CommonFrame
 from drone_mesh.communication.interfaces import NO_ROUTE, IMeshSeals
@@ -18,11 +26,11 @@ from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.drone.location import Location
 
-OVER_S = 2.0  # noise of a receiver and turns of a drone cancel out
-TURN_S = 0.5  # only so long before a turn is noticed count samples for the new velocity
-STANDS_S = 10.0  # a drone that has not moved for this long stands
-REGION_M = 256.0  # far less than the distance up to which a beacon tells its place
-AGAIN_S = 0.1  # a receiver for satellites gives ten positions per second
+OVER_S: Final = 2.0  # noise of a receiver and turns of a drone cancel out
+TURN_S: Final = 0.5  # only so long before a turn is noticed count samples for the new velocity
+STANDS_S: Final = 10.0  # a drone that has not moved for this long stands
+REGION_M: Final = 256.0  # far less than the distance up to which a beacon tells its place
+AGAIN_S: Final = 0.1  # a receiver for satellites gives ten positions per second
 
 
 class OwnMotion:
@@ -60,7 +68,7 @@ class OwnMotion:
             self._samples.clear()
             self._motion = self.region = None
             return None
-        if self._anchor is None or self._anchor.distance_m(place) > self._step_m:
+        if self._anchor is None or math.dist(self._anchor, place) > self._step_m:
             self._moved_s = -math.inf if self._anchor is None else now_s
             self._anchor = place
             self.region = None
@@ -83,7 +91,7 @@ class OwnMotion:
         return self._motion
 
 
-LINGERS = 1.0  # intervals: a node that has left is still announced for so long
+LINGERS: Final = 1.0  # intervals: a node that has left is still announced for so long
 
 
 class NodesBelow:
@@ -133,7 +141,7 @@ class NodesBelow:
             return NOT_LISTED
         self._announced &= below
         self._new = self._new & below | below - self._announced
-        turn = sorted(below, key=lambda node: (node - after - 1) % 256)
+        turn = _from(after + 1, below)
         new = sorted(self._new)[: max(0, most - 1)]
         listed = ids_that_fit(turn, most)
         if new and len(new) >= len(self._new.intersection(listed)):
@@ -156,20 +164,27 @@ class NodesBelow:
 
     def to_show(self, most: int) -> tuple[int, ...]:
         """The next part of the neighbours with whom the link will last, at most so many."""
-        neighbours, risk, after = self._routes.neighbours, self._routes.risk, self._shown_last + 1
+        routes, neighbours = self._routes, self._routes.neighbours
         shown: list[int] = []
-        for node in sorted(neighbours, key=lambda node: (node - after) % 256):
+        for node in _from(self._shown_last + 1, neighbours):
             if len(shown) >= most:
                 break
-            if neighbours[node].usable and not risk(neighbours[node]):
+            if neighbours[node].usable and not routes.risk(neighbours[node]):
                 shown.append(node)
                 self._shown_last = node
         return tuple(shown)
 
 
-GATEWAY_PLACE_EVERY = 4  # beacons: one of so many carries the gateway's place
-DIGEST_EVERY = 4  # beacons: one of so many carries the digest of the origin
-SEALED_ROOM = 20  # bytes of a beacon with a seal
+def _from(first: int, nodes: Iterable[int]) -> list[int]:
+    """The ids in circular order, from this one on."""
+    ids = sorted(nodes)
+    at = bisect.bisect_left(ids, first)
+    return ids[at:] + ids[:at]
+
+
+GATEWAY_PLACE_EVERY: Final = 4  # beacons: one of so many carries the gateway's place
+DIGEST_EVERY: Final = 4  # beacons: one of so many carries the digest of the origin
+SEALED_ROOM: Final = 20  # bytes of a beacon with a seal
 
 
 @dataclass(eq=False)
@@ -216,8 +231,9 @@ class OwnBeacons:
         room, turn = beacon.room_below(self.room), self._sent % 2 == 0
         if room < 0 or (is_sealed and turn and room < len(below.ids())):
             beacon = beacon._replace(motion=None)
-        beacon = beacon._replace(below=below.to_announce(beacon.room_below(self.room)))
-        beacon = beacon._replace(near=below.to_show(beacon.room_near(self.room)))
+        announced = below.to_announce(beacon.room_below(self.room))
+        near = below.to_show(beacon.room_near(self.room, announced))
+        beacon = beacon._replace(below=announced, near=near)
         if beacon.motion is not None:
             self._shown = routes.now_s, beacon.motion
         return beacon.to_body(self.room)
@@ -227,7 +243,7 @@ class OwnBeacons:
         if self._shown is None:
             return False
         shown_s, shown = self._shown
-        if shown.apart_m(self._routes.now_s - shown_s, motion, 0.0) <= self._step_m:
+        if apart_m(shown, self._routes.now_s - shown_s, motion, 0.0) <= self._step_m:
             return False
         self._shown = None
         return True
@@ -238,7 +254,7 @@ class OwnBeacons:
         if self._routes.is_root or place is None:
             return None
         every = GATEWAY_PLACE_EVERY
-        if told is None or told.distance_m(place) > self._step_m:
+        if told is None or math.dist(told, place) > self._step_m:
             every = 2 if self.room <= SEALED_ROOM else 1  # with a seal, instead of its own
         if self._sent % every:
             return None

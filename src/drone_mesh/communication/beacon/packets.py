@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import math
 import struct
-from typing import Iterable, NamedTuple, Sequence, Tuple
+from typing import Final, Iterable, NamedTuple, Sequence, Tuple
 
 from drone_mesh.communication.interfaces import MAX_NODE_ID, NO_ROUTE
 from drone_mesh.communication.wire.messages import HEADER_BYTES
@@ -13,16 +13,16 @@ from drone_mesh.drone.location import Location
 
 Velocity = Tuple[float, float, float]  # m/s: north, east, up, as in a Location
 
-ANCESTORS = 3  # beyond the parent; more do not fit, fewer leave loops among moving nodes
-SEQUENCE_NUMBERS = 256
-INTERVAL_S = 0.05  # unit of an interval
-_PLACE_M = 0.1  # unit of a place
+ANCESTORS: Final = 3  # beyond the parent; more do not fit, fewer leave loops among moving nodes
+SEQUENCE_NUMBERS: Final = 256
+INTERVAL_S: Final = 0.05  # unit of an interval
+_PLACE_M: Final = 0.1  # unit of a place
 _WRAP = 2**16
-_FASTEST_M_S = 50.0  # a velocity is coded by its square root, so slow ones are precise
+_FASTEST_M_S: Final = 50.0  # a velocity is coded by its square root, so slow ones are precise
 
 _END = b"\xff"  # of the new nodes below and of the neighbours, if they do not fill the packet
-_AS_BITS = 255  # no node's id; first in a list of nodes below: it consists of bits
-_BITS_AT = 2  # in such a list, behind the first id
+_AS_BITS: Final = 255  # no node's id; first in a list of nodes below: it consists of bits
+_BITS_AT: Final = 2  # in such a list, behind the first id
 _COUNT, _HAS_PLACE, _HAS_DIGEST, _HAS_GATEWAY_PLACE, _LOOKS = 0x0F, 0x10, 0x20, 0x40, 0x80
 _LONGEST, _OFFLINE = 0x7F, 0x80  # in the byte of the interval
 _PLACE = struct.Struct("<3H3b")
@@ -42,18 +42,21 @@ class Motion(NamedTuple):
     place: Location
     velocity: Velocity
 
-    def apart_m(self, seconds: float, other: Motion, others_s: float) -> float:
-        """From where it will be to where the other one will be, each in its own time."""
-        # Without objects for places: this is the most frequent question of all.
-        (a, b, c), (u, v, w) = self
-        (d, e, f), (x, y, z) = other
-        north = a + u * seconds - (d + x * others_s)
-        east = b + v * seconds - (e + y * others_s)
-        up = c + w * seconds - (f + z * others_s)
-        return math.sqrt(north * north + east * east + up * up)
+
+def apart_m(one: Motion, ones_s: float, other: Motion, others_s: float) -> float:
+    """From where one will be to where the other one will be, each in its own time."""
+    # Without objects for places, and no method of a tuple: the most frequent question of all.
+    a, b, c = one.place
+    d, e, f = other.place
+    u, v, w = one.velocity
+    x, y, z = other.velocity
+    north = a + u * ones_s - (d + x * others_s)
+    east = b + v * ones_s - (e + y * others_s)
+    up = c + w * ones_s - (f + z * others_s)
+    return math.sqrt(north * north + east * east + up * up)
 
 
-NO_LIST = 255
+NO_LIST: Final = 255
 
 
 class Below(NamedTuple):
@@ -161,9 +164,9 @@ class Beacon(NamedTuple):
         """How many of `room` bytes the nodes below may take; negative: the rest does not fit."""
         return min(_COUNT, self._room(room))
 
-    def room_near(self, room: int) -> int:
-        """How many neighbours fit behind the nodes below."""
-        return self._room(room) - len(self.below.list_bytes()) - len(self.below.new) - len(_END)
+    def room_near(self, room: int, below: Below) -> int:
+        """How many neighbours fit behind these nodes below."""
+        return self._room(room) - len(below.list_bytes()) - len(below.new) - len(_END)
 
     def _room(self, room: int) -> int:
         used = _HEAD.size + 1
@@ -266,7 +269,7 @@ class Found(NamedTuple):
         return cls(*_FOUND.unpack_from(body))
 
 
-NO_ANCESTORS = (NO_ROUTE,) * ANCESTORS
+NO_ANCESTORS: tuple[int, ...] = (NO_ROUTE,) * ANCESTORS
 
 
 def _units(place: Location) -> Units:

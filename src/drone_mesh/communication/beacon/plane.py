@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Final
 
 from drone_mesh.communication.beacon.connection import Connection, Proofs
 from drone_mesh.communication.beacon.courier import Courier, QueuedCourier
@@ -27,14 +28,14 @@ from drone_mesh.communication.timing import Due
 from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.packet_types import MessageType
 
-LOOK_S = 0.2  # links change that slowly
-BIDS_WITHIN_S = 3.0  # routers that lose one parent notice it within two intervals
-WITHOUT_BEACONS_S = 5.0  # 2.5 of the longest intervals, and more
-MOVED = 0.05  # of the range: a drone that is further from where it stood flies; from where the
+LOOK_S: Final = 0.2  # links change that slowly
+BIDS_WITHIN_S: Final = 3.0  # routers that lose one parent notice it within two intervals
+WITHOUT_BEACONS_S: Final = 5.0  # 2.5 of the longest intervals, and more
+MOVED: Final = 0.05  # of the range: a drone further from where it stood flies; from where the
 # others expect it, it has turned
-FLIES_M_S = 0.3  # faster than the place of a drone at rest drifts
-DEAF_AGAIN_S = 10.0  # a neighbour that does not hear this node is asked so often
-DRIVER_TRIES = 4  # per hop: more delay the packet, which another neighbour may take at once
+FLIES_M_S: Final = 0.3  # faster than the place of a drone at rest drifts
+DEAF_AGAIN_S: Final = 10.0  # a neighbour that does not hear this node is asked so often
+DRIVER_TRIES: Final = 4  # per hop: more delay the packet, which another neighbour may take at once
 
 
 class BeaconPlane(IControlPlane):
@@ -268,7 +269,7 @@ class BeaconPlane(IControlPlane):
         own, told = routes.motion, beacon.motion
         if self._frame.refuses(creator):
             beacon = beacon._replace(motion=None, gateway_place=None)
-        elif own and told and own.place.distance_m(told.place) > LUCKY * self._range_m:
+        elif own and told and math.dist(own.place, told.place) > LUCKY * self._range_m:
             reason = "a neighbour's place that is out of reach"
             self._complaints.add(reason, told.place.in_words(), now_s)
             beacon = beacon._replace(motion=None)

@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 from collections import Counter
 from dataclasses import dataclass
-from operator import attrgetter, itemgetter
-from typing import Callable, Iterator, NamedTuple, Tuple
+from operator import itemgetter
+from typing import Callable, Final, Iterator, NamedTuple, Tuple
 
 from drone_mesh.communication.beacon.disputes import Disputes
 from drone_mesh.communication.beacon.neighbour import WRONG, Losses, Neighbour
@@ -18,6 +18,7 @@ from drone_mesh.communication.beacon.packets import (
     NO_ANCESTORS,
     Beacon,
     Motion,
+    apart_m,
     newer,
 )
 from drone_mesh.communication.control.delivery import IRoutes
@@ -30,24 +31,23 @@ _WAY_UP = itemgetter(
     *map(Beacon._fields.index, ("gateway", "hops", "parent", "ancestors", "offline"))
 )
 
-_UNTIL_S = attrgetter("until_s")
-
-DUE = 1.2  # intervals, with their jitter: until then a neighbour's next beacon is not late
-BACK = 2  # sequence numbers: a new neighbour that is further behind the others may lead nowhere
-PROVEN_S = 12.0  # a router is connected for so long after its parent has heard it
-STALE = 5.0  # intervals: a neighbour whose number was not a new one for longer leads nowhere
-REACH = 0.97  # of the range: two nodes further apart are expected to lose each other
-NEEDS = 1.05  # of the range: a link that is longer is luck, and places are rounded
-LEAVES, GONE = 1.0, 3.0  # hops that a detour may cost around a link that will break, or should have
-ANOTHER_GATEWAY = 1.5  # hops that another gateway must be nearer
-UNPROVEN = 32.0  # hops: any gateway that proved to be one is nearer than one that did not
-TRIES = 4  # heartbeats in vain to one that did not, then another one gets its chance
-MOST_DOUBTS = 7  # times UNPROVEN, which is less than OFFLINE
-OFFLINE = 256.0  # hops: any gateway with internet is nearer than one without
-SEEN_S = 10.0  # an older place of a node does not tell the way to it
-NEAR = 2.0  # intervals: an older report that a neighbour hears a node shows no way to it
-SHOWN_S = 20.0  # beacons with little room show all neighbours of their sender within this time
-HINT_S = 3.0  # a packet that came from a node shows the way to it for this long
+DUE: Final = 1.2  # intervals, with their jitter: until then a neighbour's next beacon is not late
+BACK: Final = 2  # sequence numbers: a new neighbour further behind the others may lead nowhere
+PROVEN_S: Final = 12.0  # a router is connected for so long after its parent has heard it
+STALE: Final = 5.0  # intervals: a neighbour whose number was not a new one for longer leads nowhere
+REACH: Final = 0.97  # of the range: two nodes further apart are expected to lose each other
+NEEDS: Final = 1.05  # of the range: a link that is longer is luck, and places are rounded
+LEAVES: Final = 1.0  # hops that a detour may cost around a link that will break
+GONE: Final = 3.0  # or around one that should have
+ANOTHER_GATEWAY: Final = 1.5  # hops that another gateway must be nearer
+UNPROVEN: Final = 32.0  # hops: any gateway that proved to be one is nearer than one that did not
+TRIES: Final = 4  # heartbeats in vain to one that did not, then another one gets its chance
+MOST_DOUBTS: Final = 7  # times UNPROVEN, which is less than OFFLINE
+OFFLINE: Final = 256.0  # hops: any gateway with internet is nearer than one without
+SEEN_S: Final = 10.0  # an older place of a node does not tell the way to it
+NEAR: Final = 2.0  # intervals: an older report that a neighbour hears a node shows no way to it
+SHOWN_S: Final = 20.0  # beacons with little room show all neighbours of their sender in this time
+HINT_S: Final = 3.0  # a packet that came from a node shows the way to it for this long
 
 Rank = Tuple[float, bool, float, int]
 """Of a way up, the lowest is the best: cost in hops, not the present one, -heard_s, neighbour."""
@@ -259,7 +259,11 @@ class BeaconRoutes(IRoutes):
 
     def first_end_s(self) -> float:
         """When the first neighbour will have been silent for too long."""
-        return min(map(_UNTIL_S, self.neighbours.values()), default=math.inf)
+        first_s = math.inf
+        for neighbour in self.neighbours.values():
+            if neighbour.until_s < first_s:
+                first_s = neighbour.until_s
+        return first_s
 
     # The way up --------------------------------------------------------------------------------
 
@@ -344,7 +348,7 @@ class BeaconRoutes(IRoutes):
         return self.clock.now_s - at_s > STALE * self._slowest_s()
 
     def _slowest_s(self) -> float:
-        return max((n.beacon.interval_s for n in self._all()), default=0.0)
+        return max([n.beacon.interval_s for n in self._all()], default=0.0)
 
     def _rank(self, neighbour: Neighbour) -> Rank:
         """The lowest is the best way up: few hops over links that last; if equal, the present."""
@@ -369,7 +373,7 @@ class BeaconRoutes(IRoutes):
             return beacon.hops
         errs = neighbour.motion is None or neighbour.apart_m > WRONG * self._range_m
         from_ = self.motion if errs or neighbour.motion is None else neighbour.motion
-        needed = from_.place.distance_m(place) / (NEEDS * self._range_m)
+        needed = math.dist(from_.place, place) / (NEEDS * self._range_m)
         return max(beacon.hops, math.ceil(needed))
 
     def risk(self, neighbour: Neighbour) -> float:
@@ -378,10 +382,10 @@ class BeaconRoutes(IRoutes):
         if own is None or other is None or neighbour.apart_m > WRONG * self._range_m:
             return loss
         reach_m, age_s = REACH * self._range_m, self.clock.now_s - neighbour.reported_s
-        if own.apart_m(0.0, other, age_s) > reach_m:
+        if apart_m(own, 0.0, other, age_s) > reach_m:
             return max(loss, GONE)
         soon_s = neighbour.beacon.interval_s
-        leaves = own.apart_m(soon_s, other, age_s + soon_s) > reach_m
+        leaves = apart_m(own, soon_s, other, age_s + soon_s) > reach_m
         return max(loss, LEAVES) if leaves else loss
 
     def _all(self) -> list[Neighbour]:
@@ -468,12 +472,12 @@ class BeaconRoutes(IRoutes):
         if seen is None or self.motion is None or self.clock.now_s - seen.heard_s > SEEN_S:
             return []
         goal = seen.place
-        own_m = self.motion.place.distance_m(goal)
+        own_m = math.dist(self.motion.place, goal)
         nearer_ones = []
         for neighbour in self._all():
             motion = neighbour.motion
             if motion is not None and neighbour.usable and self.risk(neighbour) < GONE:
-                off_m = motion.place.distance_m(goal)
+                off_m = math.dist(motion.place, goal)
                 if off_m < own_m:
                     nearer_ones.append((off_m, Way(neighbour.node, neighbour.heard_s)))
         return [way for _off_m, way in sorted(nearer_ones)]

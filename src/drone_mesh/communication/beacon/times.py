@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import math
 import random
+from typing import Final
 
 from drone_mesh.communication.beacon.neighbour import Neighbour
 from drone_mesh.communication.beacon.packets import INTERVAL_S
 from drone_mesh.communication.beacon.routes import BeaconRoutes
 from drone_mesh.communication.timing import Medium
 
-HOPS_PER_BEACON = 400  # a beacon takes half a hop, and ten neighbours send as many
-LEAST_S = 0.5  # of an interval
-RARER = 1.3  # factor between one interval and the next
-AT_REST_S = 1.6  # a dead parent is noticed in 1.3 of it, and another one chosen
-JITTER = 0.2  # part of an interval by which a beacon may be early or late
-SOON_HOPS = 12  # an urgent beacon waits for up to so many hops, as others wait too
+HOPS_PER_BEACON: Final = 400  # a beacon takes half a hop, and ten neighbours send as many
+LEAST_S: Final = 0.5  # of an interval
+RARER: Final = 1.3  # factor between one interval and the next
+AT_REST_S: Final = 1.6  # a dead parent is noticed in 1.3 of it, and another one chosen
+JITTER: Final = 0.2  # part of an interval by which a beacon may be early or late
+SOON_HOPS: Final = 12  # an urgent beacon waits for up to so many hops, as others wait too
 
 
 class Trickle:
@@ -65,10 +66,10 @@ class Trickle:
             self.due_s = min(self.due_s, now_s + within_s * self._rng.random())
 
 
-LATE = 1.25  # intervals, with their jitter: then a beacon of the parent was lost, or it is dead
-LATE_S = 2.0  # one lost beacon of a frequent sender says little
-PROOF_S = 5.0  # for so long a parent that names its children in turn is not asked
-TURN_HOPS = 8  # for each neighbour: children ask one after the other, and the answer is for all
+LATE: Final = 1.25  # intervals, with jitter: then a beacon of the parent was lost, or it is dead
+LATE_S: Final = 2.0  # one lost beacon of a frequent sender says little
+PROOF_S: Final = 5.0  # for so long a parent that names its children in turn is not asked
+TURN_HOPS: Final = 8  # for each neighbour: children ask in turn, and the answer is for all
 
 
 class ParentWatch:

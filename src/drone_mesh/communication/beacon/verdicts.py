@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass
-from typing import Callable, Iterator
+from typing import Callable, Final, Iterator
 
 from drone_mesh.communication.beacon.courier import DROP, HOLD, Transit
 from drone_mesh.communication.beacon.packets import Search
@@ -15,13 +15,13 @@ from drone_mesh.communication.timing import Deadlines, Due
 from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.packet_types import MessageType
 
-AGAIN_S = 0.6  # broadcasts are not acknowledged
-MOST_HOPS = 12
-HOPS_AROUND = 2  # of a search by a relay, which was near the node a moment ago
-SAME_S = 5.0  # far longer than a search takes to pass through a mesh
-MOST_IN_VAIN = 5  # searches in a row for a node
-PAUSE_S = 10.0  # after them
-GAP_HOPS = 400  # between two searches; each takes time on the air for every node
+AGAIN_S: Final = 0.6  # broadcasts are not acknowledged
+MOST_HOPS: Final = 12
+HOPS_AROUND: Final = 2  # of a search by a relay, which was near the node a moment ago
+SAME_S: Final = 5.0  # far longer than a search takes to pass through a mesh
+MOST_IN_VAIN: Final = 5  # searches in a row for a node
+PAUSE_S: Final = 10.0  # after them
+GAP_HOPS: Final = 400  # between two searches; each takes time on the air for every node
 
 Broadcast = Callable[[int, int, bytes], None]
 
@@ -79,11 +79,11 @@ class Searches:
         return False
 
 
-HELD_S = 2.5  # a packet without a next hop waits this long
-RETRY_S = 0.15  # so often it asks again, beside each beacon that arrives
-MOST_WAYS = 3  # to which one node sends a packet down; after that it searches
-SEARCHES_S = 0.6  # a relay without a way searches for so long, then returns a packet
-SUSPECTED_S = 30.0  # an order is repeated within 16 s, a POLL within 30 s
+HELD_S: Final = 2.5  # a packet without a next hop waits this long
+RETRY_S: Final = 0.15  # so often it asks again, beside each beacon that arrives
+MOST_WAYS: Final = 3  # to which one node sends a packet down; after that it searches
+SEARCHES_S: Final = 0.6  # a relay without a way searches for so long, then returns a packet
+SUSPECTED_S: Final = 30.0  # an order is repeated within 16 s, a POLL within 30 s
 NOT_HELD = (MessageType.MOVEMENT_NEGOTIATION, MessageType.FOUND)  # soon sent again
 
 

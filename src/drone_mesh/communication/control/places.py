@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Final
 
 from drone_mesh.communication.control.delivery import IDelivery
 from drone_mesh.communication.control.pilot import Pilot
@@ -16,7 +17,7 @@ from drone_mesh.communication.timing import Deadlines
 from drone_mesh.communication.wire import messages
 from drone_mesh.drone.location import Location
 
-NO_FRAME = 0  # the digest of a node without an origin, or without support for origins
+NO_FRAME: Final = 0  # the digest of a node without an origin, or without support for origins
 
 
 class CommonFrame:
@@ -45,10 +46,10 @@ class CommonFrame:
         return from_ in self._digests and self.refuses(from_)
 
 
-UNKNOWN_HOPS = 10  # to the gateway, for a router that never was connected
-SAME_GATEWAY_M = 0.5  # places travel as float32, heights in whole metres
+UNKNOWN_HOPS: Final = 10  # to the gateway, for a router that never was connected
+SAME_GATEWAY_M: Final = 0.5  # places travel as float32, heights in whole metres
 # A node of 2019 does not say that a place is its goal; it is out of reach by then.
-WRONG_FOR_S = 30.0
+WRONG_FOR_S: Final = 30.0
 
 
 class KnownPlaces:
@@ -160,7 +161,7 @@ class Claims:
         return possible
 
 
-TOLD_M = 0.09  # so much the spots of other drones allow for (TakenPlaces)
+TOLD_M: Final = 0.09  # so much the spots of other drones allow for (TakenPlaces)
 
 
 @dataclass(eq=False)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import logging
 import math
+from typing import Final
 
 from drone_mesh.communication.timing import Throttle
 
-COMPLAINT_PERIOD_S = 30.0  # one line per reason and node in this time
-FOREIGN_FOR_S = 60.0  # a neighbour sends several packets in this time
-CHALLENGED_FOR_S = 10.0  # a neighbour with a key challenges one without every 2 s
+COMPLAINT_PERIOD_S: Final = 30.0  # one line per reason and node in this time
+FOREIGN_FOR_S: Final = 60.0  # a neighbour sends several packets in this time
+CHALLENGED_FOR_S: Final = 10.0  # a neighbour with a key challenges one without every 2 s
 
 _log = logging.getLogger(__name__)
 

@@ -129,13 +129,13 @@ class Whereabouts:
         """Packets that tell `to` which nodes, `but` these, were last heard near a goal."""
         me, now_s = self._node_id, self._deadlines.now_s
         near = sorted(
-            (heard.place.distance_m(goal), node, heard)
+            (heard.place.distance_m(goal), node, heard.place, heard.heard_s)
             for node, heard in self._control.neighbours.taken()
             if node not in but
         )
         return [
-            LastPlace(node, heard.place, now_s - heard.heard_s).packet(me, to)
-            for away_m, node, heard in near[:MOST_TOLD]
+            LastPlace(node, place, now_s - heard_s).packet(me, to)
+            for away_m, node, place, heard_s in near[:MOST_TOLD]
             if away_m < NEAR_CLEARANCES * self._clearance_m
         ]
 

@@ -13,7 +13,9 @@ import random
 from collections import defaultdict
 from pathlib import Path
 from statistics import fmean
-from typing import Callable, Hashable, NamedTuple
+from typing import Callable, Hashable
+
+from drone_mesh.compiled import mypyc_attr
 
 SENSITIVITY_DBM = {250_000: -94.0, 1_000_000: -85.0, 2_000_000: -82.0}  # at 0.1 % BER [DS 5.7]
 _FSPL_CONSTANT_DB = -27.55  # free space, metres and MHz (ITU-R P.525)
@@ -23,19 +25,31 @@ _ADDRESS_LOST_BER = 0.1  # with more wrong bits not even the address is recognis
 _SAME_POINT_DBM = 0.0  # the strongest specified input [DS 5.7]
 
 
-class Hop(NamedTuple):
-    """The path of one frame to one receiver."""
+class Hop:
+    """The path of one frame to one receiver.
 
-    sender: Hashable
-    receiver: Hashable
-    distance_m: float
-    power_dbm: float  # at the receiver
-    bits_per_s: int
-    bit_count: int
-    packet: object  # the same object for each attempt to send one packet; None: acknowledgement
-    start_ns: int = 0  # when the frame began
+    `power_dbm` is at the receiver; `packet` the same object for each attempt to send it, and None
+    for an acknowledgement; the frame began at `start_ns`.
+    """
+
+    def __init__(
+        self,
+        sender: Hashable,
+        receiver: Hashable,
+        distance_m: float,
+        power_dbm: float,
+        bits_per_s: int,
+        bit_count: int,
+        packet: object,
+        start_ns: int = 0,
+    ) -> None:
+        self.sender, self.receiver = sender, receiver
+        self.distance_m, self.power_dbm = distance_m, power_dbm
+        self.bits_per_s, self.bit_count = bits_per_s, bit_count
+        self.packet, self.start_ns = packet, start_ns
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class LinkModel(abc.ABC):
     """The effect of the space between two antennas on frames."""
 
@@ -63,6 +77,7 @@ def free_space_dbm(distance_m: float, tx_dbm: float, carrier_mhz: int) -> float:
     return min(tx_dbm - loss_db, _SAME_POINT_DBM)
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class IdealDisc(LinkModel):
     """All frames arrive within the range, none beyond it."""
 

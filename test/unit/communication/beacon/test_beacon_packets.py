@@ -38,7 +38,7 @@ def test_a_beacon_has_these_bytes():
 
 def test_neighbours_stand_behind_the_nodes_below():
     shows = ROUTER._replace(near=(3, 14))
-    assert shows.room_near(27) == 3
+    assert shows.room_near(27, shows.below) == 3
     body = bytes.fromhex(FULL[:-8] + "03 0e ff")
     assert shows.to_body(27) == body
     assert Beacon.from_body(body, HERE).near == (3, 14)
@@ -102,7 +102,7 @@ def test_many_nodes_below_stand_as_the_first_id_and_a_bit_for_each():
     body = bytes.fromhex(FULL[: 18 * 3] + "05 ff 06 2d 00 c0 0c ff ff")
     body = bytes((body[0] + 2, *body[1:]))
     assert crowd.to_body(27) == body
-    assert crowd.room_near(27) == 1
+    assert crowd.room_near(27, crowd.below) == 1
     assert Beacon.from_body(body, HERE).below == crowd.below
 
 
