@@ -92,8 +92,11 @@ class Relief:
                 self._homing.pop(node.id, None)
         for post in list(self._posts):
             self._watch_holder(post, look)
+        busy = {*self._homing, *(post.holder for post in self._posts)}
+        busy.update(post.turn.new for post in self._posts if post.turn is not None)
         for node in nodes:
-            self._settle(node, look)
+            if node.id not in busy:
+                self._settle(node, look)
         self._fence = rules.fence
         for post in self._posts:
             if post.turn is not None:
@@ -133,14 +136,10 @@ class Relief:
 
     def _settle(self, node: NodeStatus, look: _Look) -> None:
         """Who hovers holds a post; who was silent does if its post is free, or goes home."""
-        is_ours = any(leads_to(node, post.places) for post in self._posts)
-        if not is_in_air(node) or (len(node.path) and not is_ours):
+        moves = len(node.path) > 0 or not is_in_air(node)
+        if moves and not any(leads_to(node, post.places) for post in self._posts):
             self._silent.discard(node.id)
-        turns = [post.turn.new for post in self._posts if post.turn is not None]
-        if node.id in [*self._homing, *turns, *(post.holder for post in self._posts)]:
-            return
-        is_able = node.on and not node.crashed and not len(node.heading)
-        if not is_able or not is_in_air(node) or len(node.path):
+        if moves or not node.on or node.crashed or len(node.heading):
             return
         free = [p for p in self._posts if p.holder is None and is_at(node, *p.places)]
         if not free and node.id not in self._silent:
