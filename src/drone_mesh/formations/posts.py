@@ -14,6 +14,7 @@ from drone_mesh.formations.reserves import place_of
 from drone_mesh.state.model import NodeStatus
 
 BESIDE_M = 1.5  # between the two places of a post: the clearance, and what physics moves a drone
+NEAR_M = 2.0  # of a free post: who comes to rest there holds it; a repair ends beside the place
 _MOST_PLACES = 255  # of posts, in an Airspace
 _WAYS = 8  # directions in which the place beside is searched
 

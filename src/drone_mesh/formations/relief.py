@@ -15,9 +15,9 @@ from drone_mesh.drone.fence import Fence
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
 from drone_mesh.formations.departures import FlightRules
-from drone_mesh.formations.posts import Post, Turn, Ways, is_at, leads_to
+from drone_mesh.formations.posts import NEAR_M, Post, Turn, Ways, is_at, leads_to
 from drone_mesh.formations.relief_policies import IReliefPolicy, ReliefView
-from drone_mesh.formations.reserves import Reserves, is_in_air, is_low, place_of
+from drone_mesh.formations.reserves import Reserves, is_in_air, is_low, place_of, repairs
 from drone_mesh.formations.standing_orders import StandingOrders
 from drone_mesh.state.model import MeshStatus, NodeStatus, position_is_known
 
@@ -112,7 +112,10 @@ class Relief:
     # What the drones do ----------------------------------------------------------------------
 
     def _watch_holder(self, post: Post, look: _Look) -> None:
-        """Whether it is still there; who was sent elsewhere takes its post along."""
+        """Whether it is still there; who was sent elsewhere takes its post along.
+
+        Who flies for a repair leaves it behind: another drone's place is what it flies to.
+        """
         if post.holder is None:
             return
         node = look.known.get(post.holder)
@@ -123,7 +126,7 @@ class Relief:
         ):
             post.heard_s = look.mesh.stamp_s
         is_mute = post.heard_s is not None and look.mesh.stamp_s - post.heard_s > SILENT_S
-        is_lost = node is None or not node.on or node.crashed or is_mute
+        is_lost = node is None or not node.on or node.crashed or is_mute or repairs(node)
         if node is None or is_lost or (is_low(node) and not is_there):
             self._silent.add(post.holder)
             post.holder = post.heard_s = None
@@ -141,7 +144,7 @@ class Relief:
             self._silent.discard(node.id)
         if moves or not node.on or node.crashed or len(node.heading):
             return
-        free = [p for p in self._posts if p.holder is None and is_at(node, *p.places)]
+        free = [p for p in self._posts if p.holder is None and leads_to(node, p.places, NEAR_M)]
         if not free and node.id not in self._silent:
             self._posts.append(Post(self._places_at(node, look), node.id))
         elif node.connected:
@@ -273,13 +276,18 @@ class Relief:
 
     def saved(self) -> dict[str, Any]:
         """Its posts and reliefs, as plain values that `restore` reads."""
-        posts, homing = list(map(asdict, self._posts)), list(self._homing.items())
-        return {"posts": posts, "homing": homing, "silent": sorted(self._silent)}
+        return {
+            "posts": list(map(asdict, self._posts)),
+            "homing": list(self._homing.items()),
+            "silent": sorted(self._silent),
+            "homes": list(self._reserves.homes.items()),
+        }
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """Go on with what `saved` returned. Raises KeyError, TypeError or ValueError."""
         posts = [Post.restored(post) for post in saved["posts"]]
         self._homing = {int(drone): number for drone, number in saved["homing"]}
+        self._reserves.homes.update({int(n): Location(*home) for n, home in saved["homes"]})
         self._posts, self._silent = posts, set(saved["silent"])
 
 

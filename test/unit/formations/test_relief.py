@@ -231,7 +231,6 @@ def test_a_restart_amid_a_relief_makes_no_second_post():
     mesh.orders, mesh.relief = StandingOrders(), Relief(relief_policy("spare_first"))
     mesh.orders.restore(left[0])
     mesh.relief.restore(left[1])
-    mesh.spare.home, mesh.holder.home = HOME.to_vector(), OTHER.to_vector()
     assert fly(mesh, mesh.spare, place) == {}
     assert mesh.sent(6) == {1: OTHER}
     mesh.holder.position, mesh.holder.battery = OTHER.to_vector(), 100.0
@@ -414,3 +413,20 @@ def test_a_neighbour_that_falls_silent_before_it_sets_out_for_another_post_goes_
     mesh.sent(8)
     mesh.spare.on = mesh.spare.connected = True
     assert mesh.sent(2)[2] == HOME
+
+
+def test_who_flies_for_a_repair_leaves_its_post_behind_and_holds_that_of_the_lost_one():
+    mesh = Mesh()
+    lost = NodeStatus(3, connected=True, position=(6.0, 6.0, 4.0), battery=90.0)
+    mesh.others, mesh.spare.battery = [lost], 50.0
+    mesh.sent()
+    lost.on = lost.connected = False
+    mesh.holder.repair_state, mesh.holder.path = 5, (6.0, 7.6, 4.0)
+    mesh.sent(2)
+    mesh.holder.position, mesh.holder.path = (6.0, 7.6, 4.0), ()
+    mesh.holder.repair_state, mesh.spare.battery = 0, 100.0
+    ((drone, place),) = mesh.sent(3).items()
+    assert (drone, place.distance_m(POST) < 1.6) == (2, True)
+    mesh.spare.position = place.to_vector()
+    assert mesh.sent(7) == {}
+    assert mesh.posts().keys() == {1, 2}
