@@ -98,12 +98,12 @@ class Relief:
             if node.id not in busy:
                 self._settle(node, look)
         self._fence = rules.fence
-        for post in self._posts:
+        for post in list(self._posts):
             if post.turn is not None:
                 self._go_on(post, post.turn, look)
             holder = known.get(-1 if post.holder is None else post.holder)
             if holder is not None and self._must_go(holder):
-                post.holder = None  # it cannot wait for another one
+                self._leave(post)  # it cannot wait for another one
                 self._send_home(holder.id, look)
         while sum(post.turn is not None for post in self._posts) < MOST_AT_ONCE:
             if not self._begin(look):
@@ -129,7 +129,7 @@ class Relief:
         is_lost = node is None or not node.on or node.crashed or is_mute or repairs(node)
         if node is None or is_lost or (is_low(node) and not is_there):
             self._silent.add(post.holder)
-            post.holder = post.heard_s = None
+            self._leave(post)
         elif not is_there or not is_in_air(node):
             self._call_back(post, look)
             if not flies:
@@ -221,7 +221,7 @@ class Relief:
         if pair is None or to is None:
             return False
         if pair.new in held:
-            held[pair.new].holder = None
+            self._leave(held[pair.new])
         self._send(held[pair.old], pair.new, to, look)
         return True
 
@@ -253,10 +253,18 @@ class Relief:
                     self.reliefs += 1
                     self._send_home(old, look)
 
+    def _leave(self, post: Post) -> None:
+        """Nobody holds it (yet). Which is free for the longest comes first."""
+        post.holder = post.heard_s = None
+        self._posts.remove(post)
+        self._posts.append(post)
+
     def _end(self, post: Post, look: _Look) -> None:
         if post.turn is not None:
             look.orders.end(post.turn.number)
             post.turn = None
+        if post.holder is None:
+            self._leave(post)
 
     def _call_back(self, post: Post, look: _Look) -> None:
         """Nobody has to come to this post."""

@@ -430,3 +430,16 @@ def test_who_flies_for_a_repair_leaves_its_post_behind_and_holds_that_of_the_los
     mesh.spare.position = place.to_vector()
     assert mesh.sent(7) == {}
     assert mesh.posts().keys() == {1, 2}
+
+
+def test_of_two_free_posts_the_one_that_has_been_free_for_longer_is_filled_first():
+    mesh = Mesh()
+    second = NodeStatus(3, connected=True, position=(6.0, 6.0, 4.0), battery=90.0)
+    mesh.others, mesh.spare.battery = [second], 50.0
+    mesh.sent()
+    for node in (second, mesh.holder):
+        node.on = node.connected = False
+        mesh.sent()
+    mesh.spare.battery = 100.0
+    ((drone, place),) = mesh.sent().items()
+    assert (drone, place.distance_m(Location(6.0, 6.0, 4.0)) < 1.6) == (2, True)
