@@ -100,6 +100,7 @@ class ConsoleProcess:
 
 
 MOVING = {"reduced_motion": "no-preference"}  # of a visit: packets are drawn, 30 times a second
+FIRST_PAUSE_MS, LONGEST_PAUSE_MS = 20.0, 200.0  # between looks, each of which costs milliseconds
 WAIT_WITHIN_S = 30.0  # for as long as the page itself waits for the answer to an order
 HANGS_AFTER_S = 600  # a test of many waits, each of which may be long on a busy machine
 expect.set_options(timeout=1000 * WAIT_WITHIN_S)
@@ -224,13 +225,14 @@ class Visit:
     def wait_for(
         self, what: str, condition: Callable[[], bool], within_s: float = WAIT_WITHIN_S
     ) -> None:
-        deadline_s = time.monotonic() + within_s
+        deadline_s, pause_ms = time.monotonic() + within_s, FIRST_PAUSE_MS
         while not condition():
             assert time.monotonic() < deadline_s, (
                 f"timed out: {what}, waited {within_s:g} s; {self.page.url} shows "
                 f"{[self.page.inner_text(part) for part in ('#clock', '#time-now', '#toasts')]}"
             )
-            self.page.wait_for_timeout(50)
+            self.page.wait_for_timeout(pause_ms)
+            pause_ms = min(1.25 * pause_ms, LONGEST_PAUSE_MS)
 
     def answer_held(self, button: str) -> None:
         """Click this button, or press this key, as soon as an order is held."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pytest
-from conftest import Visit
 
 APPLY = """async (events) => {
   const { EventLog } = await import("/static/log.js");
@@ -23,9 +22,8 @@ APPLY = """async (events) => {
 
 
 @pytest.fixture
-def log(start_console, visit):
-    page: Visit = visit(start_console().url)
-    return lambda *events: page.page.evaluate(APPLY, events)
+def log(shared_page):
+    return lambda *events: shared_page.page.evaluate(APPLY, events)
 
 
 def test_nothing_joins_a_sentence_from_before_the_opposite_happened(log):
