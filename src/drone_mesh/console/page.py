@@ -95,7 +95,7 @@ class Page:
         self.socket = socket
         self.watching: int | None = None  # the node whose neighbours it shows
         self.packets = PacketDots()
-        self.orders: set[asyncio.Task[None]] = set()
+        self.waiting: set[asyncio.Task[None]] = set()  # orders and questions without an answer yet
         self._live, self._history, self._is_live = live, history, is_live
         self._player = None if is_live else Player(history, history.times[0], live.origin)
         self._version = 0  # of what the page has

@@ -318,33 +318,45 @@ class ConsoleServer:
                 raise OrderRefused(
                     f"sent {late_s:.0f} s after the page last heard the console: not carried out"
                 )
-        about: Mapping[str, object] = {}
-        if isinstance(request, ReadPlaces):
-            content = await self._in_worker(request.content, self._store.origin)
-            text, about = "a layout", content._asdict()
-        elif isinstance(request, PreviewLayout):
-            found = await self._in_worker(self._controls.preview, request.case)
-            text = found.in_words()
-            about = {"preview": dataclasses.asdict(found), "lost": found.out_of_reach}
-        elif isinstance(request, Foresee):
-            mesh = self._store.mesh
-            lost = await self._in_worker(request.lost_routes, mesh) if mesh else LostRoutes()
-            text, about = lost.in_words(), {"lost": [*lost.there, *lost.cut_off]}
-        elif isinstance(request, Acknowledge):
+        if isinstance(request, Acknowledge):
             text = f"acknowledged {self._store.acknowledge(request.text)}"
         elif isinstance(request, Demonstrate):
             if request.plan:
                 text = self._stage.plan()
             else:
                 text = self._stage.begin() if request.on else self._stage.end()
-        elif len(page.orders) >= MOST_ORDERS_WAITING:
+        elif len(page.waiting) >= MOST_ORDERS_WAITING:
             raise OrderRefused("too many orders at once")
         else:
-            task = asyncio.ensure_future(self._carry_out(page, request))
-            page.orders.add(task)
-            task.add_done_callback(page.orders.discard)
+            # What is computed for one request makes the page's next order no later.
+            task = asyncio.ensure_future(
+                self._carry_out(page, request)
+                if isinstance(request, PageOrder)
+                else self._reply(page, request)
+            )
+            page.waiting.add(task)
+            task.add_done_callback(page.waiting.discard)
             return
-        await self._answer(page, request.number, True, text, about)
+        await self._answer(page, request.number, True, text)
+
+    async def _reply(self, page: Page, question: ReadPlaces | PreviewLayout | Foresee) -> None:
+        about: Mapping[str, object]
+        try:
+            if isinstance(question, ReadPlaces):
+                content = await self._in_worker(question.content, self._store.origin)
+                text, about = "a layout", content._asdict()
+            elif isinstance(question, PreviewLayout):
+                found = await self._in_worker(self._controls.preview, question.case)
+                text = found.in_words()
+                about = {"preview": dataclasses.asdict(found), "lost": found.out_of_reach}
+            else:
+                mesh = self._store.mesh
+                lost = await self._in_worker(question.lost_routes, mesh) if mesh else LostRoutes()
+                text, about = lost.in_words(), {"lost": [*lost.there, *lost.cut_off]}
+        except OrderRefused as error:
+            await self._answer(page, question.number, False, str(error))
+        else:
+            await self._answer(page, question.number, True, text, about)
 
     async def _carry_out(self, page: Page, order: PageOrder) -> None:
         # Before it is carried out: its first event may come before its answer.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import threading
 from typing import Any, Awaitable, Callable
 
 import pytest
@@ -238,6 +239,27 @@ def test_orders_are_answered_by_their_numbers():
         assert (answers[4]["done"], answers[4]["text"]) == (True, "3 False")
         assert (answers[5]["done"], answers[5]["text"]) == (False, "no case 9")
         assert not answers[6]["done"]
+
+    run(scenario)
+
+
+def test_an_order_is_not_late_because_the_console_computed_an_answer_before_it(monkeypatch):
+    ordered = threading.Event()
+
+    def preview(_controls: PromptControls, _case: int) -> FormationPreview:
+        assert ordered.wait(LIMIT_S)
+        return FormationPreview(9.0, [14], [], {}, 0.82)
+
+    monkeypatch.setattr(PromptControls, "preview", preview)
+
+    async def scenario(server: ConsoleServer, _store: FrameStore) -> None:
+        page = FakePage(server).open()
+        page.say(do="preview", number=1, case=0)
+        page.say(do="power", number=2, node=3, on=False)
+        await until("the order's answer", lambda: page.of_type("answer"))
+        ordered.set()
+        await until("both answers", lambda: len(page.of_type("answer")) == 2)
+        assert [answer["number"] for answer in page.of_type("answer")] == [2, 1]
 
     run(scenario)
 
