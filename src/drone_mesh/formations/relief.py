@@ -7,6 +7,7 @@ standing orders: Departures lets drones set out one after the other, clear of ea
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import asdict
 from typing import Any, Mapping, NamedTuple
 
@@ -43,9 +44,6 @@ class _Look(NamedTuple):
     known: Mapping[int, NodeStatus]  # those whose places are known
     orders: StandingOrders
     rules: FlightRules
-
-    def ways(self, posts: list[Post]) -> Ways:
-        return Ways(posts, self.known.values(), self.rules)
 
 
 class Relief:
@@ -162,7 +160,10 @@ class Relief:
 
     def _places_at(self, node: NodeStatus, look: _Look) -> list[Location]:
         home = self._reserves.homes.get(node.id)
-        return look.ways(self._posts).places_at(node, home, look.mesh.max_distance)
+        return self._ways(look).places_at(node, home, look.mesh.max_distance)
+
+    def _ways(self, look: _Look) -> Ways:
+        return Ways(self._posts, look.known.values(), look.rules)
 
     def _must_go(self, node: NodeStatus) -> bool:
         can_go = node.id in self._reserves.homes and node.on and not len(node.path)
@@ -183,28 +184,24 @@ class Relief:
 
     def _begin(self, look: _Look) -> bool:
         """Begin the next relief; returns whether there was one to begin."""
-        known, homes, ways = look.known, self._reserves.homes, look.ways(self._posts)
+        known, homes, ways = look.known, self._reserves.homes, self._ways(look)
         held = {p.holder: p for p in self._posts if p.holder is not None}
         busy = {*self._homing, *(post.turn.new for post in self._posts if post.turn is not None)}
         spares = sorted(homes.keys() & known.keys() - held.keys())
         ready = [d for d in spares if d not in busy and self._is_ready(known[d], look)]
 
-        for post in self._posts:
-            if post.holder is None and post.turn is None:
-                for new in ready:
-                    to = ways.to(homes[new], post)
-                    if to is not None:
-                        self._send(post, new, to, look)
-                        return True
+        free = [post for post in self._posts if post.holder is None and post.turn is None]
+        for post, new in itertools.product(free, ready):
+            to = ways.to(homes[new], post)
+            if to is not None:
+                self._send(post, new, to, look)
+                return True
 
         at_rest = [d for d in held.keys() & known.keys() if not len(known[d].path)]
-        flights_s = [self._reserves.flight_s(d, place_of(known[d])) for d in at_rest]
-        waits_s = {d: WAIT_S + CARRIES_S + flight_s for d, flight_s in zip(at_rest, flights_s)}
-        left_s = {
-            d: self._reserves.left_s(known[d]) - wait_s
-            for d, wait_s in waits_s.items()
-            if held[d].turn is None and d not in busy
-        }
+        waits_s = {d: self._reserves.flight_s(d, place_of(known[d])) for d in at_rest}
+        waits_s = {d: WAIT_S + CARRIES_S + flight_s for d, flight_s in waits_s.items()}
+        due = [d for d in at_rest if held[d].turn is None]
+        left_s = {d: self._reserves.left_s(known[d]) - waits_s[d] for d in due}
         cycle_s = 2.0 * sum(waits_s.values()) / max(1, len(waits_s)) + self._rules.swap_s
         view = ReliefView(
             left_s=dict(sorted(left_s.items(), key=lambda item: (item[1], item[0]))),
