@@ -64,6 +64,7 @@ class Relief:
         self._posts: list[Post] = []
         self._homing: dict[int, int | None] = {}  # ordered home, by which order
         self._silent: set[int] = set()  # they fell silent at a post, or on the way to one
+        self._away: set[int] = set()  # a repair took them where they are
         self._fence = Fence()
         self.is_active = policy is not None
         self.reliefs = 0  # drones that left when another one carried their traffic
@@ -126,7 +127,8 @@ class Relief:
         is_mute = post.heard_s is not None and look.mesh.stamp_s - post.heard_s > SILENT_S
         is_lost = node is None or not node.on or node.crashed or is_mute or repairs(node)
         if node is None or is_lost or (is_low(node) and not is_there):
-            self._silent.add(post.holder)
+            if node is None or not repairs(node):
+                self._silent.add(post.holder)
             self._leave(post)
         elif not is_there or not is_in_air(node):
             self._call_back(post, look)
@@ -136,21 +138,32 @@ class Relief:
             post.places = self._places_at(node, look)
 
     def _settle(self, node: NodeStatus, look: _Look) -> None:
-        """Who hovers holds a post; who was silent does if its post is free, or goes home."""
+        """Who hovers holds a post; who was silent does if its post is free, or goes home.
+
+        So does who flew for a repair, but it goes home only when all posts are held.
+        """
         moves = len(node.path) > 0 or not is_in_air(node)
-        if moves and not any(leads_to(node, post.places) for post in self._posts):
+        if repairs(node):
+            self._away.add(node.id)
+        elif moves and not any(leads_to(node, post.places) for post in self._posts):
             self._silent.discard(node.id)
+            self._away.discard(node.id)
         if moves or not node.on or node.crashed or len(node.heading):
             return
         free = [p for p in self._posts if p.holder is None and leads_to(node, p.places, NEAR_M)]
-        if not free and node.id not in self._silent:
+        is_silent = node.id in self._silent - self._away
+        if not free and node.id not in self._silent | self._away:
             self._posts.append(Post(self._places_at(node, look), node.id))
-        elif node.connected:
-            self._silent.discard(node.id)
-            if free:
-                free[0].holder = node.id
-            else:
-                self._send_home(node.id, look)
+        elif not node.connected:
+            return
+        elif free:
+            free[0].holder = node.id
+        elif is_silent or self._must_go(node) or all(p.holder is not None for p in self._posts):
+            self._send_home(node.id, look)
+        else:
+            return
+        self._silent.discard(node.id)
+        self._away.discard(node.id)
 
     def _is_in_reach(self, node: NodeStatus, look: _Look) -> bool:
         """Whether somebody who is connected could hear it."""
@@ -285,6 +298,7 @@ class Relief:
             "posts": list(map(asdict, self._posts)),
             "homing": list(self._homing.items()),
             "silent": sorted(self._silent),
+            "away": sorted(self._away),
             "homes": list(self._reserves.homes.items()),
         }
 
@@ -293,7 +307,7 @@ class Relief:
         posts = [Post.restored(post) for post in saved["posts"]]
         self._homing = {int(drone): number for drone, number in saved["homing"]}
         self._reserves.homes.update({int(n): Location(*home) for n, home in saved["homes"]})
-        self._posts, self._silent = posts, set(saved["silent"])
+        self._posts, self._silent, self._away = posts, set(saved["silent"]), set(saved["away"])
 
 
 def _is_off(node: NodeStatus, to: Location, number: int | None, orders: StandingOrders) -> bool:

@@ -443,3 +443,21 @@ def test_of_two_free_posts_the_one_that_has_been_free_for_longer_is_filled_first
     mesh.spare.battery = 100.0
     ((drone, place),) = mesh.sent().items()
     assert (drone, place.distance_m(Location(6.0, 6.0, 4.0)) < 1.6) == (2, True)
+
+
+def test_who_ends_a_repair_away_from_all_posts_goes_home_when_they_are_held_and_holds_none():
+    mesh = Mesh()
+    mesh.spare.battery = 50.0
+    mesh.sent(2)
+    mesh.holder.repair_state, mesh.holder.path = 5, (6.0, 9.0, 4.0)
+    mesh.sent(2)
+    mesh.holder.position, mesh.holder.path = (6.0, 9.0, 4.0), ()
+    mesh.holder.repair_state = 0
+    assert mesh.sent(3) == {}
+    assert list(mesh.posts()) == [None]
+    mesh.spare.battery = 100.0
+    ((drone, place),) = mesh.sent(3).items()
+    assert (drone, place.distance_m(POST) < 1.6) == (2, True)
+    mesh.spare.position = place.to_vector()
+    assert mesh.sent(8) == {1: OTHER}
+    assert list(mesh.posts()) == [2]
