@@ -104,6 +104,7 @@ class Neighbours:
         self.places: dict[int, HeardPlace] = {}  # reported, by node; changes only here
         self._goals_s: dict[int, float] = {}  # when those in flight told their goal, their place
         self._rested_m: dict[int, float] = {}  # how high each was when it was seen at rest last
+        self._left: dict[int, Location | None] = {}  # where each was before its latest flight
         self._seen: dict[int, HeardPlace] = {}  # where these were seen since, perhaps for good
         self.silent = False  # all neighbours (2 or more) fell silent together; none heard since
 
@@ -223,10 +224,12 @@ class Neighbours:
         """
         known = self.places.get(node)
         if known is None or heard_s >= known.heard_s:
-            self._goals_s.pop(node, None)
+            stood = self._goals_s.pop(node, None) is None
             self._seen.pop(node, None)
             if is_goal:
                 self._goals_s[node] = heard_s
+                if stood:
+                    self._left[node] = None if known is None else known.place
             self.places[node] = HeardPlace(place, heard_s)
             if known is None or known.place != place:  # most nodes stand
                 self.motion.reported(node, place, heard_s)
@@ -252,6 +255,12 @@ class Neighbours:
     def place_of(self, node: int) -> HeardPlace | None:
         """The last reported place of `node`."""
         return self.places.get(node)
+
+    def under_way(self, now_s: float) -> Iterator[tuple[int, Location | None, Location]]:
+        """Who told its goal a moment ago, from where it flies (None: unknown), and to where."""
+        for node, told_s in self._goals_s.items():
+            if now_s - told_s < FLIGHT_S:
+                yield node, self._left[node], self.places[node].place
 
     def taken(self) -> Iterator[tuple[int, HeardPlace]]:
         """Where each node may be: its reported place, and where it was seen on the way there."""

@@ -18,6 +18,7 @@ GRAVITY_M_S2 = 9.81
 LAND_AT_PERCENT = 20.0  # it comes down while it still can
 READY_PERCENT = 95.0  # a crew leaves a fuller battery in the drone
 FLAT = 0.0
+LEAST_USE_PERCENT = 2.0  # less says nothing: autopilots report whole percents
 
 _LIFT = 2.8037 + 0.3177  # W/N^1.5: c1 and c2, induced and profile power
 _DRAG = 0.0296  # N/(m/s)^2: c4, parasitic drag
@@ -85,6 +86,23 @@ class Battery:
     def swap(self) -> None:
         """Put in a full battery."""
         self._left_j = self._full_j
+
+
+class BatteryUse:
+    """How fast a drone empties its battery, by the figures that it shows."""
+
+    def __init__(self) -> None:
+        self._since = (-math.inf, 0.0)  # percent, and when
+        self.per_s = self._in_hover = 100.0 / PowerModel.hover_s  # percent; at least this
+
+    def note(self, percent: float, now_s: float) -> None:
+        """It shows this charge; what counts is how long the last LEAST_USE_PERCENT took."""
+        before, since_s = self._since
+        if percent > before:  # it has another battery
+            self._since = percent, now_s
+        elif before - percent >= LEAST_USE_PERCENT and now_s > since_s:
+            self._since = percent, now_s
+            self.per_s = max(self._in_hover, (before - percent) / (now_s - since_s))
 
 
 class Crews:

@@ -32,6 +32,21 @@ def nearest_share(start: Sequence[float], end: Sequence[float]) -> float:
     return min(1.0, max(0.0, -sum(a * step for a, step in zip(start, way)) / length_2))
 
 
+def ground_apart_m(a: Point, b: Point, c: Point, d: Point) -> float:
+    """How near the straight ways from a to b and from c to d come to each other over ground."""
+
+    def side(p: Point, q: Point, r: Point) -> float:
+        return (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
+
+    def away_m(p: Point, q: Point, r: Point) -> float:
+        start, end = (q[0] - p[0], q[1] - p[1], 0.0), (r[0] - p[0], r[1] - p[1], 0.0)
+        return math.hypot(*between(start, end, nearest_share(start, end)))
+
+    if side(a, b, c) * side(a, b, d) < 0 and side(c, d, a) * side(c, d, b) < 0:
+        return 0.0
+    return min(away_m(a, c, d), away_m(b, c, d), away_m(c, a, b), away_m(d, a, b))
+
+
 @dataclass(frozen=True)
 class FlightPath:
     """One flight in straight lines: up, across, down.

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import abc
 
+from drone_mesh.drone.battery import LAND_AT_PERCENT
 from drone_mesh.drone.fence import Fence
 from drone_mesh.drone.flight_path import FlightPath, Vector
 from drone_mesh.drone.location import Location
+
+ON_GROUND_M = 0.3
 
 
 class IDroneEngine(abc.ABC):
@@ -58,12 +61,32 @@ class IDroneEngine(abc.ABC):
         """The charge of its battery, 0..100; None: unknown."""
         return None
 
+    least_percent = LAND_AT_PERCENT
+    """Of its battery; with less it flies to no goal."""
+
+    def home(self) -> Location | None:
+        """Where it belongs on the ground; None: where its node has seen it first."""
+        return None
+
+    def seconds_between(self, start: Location, goal: Location) -> float:
+        """How long a flight takes, about; if there is no way, how long a straight one would."""
+        ends = start.to_vector(), goal.to_vector(), 0.0
+        return (self.plan(*ends) or FlightPath(*ends)).duration_s
+
+    def on_ground(self, here: Location) -> bool:
+        """Whether it stands on the ground, if it is here."""
+        return here.height <= ON_GROUND_M
+
     def step_back_to(self, latitude: float, longitude: float, height: float) -> None:
         """Fly to the position of another node, to repair the mesh; otherwise like `set_goal`.
 
         An engine overrides this if its repairs end differently from ordered flights, for example
         hovering instead of landing.
         """
+        self.set_goal(latitude, longitude, height)
+
+    def land_at(self, latitude: float, longitude: float, height: float) -> None:
+        """Fly there and land, because the mesh is lost. Who may forbid repairs forbids this."""
         self.set_goal(latitude, longitude, height)
 
     def plan(self, start: Vector, goal: Vector, now_s: float) -> FlightPath | None:

@@ -40,7 +40,7 @@ class InProcessDrone(IDroneEngine):
         self.fence = fence
         self._why_not_fly = why_not_fly
         self._clock = clock
-        self._place = start
+        self._place = self.home_place = start
         self.path: FlightPath | None = None  # of the current flight; None while at rest
         self._on_flight = on_flight
         self.under_pilot = False  # until an order ends the pilot's flight
@@ -124,6 +124,9 @@ class InProcessDrone(IDroneEngine):
     def battery_percent(self) -> float | None:
         return None if self.battery is None else self.battery.percent
 
+    def home(self) -> Location:
+        return self.home_place
+
     def get_location(self) -> Location:
         """Its position now. Never raises."""
         if self.path is None:
@@ -180,6 +183,9 @@ class PositionReceiver(IDroneEngine):
 
     def battery_percent(self) -> float | None:
         return self._drone.battery_percent()
+
+    def home(self) -> Location:
+        return self._drone.home()
 
     def get_location(self) -> Location:
         if not self._errors.known:

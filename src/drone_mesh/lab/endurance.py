@@ -136,6 +136,8 @@ class EnduranceRun:
         stands = _stands(part, layout, len(self._routers))
         ordered = [*spares, *posts]  # the spares stand there
         self._homes = {n: Location(y, x, 0.0) for n, (x, y) in zip(ordered, stands)}
+        for n, home in self._homes.items():
+            drones[n].home_place = home
         self._pads = {drone: count % len(part.pads) for count, drone in enumerate(ordered)}
         self._posts: np.ndarray = np.array([drones[n].get_location().to_vector() for n in posts])
         self._since_s: np.ndarray = np.full(len(posts), math.nan)  # when each post was left

@@ -72,6 +72,23 @@ def test_a_step_back_ends_in_hovering_even_at_a_place_on_the_ground(engine: Mavl
     assert engine.get_location().height == pytest.approx(15.0, abs=1.5)
 
 
+def test_the_last_flight_lands_at_home_within_the_time_that_is_reckoned(
+    engine: MavlinkEngine,
+) -> None:
+    home = engine.home()
+    assert home is not None
+    assert engine.on_ground(home)
+    engine.step_back_to(30.0, 0.0, 0)
+    wait_for("it hovers", lambda: not engine.is_flying())
+    assert not engine.on_ground(home)
+    reckoned_s, begun_s = engine.seconds_between(engine.get_location(), home), time.monotonic()
+    engine.land_at(home.latitude, home.longitude, 0.0)
+    wait_for("it has landed", lambda: engine.on_ground(home))
+    assert time.monotonic() - begun_s < reckoned_s
+    assert engine.get_location().distance_m(home) < 1.5
+    assert (engine.least_percent, LIMITS.min_battery_percent) == (30.0, 30.0)
+
+
 def test_a_step_back_to_where_it_hovers_moves_nothing(
     engine: MavlinkEngine, server: VehicleServer
 ) -> None:

@@ -7,7 +7,7 @@ import re
 import pytest
 
 from drone_mesh.communication.node.node_configuration import NodeConfiguration
-from drone_mesh.communication.repair.options import LostPlace, RepairOptions
+from drone_mesh.communication.repair.options import LostMesh, LostPlace, RepairOptions
 from drone_mesh.communication.seals.keys import MeshKey, write_key_file
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone import Location
@@ -112,7 +112,7 @@ def test_each_option_reaches_what_it_is_for():
         "--check-period 5 --connection-lost-after 60 --report-period 45 "
         "--latitude 10 --longitude -20.5 "
         "--height 3 --debug 2.5 --log-level debug --repair home --clearance 3 --range 40 "
-        "--lost-place above "
+        "--lost-place above --lost-mesh return --lost-mesh-after 90 "
         "--routing drone_mesh.communication.routing.child_table_tree:"
         "ChildTableTree "
         "--drone mavlink:/dev/serial0,921600 --origin 52.0907,5.1214,3 --max-height 40 "
@@ -133,7 +133,7 @@ def test_each_option_reaches_what_it_is_for():
             "drone_mesh.communication.routing.child_table_tree:ChildTableTree",
             "home",
             MeshTiming(5.0, 60.0, report_period_s=45.0),
-            RepairOptions(3.0, 40.0, LostPlace.ABOVE),
+            RepairOptions(3.0, 40.0, LostPlace.ABOVE, LostMesh.RETURN, 90.0),
         ),
         location=Location(latitude=10.0, longitude=-20.5, height=3.0),
         flight=FlightOptions(

@@ -102,6 +102,12 @@ class Pilot:
         self._origin: Location | None = None  # start of the flight, or of the first of several
         self.distance_m = math.inf  # straight from there to the goal; infinity: not known
         self.flight_end = ""  # why the last flight ended short of its goal
+        self._first: Location | None = None  # on the ground where it was seen first
+
+    @property
+    def home(self) -> Location | None:
+        """Where the drone belongs on the ground; None: not known yet."""
+        return self._engine.home() or self._first
 
     def location(self) -> Location | None:
         """The drone's position; None, with a log line, if it is unknown."""
@@ -134,12 +140,12 @@ class Pilot:
         self._begin(goal)
         return True
 
-    def step_back_to(self, goal: Location) -> None:
-        """Start a repair flight, or change the goal of the current one."""
+    def step_back_to(self, goal: Location, lands: bool = False) -> None:
+        """Start a repair flight, or the last one if it `lands`, or change its goal."""
         flight = self._begin(goal)
         try:
             check_goal(*goal, self._engine.fences())
-            self._engine.step_back_to(*goal)
+            (self._engine.land_at if lands else self._engine.step_back_to)(*goal)
         except GoalRefused as error:  # the flight ends as soon as the drone stands still
             flight.may_begin = False
             self._complaints.add("goal refused", str(error), self._deadlines.now_s)
@@ -184,6 +190,7 @@ class Pilot:
         location = self._engine.get_location()
         if not math.isfinite(sum(location)):
             raise LocationUnknown(f"invalid position of the drone: {location}")
+        self._first = self._first or location._replace(height=0.0)
         return location
 
     def _ask_position_later(self) -> None:

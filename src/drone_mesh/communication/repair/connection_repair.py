@@ -21,6 +21,7 @@ from drone_mesh.communication.repair.interfaces import (
     RepairActions,
     Step,
 )
+from drone_mesh.communication.repair.lost_mesh import ANSWERS_S, LastFlight
 from drone_mesh.communication.repair.repair_flight import ASK_AGAIN_S, RepairFlight
 from drone_mesh.communication.repair.spots import (
     PITCH,
@@ -32,6 +33,7 @@ from drone_mesh.communication.repair.spots import (
     spot_beside_rivals,
 )
 from drone_mesh.communication.repair.status import NO_CHECK_YET, NOTHING_TO_REPAIR, RepairStatus
+from drone_mesh.communication.timing import Due
 from drone_mesh.communication.wire.messages import GatewayPlace, MovementNegotiationMessage
 from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.drone.location import Location
@@ -58,6 +60,8 @@ class ConnectionRepair(RepairActions):
             lambda place: not self.why_not_there(place),
             self._engine.plan,
         )
+        taken, engine, neighbours = self._taken, self._engine, self._neighbours
+        self._last = LastFlight(self, self._options, engine, self._pilot, neighbours, taken)
         again_s = self.medium.policy.ask_sealed_s if self._has_key else ASK_AGAIN_S
         self._ask_again_s = self.medium.stretched(again_s)
         # Valid from LOSS_NOTICED until the router is AT_REST:
@@ -82,12 +86,16 @@ class ConnectionRepair(RepairActions):
             self._neighbours.motion.reported(self.node_id, here, due_s)
         if state is RepairState.AT_REST:
             self._notice_loss(due_s)
+        if state in (RepairState.AT_REST, RepairState.LOST) and self._last.becomes_due(due_s):
+            self._strategy.on_stopped()
+            self.ask_places()
+            self._look_again()
         elif state is RepairState.LOST:
             self._was_silent = self.silent
             self._plan_emergency()
             if due_s >= self._emergency_s - ROUNDING_S:
                 self._emergency()
-        elif self._checked_s is None:
+        elif state is not RepairState.AT_REST and self._checked_s is None:
             self._checked_s = due_s
 
     def on_connected_check(self) -> None:
@@ -97,6 +105,7 @@ class ConnectionRepair(RepairActions):
 
     def on_connected(self) -> None:
         """A gateway answers again."""
+        self._last.begin_anew()
         self._clear()
         self._tried_goals.clear()
         self._tried_spots.clear()
@@ -108,12 +117,14 @@ class ConnectionRepair(RepairActions):
     def on_antenna_off(self) -> None:
         """The antenna is off."""
         self._control.end(RouterEvent.ANTENNA_OFF)
+        self._last.begin_anew()
         self._clear()
         self._strategy.reason = ""
         self._strategy.on_stopped()
 
     def on_ordered_flight(self) -> None:
         """An ordered flight has started."""
+        self._last.begin_anew()
         self._flight = None
         self._took_off()
 
@@ -139,15 +150,20 @@ class ConnectionRepair(RepairActions):
 
     def on_place(self, node: int, place: Location) -> None:
         """`node` reports its place."""
-        if self._flight is not None:
-            self._flight.on_place(node, place)
-        else:
+        if self._flight is None:
             self._strategy.on_place(node, place)
+        elif self._flight.lands:
+            self.on_taken(place)
+        else:
+            self._flight.on_place(node, place)
 
     def on_taken(self, place: Location) -> None:
         """A drone is at `place` or flies there, or was last heard there."""
-        if self._flight is not None:
-            self._flight.on_taken(place)
+        flight = self._flight
+        if flight is not None and self._last.must_wait(flight):
+            flight.pause()
+        elif flight is not None:
+            flight.on_taken(place)
 
     @receives(MessageType.MOVEMENT_NEGOTIATION)
     def on_bid_packet(self, payload: bytes, creator: int, from_: int) -> None:
@@ -164,16 +180,21 @@ class ConnectionRepair(RepairActions):
             if about is not None:
                 self._neighbours.set_place(node, about, self.now_s, is_goal=True)
                 self.on_taken(about)
-        self._strategy.on_bid(node, score, from_, about)
+        if self._last.due is None:
+            self._strategy.on_bid(node, score, from_, about)
 
     def on_due(self) -> bool:
         """The repair's timer has expired. Returns whether a flight is over."""
         self.wait_until(math.inf)
         flight = self._flight
         if flight is None:
-            self._strategy.on_time()
+            (self._strategy.on_time if self._last.due is None else self._end_work)()
             return False
         if not flight.on_ground:
+            if self._last.must_wait(flight):
+                self._look_again()
+            elif flight.paused:
+                flight.fly_on()
             return False
         is_over = not flight.ask_again()
         if not is_over:
@@ -183,6 +204,7 @@ class ConnectionRepair(RepairActions):
     def status(self) -> RepairStatus:
         """The current activity of the repair, and its reason."""
         state, flight, strategy = self.state, self._flight, self._strategy
+        reason = (not self._last.due and self._last.why_not_repair()) or strategy.reason
         if flight is not None:
             return RepairStatus(
                 state,
@@ -190,15 +212,16 @@ class ConnectionRepair(RepairActions):
                 place_of=self._flies_to_place_of,
                 goal=flight.goal,
                 landed=flight.on_ground,
+                ends=self._last.due.words if self._last.due and flight.lands else "",
             )
         if self.connected or state is RepairState.FLYING:
             return NOTHING_TO_REPAIR
-        if state is RepairState.AT_REST and not strategy.reason:
+        if state is RepairState.AT_REST and not reason:
             return NO_CHECK_YET if self._antenna.on() else NOTHING_TO_REPAIR
         bids = state in (RepairState.NEGOTIATING, RepairState.WATCHING)
         return RepairStatus(
             state,
-            strategy.reason,
+            reason,
             bid=strategy.own_bid if bids else NO_BID,
             bid_unit=strategy.bid_unit,
             place_of=strategy.bids_for if bids else NO_ROUTE,
@@ -234,6 +257,29 @@ class ConnectionRepair(RepairActions):
         elif self._flight is not None and self._tried_goals:
             self._tried_goals.pop()  # it turns back before it has been there
             self._tried_spots.pop()
+        self._set_out(flight)
+
+    def why_not_fly(self) -> str:  # noqa: D102
+        return self._last.why_not_repair() or super().why_not_fly()
+
+    def _end_work(self) -> None:
+        """Set out for the last time, unless somebody is in the way: a check asks again, then."""
+        ending = self._last.due
+        assert ending is not None  # asked before
+        place, self._strategy.reason = self._last.may_set_out(ending)
+        if place is None:
+            return
+        self._report(MeshEventKind.FLIGHT_DECIDED, detail=ending.words)
+        flight = self._new_flight(Step(place), place, lands=True)
+        flight.stops_when_connected = ending.waits_until_s == math.inf
+        self._flies_to_place_of = NO_ROUTE
+        self._set_out(flight)
+
+    def _look_again(self) -> None:
+        answers_s = self.now_s + self.medium.stretched(ANSWERS_S)
+        self.wait_until(min(self._deadlines.at_s[Due.REPAIR], answers_s))
+
+    def _set_out(self, flight: RepairFlight) -> None:
         self._neighbours.forget_all()
         self._neighbours.takes_off(by_order=False)
         self._control.routes.node_moved_location()
@@ -269,26 +315,33 @@ class ConnectionRepair(RepairActions):
         """The drone is still in flight."""
         if self._flight is not None:
             self._flight.each_second()
+            if not self._flight.lands and self._last.becomes_due(self.now_s, flies=True):
+                self._end_work()
 
     def on_arrived(self) -> bool:
         """The drone is at its goal. Returns whether the flight is over."""
         if self._flight is None:
             return True
-        if self._flight.arrived():
+        is_there, lands = self._flight.arrived(), self._flight.lands
+        if self._flight.paused:
+            self._look_again()
+        elif is_there and not lands:
             self._await_answers()
-        return False
+        return is_there and lands
 
     def on_landed(self) -> None:
         """The flight is over."""
         flight, self._flight = self._flight, None
         was_repair = flight is not None
-        self._landed_unheard = (
-            flight is not None and not flight.leads_back and not self._neighbours.ids()
+        self._landed_unheard = flight is not None and not (
+            flight.leads_back or flight.lands or self._neighbours.ids()
         )
         if was_repair and self._flies_to_place_of == self._control.gateway and not self.connected:
             self._places.gateway_not_found()
         self._control.end(RouterEvent.LANDED)
-        if was_repair:
+        if flight is not None and flight.lands:
+            self._last.landed()
+        elif was_repair and self._last.due is None:
             self._strategy.on_landed()
 
     def _check_spot(self) -> None:
@@ -303,7 +356,7 @@ class ConnectionRepair(RepairActions):
             flight.ask_on_ground()
             self._await_answers()
 
-    def _new_flight(self, step: Step, goal: Location) -> RepairFlight:
+    def _new_flight(self, step: Step, goal: Location, lands: bool = False) -> RepairFlight:
         return RepairFlight(
             self.node_id,
             self._pilot,
@@ -315,6 +368,7 @@ class ConnectionRepair(RepairActions):
             self._options,
             self._taken,
             self._landing(step),
+            lands,
         )
 
     def _await_answers(self) -> None:

@@ -21,6 +21,15 @@ class LostPlace(enum.Enum):
     EXACT = "exact"  # at that very place, as in the document
 
 
+class LostMesh(enum.Enum):
+    """What a drone does that has no gateway for long."""
+
+    REPAIR = "repair"  # it repairs, as long as its battery reaches home
+    HOLD = "hold"  # it stays where it is, also for a repair
+    RETURN = "return"  # it repairs, then flies home and lands
+    LAND = "land"  # it repairs, then lands where it is
+
+
 @dataclass(frozen=True)
 class RepairOptions:
     """Adjustable numbers of the repair of one node."""
@@ -43,6 +52,18 @@ class RepairOptions:
         LostPlace.BESIDE,
         "where a repair ends if a silent drone may still be at the place: beside, above, below or "
         "exact, which is that very place",
+    )
+    lost_mesh: LostMesh = setting(
+        LostMesh.REPAIR,
+        "what a drone without a gateway does: repair, hold its place, or after lost_mesh_after "
+        "return home or land where it is: repair, hold, return or land",
+    )
+    lost_mesh_after_s: float = setting(
+        120.0,
+        "seconds without a gateway before a drone returns home or lands (lost_mesh)",
+        "seconds",
+        least=0.1,
+        most=36_000.0,
     )
 
     def __post_init__(self) -> None:

@@ -11,6 +11,7 @@ from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.repair.interfaces import Step
 from drone_mesh.communication.repair.options import RepairOptions
 from drone_mesh.communication.repair.spots import (
+    ROUNDING_M,
     Landing,
     TakenPlaces,
     above_ground,
@@ -46,6 +47,7 @@ class RepairFlight:
     _options: RepairOptions
     _taken: TakenPlaces
     _landing: Landing
+    lands: bool = False  # the last flight of a drone whose mesh is lost, in one go
 
     def __post_init__(self) -> None:
         self.group = self._neighbours.ids()  # the neighbours that it leaves behind
@@ -58,6 +60,7 @@ class RepairFlight:
         self._leg_end = self.goal
         self._way: FlightPath | None = None  # to there
         self._asides = 0  # because another drone was in the way
+        self.paused = False  # it hovers where another one let it wait
         stands = self._pilot.place()
         self._highest_m = max(self.goal.height, stands.height if stands else 0.0)
 
@@ -79,13 +82,19 @@ class RepairFlight:
 
     def stop_when_connected(self) -> None:
         """Stop at the first connection, unless this flight leads back."""
-        self.stops_when_connected = not self.leads_back
+        if not self.lands:
+            self.stops_when_connected = not self.leads_back
 
     def stop_here(self, next_hop: int) -> None:
-        """Land at the nearest free spot, in reach of `next_hop` if possible."""
+        """Land at the nearest free spot, in reach of `next_hop` if possible.
+
+        A drone that was about to land for good stays as high as it was before.
+        """
         here = self._pilot.location()
         if here is not None and not self.on_ground:
-            below = Location(here.latitude, here.longitude, self.goal.height)
+            height_m = self._highest_m if self.lands else self.goal.height
+            self.lands = False
+            below = Location(here.latitude, here.longitude, height_m)
             if below.distance_m(self.goal) >= self._options.clearance_m:
                 relay = self._neighbours.place_of(next_hop)
                 self._wanted = below
@@ -117,12 +126,17 @@ class RepairFlight:
                 self.fly_on()
 
     def _is_taken_by(self, place: Location, spot: Location) -> bool:
-        near = above_ground(place).distance_m(spot) < self._options.clearance_m
+        # Homes may be just a clearance apart
+        near_m = self._options.clearance_m - (ROUNDING_M if self.lands else 0.0)
+        near = above_ground(place).distance_m(spot) < near_m
         return near and not self._taken.is_free(spot)
 
     def arrived(self) -> bool:
         """Ask for the places of others after landing. Returns False if another leg follows."""
         here, start = self._pilot.location(), self._leg_from
+        if self.lands and (self.paused or self._leg_end == self.goal):
+            self._requests.ask_all()  # which tells that it no longer flies
+            return not self.paused
         left = here and start and here.distance_m(start) >= LANDED_WITHIN_M
         if here and left and here.distance_m(self.goal) > LANDED_WITHIN_M:  # not the last leg
             self.fly_on()
@@ -142,6 +156,14 @@ class RepairFlight:
             self._requests.ask_all(may_fly_on=True)
         return self.on_ground
 
+    def pause(self) -> None:
+        """Stay here until `fly_on`: others fly round it."""
+        here = self._pilot.location()
+        if here is not None and not self.paused:
+            self.paused, self._leg_end = True, at_whole_metres(here)
+            self._pilot.step_back_to(self._leg_end)
+            self._requests.ask_all()
+
     def _go_to(self, goal: Location) -> None:
         self.goal = goal
         self.asks_left = 0
@@ -156,11 +178,12 @@ class RepairFlight:
         others are told where it ends at once: this drone may fall silent within a second. If
         another drone is in the way, a leg leads aside first.
         """
-        here = self._pilot.location()
+        here, self.paused = self._pilot.location(), False
         self._leg_from, self._leg_end, self._way = here, above_ground(self.goal), None
         if here is not None:
             longest_m = self._leg_m + LANDED_WITHIN_M
-            if self.stops_when_connected and here.distance_m(self.goal) > longest_m:
+            in_legs = self.stops_when_connected and not self.lands
+            if in_legs and here.distance_m(self.goal) > longest_m:
                 end = here.towards(self.goal, self._leg_m)
                 end = at_whole_metres(end._replace(height=min(end.height, self._highest_m)))
                 free = self._taken.is_free(end)
@@ -170,7 +193,7 @@ class RepairFlight:
                 self._asides += 1
                 self._leg_end = self._taken.aside(here, self._leg_end)
                 self._way = self._taken.way(here, self._leg_end)
-        self._pilot.step_back_to(self._leg_end)
+        self._pilot.step_back_to(self._leg_end, self.lands and self._leg_end == self.goal)
         self._requests.ask_all()
 
     def _spot(self) -> Location:

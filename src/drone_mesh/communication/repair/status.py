@@ -28,6 +28,7 @@ class RepairStatus(NamedTuple):
     silent: bool = False  # all its neighbours, two or more, fell silent together
     landed: bool = False  # the flight ends: it checks whether another drone is there
     jammed: bool = False  # it hears nobody, and measures power in its channel
+    ends: str = ""  # what its last flight is, and why: its mesh is lost
     unchecked: bool = False  # it has no gateway, and no check of its own has found that yet
 
     def in_words(self, now_s: float) -> str:
@@ -62,7 +63,9 @@ class RepairStatus(NamedTuple):
     def _flies(self) -> str:
         if self.landed:
             return "has landed, checks that no other drone is there"
-        return f"lands: {self.reason}" if self.reason else f"flies to {self._place()}"
+        if self.reason:
+            return f"lands: {self.reason}"
+        return self.ends or f"flies to {self._place()}"
 
     def _place(self) -> str:
         if self.place_of == NO_ROUTE:

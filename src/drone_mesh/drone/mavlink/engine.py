@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import threading
 import time
 from collections import deque
@@ -22,6 +23,7 @@ TICK_S = 0.05  # four ticks per target
 STALE_S = 2.0  # an older status is no longer valid
 LONGEST_STEP_S = 0.2  # four ticks of the engine; what is longer was not listening
 ASLEEP_S = 1.0  # after so long the pilot may have chosen another mode unseen
+LANDING_M_S = 0.5  # ArduPilot's LAND_SPEED; PX4's MPC_LAND_SPEED is 0.7
 CATCH_UP_S = 0.5  # for its thread, when the whole program was given no time
 
 _log = logging.getLogger(__name__)
@@ -70,6 +72,7 @@ class MavlinkEngine(IDroneEngine):
         self._node_id = node_id
         self._origin = origin
         self._limits = limits
+        self.least_percent = max(self.least_percent, limits.min_battery_percent)
         self._link = MavlinkLink(address)
         self._pilot = MavlinkPilot(node_id, origin, limits, permissions, self._link.send, fence)
         self._goals: deque[tuple[Location, bool, bool]] = deque()  # lands there; for a repair
@@ -103,6 +106,23 @@ class MavlinkEngine(IDroneEngine):
                 else self._limits.layer_height_m(self._node_id)
             )
         self._queue_goal(Location(latitude, longitude, hover_m), False, True, status.why_not_repair)
+
+    def land_at(self, latitude: float, longitude: float, height: float) -> None:
+        why_not = self.status().why_not_repair
+        self._queue_goal(Location(latitude, longitude, height), True, True, why_not)
+
+    def home(self) -> Location | None:
+        return self.status().home
+
+    def on_ground(self, here: Location) -> bool:
+        """What the autopilot says."""
+        return bool(self.status().on_ground)
+
+    def seconds_between(self, start: Location, goal: Location) -> float:
+        """Up to its layer, straight across, and down as slowly as autopilots land."""
+        layer_m = max(start.height, self._limits.layer_height_m(self._node_id))
+        flown_m = math.dist(start[:2], goal[:2]) + layer_m - start.height
+        return flown_m / self._limits.speed_m_s + (layer_m - goal.height) / LANDING_M_S
 
     def get_location(self) -> Location:
         status = self.status()
