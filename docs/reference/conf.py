@@ -18,6 +18,7 @@ autosummary_generate = True
 autodoc_default_options = {"members": True, "show-inheritance": True, "ignore-module-all": True}
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
+autodoc_use_type_comments = False  # there are none, and each function is parsed for them
 # ROS, hardware and the extras that are rarely installed are not needed to read the reference.
 autodoc_mock_imports = [
     "actionlib",
