@@ -13,6 +13,7 @@ from typing import Callable, Sequence
 
 from drone_mesh.arguments import MOST, whole
 from drone_mesh.errors import MeshError
+from drone_mesh.lab.terminal import Progress
 from drone_mesh.stopping import ends_as
 from proofs.attacks import ATTACKS
 from proofs.damage import KEY, TABLE_HEAD, damage_row, keys_of, with_row
@@ -100,11 +101,14 @@ def _attack(options: argparse.Namespace) -> int:
 def _quiet(options: argparse.Namespace) -> int:
     """Returns 1 if a node warned of anything."""
     all_runs, noisy = list(runs(options.runs)), 0
+    progress = Progress(len(all_runs))
     for run in all_runs:
         lines = warnings_of(run)
+        progress.count(failed=False)
         if lines:
             noisy += 1
             print(run, *lines, sep="\n  ", flush=True)
+    progress.close()
     print(f"{len(all_runs)} runs, {noisy} with a warning")
     return int(noisy > 0)
 

@@ -16,6 +16,7 @@ FLEET = 17  # routers of the default run
 COLUMNS = 6
 SPACING_M = 1.0
 START_S, FLIGHT_S = 20.0, 100.0
+CONNECT_S = 300.0  # at most: orders to drones that are not connected fail, which is worth a warning
 
 LAYOUTS = Layouts.shipped()
 CASES = sorted({*LAYOUTS.cases, *Layouts({}).cases})
@@ -78,6 +79,7 @@ def _fly_to(run: Run) -> None:
     orders = LAYOUTS.orders(run.layout)
     network.add_fleet(1, max(FLEET, *(order.node_id for order in orders)), COLUMNS, SPACING_M)
     network.run_for(START_S)
+    network.run_until(network.all_connected, CONNECT_S)
     for drone, goal in orders:
         network.order(
             drone, goal.longitude, goal.latitude, int(goal.height), allow_shared_place=True
