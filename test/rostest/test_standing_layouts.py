@@ -11,7 +11,7 @@ import subprocess
 import tempfile
 import unittest
 from pathlib import Path
-from typing import Sequence
+from typing import Any, Sequence
 
 import actionlib
 import rospy
@@ -144,7 +144,7 @@ class StandingLayoutsTest(unittest.TestCase):
         self.assertIn("ordered", layout.stdout.readline())
         wait_for("it waits for 17", FLIGHTS_S, lambda: any(map(waits_for_17, self.open())))
         (number,) = (progress.id for progress in self.open())
-        (kept,) = json.loads(rospy.get_param("/DroneManager/standing"))["orders"]
+        (kept,) = self.stored_orders()
         self.assertTrue(kept["at_once"])
         os.kill(layout.pid, signal.SIGINT)
         self.assertEqual(layout.wait(60), 130)
@@ -186,8 +186,13 @@ class StandingLayoutsTest(unittest.TestCase):
 
     def stored(self, number: int) -> list[str]:
         """The drones that a manager which starts now would order."""
-        orders = json.loads(rospy.get_param("/DroneManager/standing"))["orders"]
+        orders = self.stored_orders()
         return [drone for order in orders if order["number"] == number for drone in order["goals"]]
+
+    def stored_orders(self) -> list[dict[str, Any]]:
+        stored = json.loads(rospy.get_param("/DroneManager/standing"))
+        orders: list[dict[str, Any]] = stored["orders"]["orders"]
+        return orders
 
     def waiting(self, number: int) -> bytes | None:
         """Its drones without a route, once no other drone is to fly any more."""
