@@ -58,7 +58,8 @@ def test_behind_a_dead_relay_one_drone_flies_at_a_time_at_the_pace_of_the_slow_r
     ]
     each = (MeshEventKind.FLIGHT_DECIDED, MeshEventKind.LANDED)
     up_by_one = [(node, kind) for node in (3, 4, 5) for kind in each]
-    assert flights == up_by_one[:-1]  # all are connected before the last has landed
+    # The last one may connect before it has landed
+    assert flights in (up_by_one[:-1], up_by_one)
     first = next(event for event in network.events if event.kind is each[0])
     assert first.now_s - died_s > TIMING.connection_lost_after_s
 

@@ -105,6 +105,7 @@ def bit_error_rate(margin_db: float) -> float:
 _LEAST_MARGIN_DB = 10 * math.log10(math.log(0.5 / _ADDRESS_LOST_BER) / 6.215)  # its inverse
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class LogDistance(LinkModel):
     """Power falls with a power of the distance; bits are damaged near the sensitivity limit."""
 
@@ -156,6 +157,7 @@ class LogDistance(LinkModel):
         return float(10 ** (spare_db / (10 * self._exponent)) / self.metres_per_metre)
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class ScriptedLoss(LinkModel):
     """Another model with additional losses on demand, for tests and experiments."""
 
