@@ -14,7 +14,7 @@ import abc
 import itertools
 import math
 from dataclasses import dataclass
-from typing import Callable, Final, Iterable, Tuple
+from typing import Any, Callable, Final, Iterable, Tuple
 
 import numpy as np
 
@@ -302,7 +302,7 @@ class SharedAir(IInProcessAir):
             self._sent_dbm, self._carrier_mhz, self._bits_per_s, more_db
         )
         is_far = np.einsum("ij,ij->i", away, away) > furthest_m**2  # False for NaN
-        rows: list[int] = np.flatnonzero(~is_far).tolist()
+        rows: Any = np.flatnonzero(~is_far).tolist()
         return [radios[row] for row in rows]
 
     def _reaches(self, node: int, other: int, more_db: float) -> bool:
