@@ -14,10 +14,10 @@ from drone_mesh.console.controls import OrderRefused
 from drone_mesh.console.demonstration import Casting, Demonstration, free_places
 from drone_mesh.console.put_back import FAST, FleetBefore, Script, rounded
 from drone_mesh.drone.battery import LAND_AT_PERCENT, READY_PERCENT
+from drone_mesh.drone.interfaces import ON_GROUND_M
 from drone_mesh.drone.roles import Role
 from drone_mesh.formations.posts import BESIDE_M
 from drone_mesh.formations.relief import CARRIES_S
-from drone_mesh.formations.reserves import IN_AIR_M
 from drone_mesh.state.model import MeshStatus, NodeStatus, position_is_known
 from drone_mesh.state.repair_story import and_
 
@@ -35,7 +35,7 @@ class ReliefCasting(Casting):
         known = [node for node in mesh.nodes if position_is_known(node)]
         gateways = [node for node in known if node.role == Role.GATEWAY and node.on]
         able = [n for n in known if len(n.home) and n.on and not (n.why_not_fly or n.crashed)]
-        able = [n for n in able if n.role == Role.ROUTER and n.position[2] < IN_AIR_M]
+        able = [n for n in able if n.role == Role.ROUTER and n.position[2] < ON_GROUND_M]
         if not gateways or len(able) < 3:
             raise OrderRefused(
                 "this demonstration needs a gateway, and 3 routers on pads with crews: start "
@@ -69,7 +69,7 @@ _SCENES = (
     _Scene(
         "{new.id} relieves {old.id}, which has {old.battery:.0f} % left, and {new.id} "
         f"{{new.battery:.0f}} %. It flies to a free place {BESIDE_M:g} m beside, clear of others",
-        lambda new, _old: new.position[2] > IN_AIR_M and not len(new.path),
+        lambda new, _old: new.position[2] > ON_GROUND_M and not len(new.path),
     ),
     _Scene(
         f"{{new.id}} hovers beside {{old.id}}, which stays: only after {CARRIES_S:g} s with a "

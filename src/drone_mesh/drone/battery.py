@@ -16,6 +16,7 @@ from typing import NamedTuple, Sequence
 
 GRAVITY_M_S2 = 9.81
 LAND_AT_PERCENT = 20.0  # it comes down while it still can
+MARGIN_PERCENT = 2.0  # above that, or what it must keep, when it is home
 READY_PERCENT = 95.0  # a crew leaves a fuller battery in the drone
 FLAT = 0.0
 LEAST_USE_PERCENT = 2.0  # less says nothing: autopilots report whole percents

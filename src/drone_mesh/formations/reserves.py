@@ -6,14 +6,11 @@ import math
 from typing import Mapping
 
 from drone_mesh.communication.control.router_states import RepairState
-from drone_mesh.drone.battery import LAND_AT_PERCENT
+from drone_mesh.drone.battery import LAND_AT_PERCENT, LEAST_USE_PERCENT, MARGIN_PERCENT
 from drone_mesh.drone.flight_path import SPEED_M_S
+from drone_mesh.drone.interfaces import ON_GROUND_M
 from drone_mesh.drone.location import Location
 from drone_mesh.state.model import REPAIR_STATES, NodeStatus
-
-MARGIN_PERCENT = 2.0  # above LAND_AT_PERCENT when it is home
-LEAST_USE_PERCENT = 2.0  # less says nothing: reports carry whole percents
-IN_AIR_M = 0.3
 
 
 def place_of(node: NodeStatus) -> Location:
@@ -23,7 +20,7 @@ def place_of(node: NodeStatus) -> Location:
 
 def is_in_air(node: NodeStatus) -> bool:
     """Whether it flies or hovers."""
-    return len(node.path) > 0 or place_of(node).height > IN_AIR_M
+    return len(node.path) > 0 or place_of(node).height > ON_GROUND_M
 
 
 def repairs(node: NodeStatus) -> bool:

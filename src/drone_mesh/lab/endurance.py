@@ -13,6 +13,7 @@ import numpy as np
 from drone_mesh.drone.battery import (
     FLAT,
     LAND_AT_PERCENT,
+    MARGIN_PERCENT,
     READY_PERCENT,
     Battery,
     Crews,
@@ -25,7 +26,6 @@ from drone_mesh.errors import ConfigurationError, GoalRefused
 from drone_mesh.formations.posts import BESIDE_M
 from drone_mesh.formations.relief import CARRIES_S, Relief, ReliefRules
 from drone_mesh.formations.relief_policies import relief_policy
-from drone_mesh.formations.reserves import MARGIN_PERCENT
 from drone_mesh.formations.standing_orders import StandingOrders
 from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.node import event_records

@@ -244,3 +244,23 @@ def test_an_order_under_way_is_finished_first(positions):
     assert place(network, 1) == (60.0, 0.0, 3.0)
     network.run_for(60.0)
     assert math.dist(place(network, 1), (*HOMES[0], 0.0)) < 1.5
+
+
+def test_nobody_keeps_a_drone_in_the_air_by_claiming_to_fly_in_its_way():
+    """A captured node, or any without a key; once its battery just reaches home, it flies on."""
+    network = hovering(LostMesh.RETURN, POSTS[:2], HOMES[:2], repair="stay")
+    drone, component = network.nodes[2].drone, network.nodes[2].component
+    network.power(1, False)
+    network.power(0, False)
+    charge(network, 2, 40.0)
+    assert network.run_until(lambda: drone.path is not None, within_s=300.0)
+    to_13_0 = bytes.fromhex("0101 02 02fe 00000000 00005041 0180").ljust(32, b"\0")
+    waits_s = 0
+    for seconds in range(400):
+        charge(network, 2, 40.0 - 0.1 * seconds)
+        component.on_msg(to_13_0, network.now_s())
+        network.run_for(1.0)
+        waits_s += drone.path is None and drone.get_location().height > 0.0
+    assert waits_s > 60
+    assert place(network, 2) == (*HOMES[1], 0.0)
+    assert drone.battery.percent > 0.0

@@ -102,9 +102,11 @@ class Whereabouts:
         if neighbours.motion.moved_since(now_s - neighbours.motion.within_s):
             return
         near = neighbours.ids()
-        for packet in self._last_places(here, BROADCAST, but={*near, self._node_id}):
+        packets = self._last_places(here, BROADCAST, but={*near, self._node_id})
+        if packets:
+            self._tell_s.update(dict.fromkeys(near, now_s + TELL_AGAIN_S))
+        for packet in packets:
             self._antenna.broadcast_message(packet)
-            self._tell_s = dict.fromkeys(near, now_s + TELL_AGAIN_S)
 
     def _is_taken(self, place: Location) -> None:
         """A node that asks for places is at `place` or flies there."""

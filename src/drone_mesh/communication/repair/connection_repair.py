@@ -21,7 +21,7 @@ from drone_mesh.communication.repair.interfaces import (
     RepairActions,
     Step,
 )
-from drone_mesh.communication.repair.lost_mesh import ANSWERS_S, LastFlight
+from drone_mesh.communication.repair.lost_mesh import ANSWERS_S, ROUNDING_S, LastFlight
 from drone_mesh.communication.repair.repair_flight import ASK_AGAIN_S, RepairFlight
 from drone_mesh.communication.repair.spots import (
     PITCH,
@@ -39,7 +39,6 @@ from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.drone.location import Location
 
 MOVING_PATIENCE = 3.0  # while drones move by themselves, a lost link may come back
-ROUNDING_S = 1e-6  # sums of periods are not exact
 
 
 @dataclass(eq=False)
@@ -313,10 +312,14 @@ class ConnectionRepair(RepairActions):
 
     def on_flight_second(self) -> None:
         """The drone is still in flight."""
-        if self._flight is not None:
-            self._flight.each_second()
-            if not self._flight.lands and self._last.becomes_due(self.now_s, flies=True):
-                self._end_work()
+        flight = self._flight
+        if flight is None:
+            return
+        flight.each_second()
+        if flight.lands:
+            self._last.hurry(flight)
+        elif self._last.becomes_due(self.now_s, flies=True):
+            self._end_work()
 
     def on_arrived(self) -> bool:
         """The drone is at its goal. Returns whether the flight is over."""

@@ -13,12 +13,11 @@ from drone_mesh.communication.repair.interfaces import RepairActions
 from drone_mesh.communication.repair.options import LostMesh, RepairOptions
 from drone_mesh.communication.repair.repair_flight import RepairFlight
 from drone_mesh.communication.repair.spots import ROUNDING_M, Landing, TakenPlaces, above_ground
-from drone_mesh.drone.battery import BatteryUse
+from drone_mesh.drone.battery import MARGIN_PERCENT, BatteryUse
 from drone_mesh.drone.flight_path import ground_apart_m
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
 
-MARGIN_PERCENT = 2.0  # above the least charge, when it is home
 TURN_S = 30.0  # chosen here: so long it waits for others, if its battery just reaches home
 AT_PLACE_M = 1.5  # an autopilot lands within 1 m
 ANSWERS_S = 1.0  # as before a negotiation: to hear where the others are, and who flies
@@ -67,15 +66,21 @@ class LastFlight:
 
         `flies` for a repair: only its battery ends that.
         """
-        here, percent = self._pilot.place(), self._engine.battery_percent()
         self._since_s = min(self._since_s, now_s)
-        if percent is not None:
-            self._use.note(percent, now_s)
+        here = self._pilot.place()
         if here is not None:
-            self.due = due = self._ending(now_s, here, percent, flies)
+            self.due = due = self._ending(now_s, here, flies)
             if due and math.dist(here[:2], due.place[:2]) <= AT_PLACE_M:
                 self.landed()  # nothing takes off only to land
         return self.due is not None
+
+    def hurry(self, flight: RepairFlight) -> None:
+        """On the way, as at the start: its battery that just reaches home ends all waiting."""
+        here, due, now_s = self._pilot.place(), self.due, self._mesh.now_s
+        ending = here and due and self._ending(now_s, here, flies=True)
+        if due and ending:
+            self.due = due._replace(waits_until_s=min(due.waits_until_s, ending.waits_until_s))
+            flight.stops_when_connected = False
 
     def landed(self) -> None:
         """Its last flight is over: no other one follows, if it stands on the ground."""
@@ -83,9 +88,10 @@ class LastFlight:
         if here and self._engine.on_ground(here):
             self._landed, self.due = self.due, None
 
-    def _ending(
-        self, now_s: float, here: Location, percent: float | None, flies: bool
-    ) -> Ending | None:
+    def _ending(self, now_s: float, here: Location, flies: bool) -> Ending | None:
+        percent = self._engine.battery_percent()
+        if percent is not None:
+            self._use.note(percent, now_s)
         mode, after_s = self._options.lost_mesh, self._options.lost_mesh_after_s
         landed, below = self._landed, here._replace(height=0.0)
         home = above_ground(self._pilot.home or here)
@@ -128,10 +134,11 @@ class LastFlight:
 
     def must_wait(self, flight: RepairFlight) -> bool:
         """Whether a drone with a lower id flies, too, and is in the way of this flight."""
-        here, due = self._pilot.place(), self.due
-        if due is None or here is None or not flight.lands:
+        here = self._pilot.place()
+        if self.due is None or here is None or not flight.lands:
             return False
-        return self._flies_first(here, flight.goal, self._mesh.node_id, due) != NO_ROUTE
+        self.hurry(flight)
+        return self._flies_first(here, flight.goal, self._mesh.node_id, self.due) != NO_ROUTE
 
     def _flies_first(self, start: Location, goal: Location, below: int, ending: Ending) -> int:
         """A drone in flight, its id under `below`, that is in the way; NO_ROUTE: none.
