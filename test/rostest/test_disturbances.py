@@ -124,7 +124,7 @@ class StrayMessagesTest(unittest.TestCase):
             command = ["rostopic", "pub", "-r", "500", "/WirelessSignalSimulator"]
             announcer = subprocess.Popen([*command, "drone_mesh/DroneInfo", info])
             self.addCleanup(announcer.wait)
-            self.addCleanup(announcer.terminate)
+            self.addCleanup(announcer.kill)  # on SIGTERM it may hang, as it publishes
             return announcer
 
         announcers = [announce_for_ever(topic) for topic in (AGAIN_AND_AGAIN, "/Node/2")]
