@@ -22,6 +22,7 @@ CIRCLE_CORNERS = 64  # the polygon for a circle is off by 0.12 % of its radius, 
 CIRCLE_TURNS = 16  # of ways round a circle, which are up to 2 % longer so
 MOST_CORNERS = 500  # of one area; the search for a way round tries all of them
 _SHORT_M = 1e-6  # a shorter piece of a way is rounding
+_ROUNDING = 1e-9  # of shares
 _SHARPEST = 1.0 / 3.0  # at a sharper corner, ways round keep 3 * CLEAR_M from its tip
 
 
@@ -87,7 +88,7 @@ class Zone:
         object.__setattr__(self, "_parts", tuple(_parts(edges)))
         object.__setattr__(self, "turns", self.turns or tuple(turns))
         for number, (start, end) in enumerate(edges):
-            if any(True for _ in _meetings(start, end, edges[:number], inset=1e-9)):
+            if any(True for _ in _meetings(start, end, edges[:number], inset=_ROUNDING)):
                 raise ConfigurationError("its edges cross: which side is inside is not clear")
         if abs(sum(p[0] * q[1] - p[1] * q[0] for p, q in edges)) < _SHORT_M:
             raise ConfigurationError("its corners are in a line: they enclose nothing")
@@ -127,7 +128,7 @@ class Zone:
         """Where the way from a to b passes its sides, floor or ceiling: shares of that way."""
         (x1, y1, _z1), (x2, y2, _z2) = a, b
         box = min(x1, x2), max(x1, x2), min(y1, y2), max(y1, y2)
-        yield from _meetings(a[:2], b[:2], self._edges_within(*box))
+        yield from _meetings(a[:2], b[:2], self._edges_within(*box), inset=-_ROUNDING)
         if a[2] != b[2]:
             for height_m in (self.lowest_m, self.highest_m):
                 yield (height_m - a[2]) / (b[2] - a[2])
@@ -325,9 +326,12 @@ def _parts(edges: Sequence[tuple[Point, Point]]) -> Iterator[_Part]:
 
 
 def _meetings(
-    a: Sequence[float], b: Sequence[float], edges: Iterable[tuple[Point, Point]], inset: float = 0.0
+    a: Sequence[float], b: Sequence[float], edges: Iterable[tuple[Point, Point]], inset: float
 ) -> Iterator[float]:
-    """Where a..b meets these edges, as shares of a..b; not within `inset` of any of the ends."""
+    """Where a..b meets these edges, as shares of a..b; not within `inset` of any of the ends.
+
+    A way through a corner would miss both edges there, as rounded, without an `inset` below 0.
+    """
     ax, ay = a
     dx, dy = b[0] - ax, b[1] - ay
     for (x1, y1), (x2, y2) in edges:

@@ -106,6 +106,13 @@ def test_a_flight_goes_round_over_or_under_and_stays_inside(
     assert path.position_at(path.duration_s) == goal
 
 
+def test_a_way_through_a_corner_into_an_area_passes_it():
+    """As rounded, it meets neither of the two edges there."""
+    kite = Zone("kite", (((0.2, 1.4), (5.2, -1.6), (6.2, 8.4), (-1.8, 6.4)),))
+    way = [(-5.2, 1.2, 0.0), (16.4, 2.0, 0.0)]
+    assert Fence.of([], [kite]).why_not_straight(way) == "its way passes fence kite"
+
+
 def test_random_flights_past_boxes_and_fences_never_leave():
     rng = random.Random(7)
     fence = Fence.of([Zone("u", (U,), highest_m=9.0)], [TOWER, SHED, BRIDGE])
