@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import json
 import math
 import reprlib
 from pathlib import Path
-from typing import Any, Iterator, Mapping, Sequence
+from typing import Any, Iterable, Iterator, Mapping, Sequence
 
 from drone_mesh.drone.fence import Fence, Zone
 from drone_mesh.drone.flight_path import Point
 from drone_mesh.drone.geodesy import EarthPlace, Origin
-from drone_mesh.earth_files.geojson import features_of, read_json
+from drone_mesh.earth_files.geojson import features_of, read_json, shapes_in
 from drone_mesh.earth_files.plan import MAX_PLAN_CHARACTERS, Plan, read_plan
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.yaml_file import MAX_FILE_BYTES, is_number, read_mapping_text, read_text
@@ -71,6 +72,25 @@ def _in_degrees(text: str, kind: str, origin: Origin) -> list[Row]:
     return rows
 
 
+def changed_rows(rows: Sequence[Row], new: Sequence[Row], remove: Iterable[str]) -> list[Row]:
+    """The first, without those to `remove` and those with the names of new ones; and these.
+
+    Several areas may have one name. A new one without a name has one of its own.
+    """
+    rows = _named(rows, ())
+    new = _named(new, [row["name"] for row in rows])
+    unknown = set(remove) - {row["name"] for row in rows}
+    if unknown:
+        raise ConfigurationError(f"the fence has no area {min(unknown)}")
+    gone = {*remove, *(row["name"] for row in new)}
+    return [*(row for row in rows if row["name"] not in gone), *new]
+
+
+def _named(rows: Sequence[Row], taken: Sequence[str]) -> list[Row]:
+    names = (name for name in map("area {}".format, itertools.count(1)) if name not in taken)
+    return [{"name": name, **row} for name, row in zip(names, rows)]
+
+
 def areas_json(rows: Sequence[Any]) -> str:
     """These areas, from which a fence can be made, as `fence_in` takes them."""
     return json.dumps(rows)
@@ -127,8 +147,14 @@ def _zone(row: Row, name: str, inside: bool) -> Zone:
     if "center" in row:
         radius_m = _number(row["radius"], "radius")
         return Zone.circle(name, _point(row["center"]), radius_m, inside, heights)
-    rings = [row["polygon"], *_list(row.get("holes", []))]
-    return Zone(name, tuple(tuple(map(_point, _list(ring))) for ring in rings), *heights)
+    outer, *holes = (
+        tuple(map(_point, _list(ring))) for ring in (row["polygon"], *_list(row.get("holes", [])))
+    )
+    alone = Zone(name, (outer,), *heights)
+    for number, hole in enumerate(holes, start=1):
+        if not any(alone.surrounds((*corner, 0.0)) for corner in hole):
+            raise ConfigurationError(f"hole {number} is outside its polygon")
+    return Zone(name, (outer, *holes), *heights) if holes else alone
 
 
 def _number(value: Any, what: str) -> float:
@@ -166,17 +192,23 @@ def _metres(latitude: Any, longitude: Any, origin: Origin) -> list[float]:
 
 def _of_geojson(content: Any, origin: Origin) -> Iterator[Row]:
     """Polygons, and points with a property `radius`; the other properties are KEYS."""
-    for feature in features_of(content):
-        geometry = _key(feature, "geometry") or {}
-        properties = feature.get("properties") or {}
-        if not isinstance(properties, dict) or not isinstance(geometry, dict):
-            raise ConfigurationError("expected properties and a geometry")
-        kind = geometry.get("type")
-        told = {k: v for k, v in properties.items() if k in KEYS and v is not None}
+    for number, feature in enumerate(features_of(content), start=1):
+        try:
+            yield from _of_feature(feature, origin)
+        except ConfigurationError as error:
+            raise ConfigurationError(f"feature {number}: {error}") from error
+
+
+def _of_feature(feature: Any, origin: Origin) -> Iterator[Row]:
+    geometry, properties = _key(feature, "geometry") or {}, feature.get("properties") or {}
+    if not isinstance(properties, dict) or not isinstance(geometry, dict):
+        raise ConfigurationError("expected properties and a geometry")
+    told = {k: v for k, v in properties.items() if k in KEYS and v is not None}
+    for kind, coordinates in shapes_in(geometry):
         if kind == "Point" and "radius" in told:
-            yield {**told, "center": _places([_key(geometry, "coordinates")], origin)[0]}
+            yield {**told, "center": _places([coordinates], origin)[0]}
         elif kind in ("Polygon", "MultiPolygon"):
-            shapes = _list(geometry.get("coordinates"))
+            shapes = _list(coordinates)
             for rings in shapes if kind == "MultiPolygon" else [shapes]:
                 outer, *holes = [_places(ring, origin) for ring in _list(rings)] or [[]]
                 yield {**told, "polygon": outer, **({"holes": holes} if holes else {})}

@@ -9,7 +9,7 @@ import yaml
 
 from drone_mesh.drone.geodesy import EarthPlace, Origin
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.fence_file import fence_of, read_fence, rows_of_text
+from drone_mesh.fence_file import changed_rows, fence_of, read_fence, rows_of_text
 
 ORIGIN = Origin(52.0907, 5.1214, 3.0)
 DATE_LINE = Origin(-17.0, 179.9999, 0.0)
@@ -147,6 +147,11 @@ def test_the_areas_of_each_kind_of_file_are_in_the_metres_of_the_mesh(
             "a center and a radius",
         ),
         ("a.yaml", "areas: [{points: []}]", "expected keys name"),
+        (
+            "a.yaml",
+            "areas: [{polygon: [[0, 0], [9, 0], [0, 9]], holes: [[[20, 0], [29, 0], [20, 9]]]}]",
+            "area 1: hole 1 is outside its polygon",
+        ),
     ],
 )
 def test_a_file_that_is_no_fence_is_refused_with_one_line_that_names_it(
@@ -171,6 +176,42 @@ def test_an_area_without_a_name_has_its_number():
     assert fence_of(rows).why_not((20, 0, 0)) == "outside fence area 1"
 
 
+def test_the_areas_of_a_geojson_collection_count_and_what_is_no_geometry_is_refused(tmp_path):
+    yard, mast, line = (one["geometry"] for one in geojson()["features"])
+    shapes = {"type": "GeometryCollection", "geometries": [line, yard, mast]}
+    nested = {"type": "GeometryCollection", "geometries": [shapes]}
+    text = written(tmp_path, "a.json", {"type": "Feature", "properties": {}, "geometry": nested})
+    assert read_fence(text, ORIGIN).why_not((10, 10, 0)) == "outside fence area 1"
+    wrong = geojson()
+    wrong["features"][1]["geometry"]["type"] = "polygon"
+    with pytest.raises(ConfigurationError, match="feature 2: .* is not a geometry"):
+        read_fence(written(tmp_path, "b.json", wrong), ORIGIN)
+
+
 @pytest.mark.parametrize("text", [YARD, json.dumps(yaml.safe_load(YARD)), json.dumps(plan())])
 def test_a_text_without_a_name_is_read_as_what_it_looks_like(text):
     assert len(fence_of(rows_of_text(text, "text", ORIGIN)).zones) == 2
+
+
+def test_areas_change_by_their_names_and_those_of_one_name_stay_together():
+    """A MultiPolygon, and the areas that a ground station calls all the same."""
+
+    def area(size, **more):
+        return {**more, "polygon": [[0, 0], [size, 0], [0, size]]}
+
+    def sizes(rows):
+        return [(row["name"], row["polygon"][1][0]) for row in rows]
+
+    trees = [area(1, name="trees"), area(2, name="trees"), area(3)]
+    assert sizes(changed_rows(trees, [area(4, name="pond")], [])) == [
+        ("trees", 1), ("trees", 2), ("area 3", 3), ("pond", 4),
+    ]  # fmt: skip
+    new = [area(4, name="trees"), area(5, name="trees")]
+    assert sizes(changed_rows(trees, new, ["area 3"])) == [("trees", 4), ("trees", 5)]
+    unnamed = changed_rows([area(1), area(2)], [area(3)], ["area 1"])
+    assert sizes(unnamed) == [("area 2", 2), ("area 3", 3)]
+    assert sizes(changed_rows(unnamed, [area(4)], [])) == [
+        ("area 2", 2), ("area 3", 3), ("area 1", 4),
+    ]  # fmt: skip
+    with pytest.raises(ConfigurationError, match="no area sea"):
+        changed_rows(trees, [], ["sea"])

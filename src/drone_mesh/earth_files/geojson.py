@@ -88,7 +88,9 @@ def _add(found: Placemarks, feature: Any, origin: Origin) -> None:
     if not isinstance(properties, dict) or not isinstance(geometry, dict):
         raise ConfigurationError("expected properties and a geometry")
     drone, height = _drone(properties), properties.get("height")
-    for kind, coordinates in _shapes(geometry):
+    for kind, coordinates in shapes_in(geometry):
+        if kind not in _LINES_AND_POINTS:
+            continue
         parts = _list(coordinates) if kind.startswith("Multi") else [coordinates]
         for part in parts:
             if kind.endswith("Point"):
@@ -111,8 +113,11 @@ def _drone(properties: Mapping[str, Any]) -> int | None:
     return drone_named(str(properties.get("name") or ""))
 
 
-def _shapes(geometry: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """The points and lines of a geometry, those in collections included."""
+def shapes_in(geometry: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """The parts of a geometry, those in collections included: their types and coordinates.
+
+    Raises ConfigurationError.
+    """
     waiting = [geometry] if geometry else []
     while waiting:
         shape = waiting.pop()
@@ -121,7 +126,7 @@ def _shapes(geometry: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
             raise ConfigurationError(f"{reprlib.repr(shape)} is not a geometry")
         if kind == "GeometryCollection":
             waiting += reversed(_list(shape.get("geometries"), "geometries"))
-        elif kind in _LINES_AND_POINTS:
+        else:
             yield kind, shape.get("coordinates")
 
 

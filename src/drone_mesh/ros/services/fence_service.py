@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import threading
-from typing import Sequence
 
 import rospy
 from std_msgs.msg import String
@@ -12,7 +11,7 @@ from std_msgs.msg import String
 from drone_mesh import srv
 from drone_mesh.earth_files.plan import MAX_PLAN_CHARACTERS
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.fence_file import Row, areas_in, areas_json, fence_in, rows_of_text
+from drone_mesh.fence_file import Row, areas_in, areas_json, changed_rows, fence_in, rows_of_text
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.fleet_parameter import get_fleet_parameter
 from drone_mesh.ros.graph.master import MasterWatch
@@ -62,21 +61,10 @@ class FenceService:
             raise ConfigurationError(f"longer than {MAX_PLAN_CHARACTERS} characters")
         is_empty = not request.areas.strip()
         read = [] if is_empty else rows_of_text(request.areas, "areas", earth_origin(""))
-        rows, present = _by_name(read), _by_name(areas_in(fence_areas(fleet)))
         if not request.keep:
-            return [*rows.values()]
-        unknown = set(request.remove) - present.keys()
-        if unknown:
-            raise ConfigurationError(f"the fence has no area {min(unknown)}")
-        gone = rows.keys() | set(request.remove)
-        return [*(row for name, row in present.items() if name not in gone), *rows.values()]
+            return read
+        return changed_rows(areas_in(fence_areas(fleet)), read, request.remove)
 
     def _tell(self, areas: str) -> None:
         self._watch.keep(names.FENCE_PARAM, areas)
         self._publisher.publish(areas)
-
-
-def _by_name(rows: Sequence[Row]) -> dict[str, Row]:
-    """Of several areas with one name, which a page would delete together, the last."""
-    named = [{"name": f"area {number}", **row} for number, row in enumerate(rows, start=1)]
-    return {str(row["name"]): row for row in named}
