@@ -77,10 +77,10 @@ make_venv() {
   "$python" -m venv --clear --system-site-packages "$venv" || fail "could not make $venv"
 }
 
-# pip_install [--no-deps] FILE...: installs requirement files whose content has changed.
+# pip_install [OPTION...] FILE...: installs requirement files whose content has changed.
 pip_install() {
   local options=() file stamp
-  [ "$1" = --no-deps ] && { options=(--no-deps); shift; }
+  while [[ $1 == --* ]]; do options+=("$1"); shift; done
   for file in "$@"; do
     stamp="$venv/.installed-$(basename "$file")"
     cmp -s "$root/$file" "$stamp" && continue
@@ -161,12 +161,13 @@ alone() {
 }
 
 # prepare_physics: pybullet has no wheel for Python 3.12 and newer. pip builds it once and keeps the
-# wheel in its cache, so that the next checkout has it at once.
+# wheel in its cache, so that the next checkout has it at once. It must not see numpy while it builds:
+# gcc 14 refuses what it does with it, and only isolated builds are sure not to.
 prepare_physics() {
   "$venv/bin/python" -c 'import importlib.util as i; exit(i.find_spec("pybullet") is None)' && return
   apt_install g++ python3-dev
   say "pip builds pybullet from its source, unless it has done so before: some four minutes on two cores"
-  pip_install requirements/physics.txt
+  pip_install --use-pep517 requirements/physics.txt
 }
 
 can_compile() { "$venv/bin/python" -c 'import sys; exit(sys.version_info < (3, 10))'; }

@@ -15,8 +15,8 @@ def require_pybullet(purpose: str) -> None:
     """Raise ConfigurationError if pybullet is not installed."""
     if not _is_installed():
         raise ConfigurationError(
-            f"{purpose} needs pybullet: pip install -r requirements/physics.txt (Python 3.12 and "
-            "newer: pip builds it from source, some minutes)"
+            f"{purpose} needs pybullet: pip install --use-pep517 -r requirements/physics.txt "
+            "(Python 3.12 and newer: pip builds it from source, some minutes)"
         )
 
 
