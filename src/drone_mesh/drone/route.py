@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Sequence
 
-from drone_mesh.drone.flight_path import Point
+from drone_mesh.drone.flight_path import Point, Vector
 from drone_mesh.drone.location import Location
 
 LEAD_S = 2.5  # the target ahead, in seconds of flight; with 1.5 ArduCopter is slow
@@ -49,6 +49,11 @@ class Route:
     def end(self) -> Location:
         """The last corner."""
         return self._corners[-1]
+
+    @property
+    def ahead(self) -> list[Vector]:
+        """The target, and the corners after it."""
+        return [place.to_vector() for place in (self.target, *self._corners[self._next :])]
 
     def advance(self, here: Location, passed_s: float) -> bool:
         """Move the target for this time; returns whether the drone is at the end of the route."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import math
 from dataclasses import dataclass
+from typing import Sequence
 
 from drone_mesh.air.obstacles import no_path
 from drone_mesh.communication.events.observer import MeshEventKind
@@ -222,6 +223,9 @@ class DynamicEngine(DroneEngine):
             return
         self.pause_pilot(True)
         self._fly_anew(path, position, now_s)
+
+    def _ahead(self, path: FlightPath, now_s: float) -> Sequence[Vector]:
+        return super()._ahead(path, now_s) if self._route is None else self._route.ahead
 
     def _fly_anew(self, path: FlightPath | None, position: Vector, now_s: float) -> None:
         here = Location.from_vector(position)

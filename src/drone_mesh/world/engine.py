@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 from collections import deque
-from typing import Callable, NamedTuple
+from typing import Callable, NamedTuple, Sequence
 
 from drone_mesh.air.obstacles import no_path
 from drone_mesh.communication.events.observer import MeshEventKind
@@ -135,13 +135,17 @@ class DroneEngine(IDroneEngine):
         (position, path, _), now_s = self._state, self._world.now_s
         if path is None:
             return
-        way = [position, *path.ahead(now_s)]
+        way = [position, *self._ahead(path, now_s)]
         why_not = fence.raised(self._half_height_m).why_not_straight(way)
         if why_not:
             plan = self._plan(position, path.goal, now_s)
             self._fly_anew(plan, position, now_s)
             if plan is None:
                 self._note(MeshEventKind.GOAL_REFUSED, f"it stays where it is: {why_not}")
+
+    def _ahead(self, path: FlightPath, now_s: float) -> Sequence[Vector]:
+        """The corners that it still flies to."""
+        return path.ahead(now_s)
 
     def _fly_anew(self, path: FlightPath | None, position: Vector, now_s: float) -> None:
         self._notify(position, path, now_s)

@@ -66,6 +66,19 @@ def test_a_flight_ends_where_it_is_or_leads_round(factory, fence, end, words):
     assert fly(factory, 40.0)[-1][:2] == pytest.approx((14.0, 0.0), abs=0.2)
 
 
+def test_the_way_that_a_drone_has_left_to_fly_counts_not_the_one_of_a_quicker_drone(factory):
+    """One with physics climbs half as fast as a kinematic one, which would be past the gate."""
+    engine = factory.drones[0].engine
+    factory.keep_to(Fence.of([], [Zone("dam", (((22, -60), (23, -60), (23, 8), (22, 8)),))]))
+    engine.set_goal(0.0, 40.0, 0.0)
+    fly(factory, 19.5 if engine.battery_percent() else 10.0)
+    assert engine.get_location().longitude < 21.0
+    gate = Fence.of([], [Zone("gate", (((22, 7), (23, 7), (23, 14), (22, 14)),))])
+    factory.keep_to(gate)
+    assert not any(map(gate.why_not, fly(factory, 40.0)))
+    assert engine.get_location().longitude == pytest.approx(40.0, abs=0.2)
+
+
 def test_a_pilot_pauses_at_the_fence(factory):
     engine = factory.drones[0].engine
     engine.fly_with(Mission([(0.0, 0.0, 2.0), (12.0, 0.0, 2.0)], 1.0, False).pilot())
