@@ -17,6 +17,7 @@ BESIDE_M = 1.5  # between the two places of a post: the clearance, and what phys
 NEAR_M = 2.0  # of a free post: who comes to rest there holds it; a repair ends beside the place
 _MOST_PLACES = 255  # of posts, in an Airspace
 _WAYS = 8  # directions in which the place beside is searched
+_RISES_M = (2.0, 4.0, 6.0, 8.0)  # above others in its way home; whole metres, as orders say
 
 
 @dataclass
@@ -88,6 +89,25 @@ class Ways:
                 if met is not None and all(self._places[count] == place for count in met):
                     return place.as_ordered()
         return None
+
+    def home(self, node: NodeStatus, home: Location, range_m: float) -> Location:
+        """Where it flies next to come home: there, or first up, if those at rest are in the way.
+
+        Up there it has to hear the next order.
+        """
+        resting, here = Airspace(self._rules.sway_m, self._rules.clearance_m), place_of(node)
+        others = [other for other in self._nodes if other.id != node.id]
+        for other in others:
+            if not len(other.path):
+                resting.add_resting(other.id, other.position)
+        if self._met(resting, here, home):
+            connected = [place_of(other) for other in others if other.on and other.connected]
+            for above in (here._replace(height=here.height + rise_m) for rise_m in _RISES_M):
+                is_in_reach = any(above.distance_m(other) < range_m for other in connected)
+                ways = self._met(resting, here, above), self._met(resting, above, home)
+                if is_in_reach and ways == ([], []):
+                    return above.as_ordered()
+        return home
 
     def places_at(self, node: NodeStatus, home: Location | None, range_m: float) -> list[Location]:
         """Where it hovers, and a place beside that it can reach and that keeps the most links.

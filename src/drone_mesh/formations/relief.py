@@ -7,9 +7,8 @@ standing orders: Departures lets drones set out one after the other, clear of ea
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import asdict
-from typing import Any, Mapping, NamedTuple
+from typing import Any, Collection, Mapping, NamedTuple
 
 from drone_mesh.drone.battery import READY_PERCENT, PowerModel
 from drone_mesh.drone.fence import Fence
@@ -26,6 +25,7 @@ CARRIES_S = 5.0  # connected for so long, the new one carries the traffic of the
 WAIT_S = 30.0  # chosen here: for other flights, before both flights of a relief
 GIVE_UP_S = 90.0  # and the time of its flight: who has not come by then is replaced
 SILENT_S = 10.0  # chosen here: a mesh has found other routes by then
+UNHEARD_S = 1.0  # chosen here: who heard it has missed several packets before
 MOST_AT_ONCE = 8  # more flights wait for each other
 
 
@@ -42,8 +42,16 @@ class _Look(NamedTuple):
 
     mesh: MeshStatus
     known: Mapping[int, NodeStatus]  # those whose places are known
+    heard: Collection[int]  # who is a neighbour of anybody who is connected; empty: not known
     orders: StandingOrders
     rules: FlightRules
+
+
+class _Leg(NamedTuple):
+    """A flight on the way home."""
+
+    number: int  # of its standing order
+    to: Location
 
 
 class Relief:
@@ -62,7 +70,7 @@ class Relief:
         self._policy, self._rules = policy, rules
         self._reserves = Reserves(rules.hover_s, homes or {})
         self._posts: list[Post] = []
-        self._homing: dict[int, int | None] = {}  # ordered home, by which order
+        self._homing: dict[int, _Leg | None] = {}  # ordered home; None: it is not known where
         self._silent: set[int] = set()  # they fell silent at a post, or on the way to one
         self._away: set[int] = set()  # a repair took them where they are
         self._fence = Fence()
@@ -82,13 +90,16 @@ class Relief:
         if not self.is_active:
             return
         known = {node.id: node for node in mesh.nodes if position_is_known(node)}
-        look = _Look(mesh, known, orders, rules)
+        heard: set[int] = set().union(*(node.neighbours for node in mesh.nodes if node.connected))
+        look = _Look(mesh, known, heard, orders, rules)
         nodes = [node for node in known.values() if node.role != Role.GATEWAY]
         for node in nodes:
             self._reserves.look(node, mesh.stamp_s)
-            number, homes = self._homing.get(node.id), self._reserves.homes
-            if not is_in_air(node) or (number and _is_off(node, homes[node.id], number, orders)):
+            leg = self._homing.get(node.id)
+            if not is_in_air(node) or (leg and _is_off(node, leg.to, leg.number, orders)):
                 self._homing.pop(node.id, None)
+            elif leg and not len(node.path) and self._way_home(node, look) != leg.to:
+                self._send_home(node.id, look)
         for post in list(self._posts):
             self._watch_holder(post, look)
         busy = {*self._homing, *(post.holder for post in self._posts)}
@@ -121,10 +132,12 @@ class Relief:
         flies = node is not None and len(node.path) > 0
         is_there = node is not None and leads_to(node, post.places) and not len(node.heading)
         if node is not None and (
-            node.connected or (post.heard_s is not None and not self._is_in_reach(node, look))
+            _is_connected(node, look)
+            or (post.heard_s is not None and not self._is_in_reach(node, look))
         ):
             post.heard_s = look.mesh.stamp_s
-        is_mute = post.heard_s is not None and look.mesh.stamp_s - post.heard_s > SILENT_S
+        patience_s = UNHEARD_S if node is not None and _is_cut_off(node, look) else SILENT_S
+        is_mute = post.heard_s is not None and look.mesh.stamp_s - post.heard_s > patience_s
         is_lost = node is None or not node.on or node.crashed or is_mute or repairs(node)
         if node is None or is_lost or (is_low(node) and not is_there):
             if node is None or not repairs(node):
@@ -154,7 +167,7 @@ class Relief:
         is_silent = node.id in self._silent - self._away
         if not free and node.id not in self._silent | self._away:
             self._posts.append(Post(self._places_at(node, look), node.id))
-        elif not node.connected:
+        elif not _is_connected(node, look):
             return
         elif free:
             free[0].holder = node.id
@@ -187,7 +200,8 @@ class Relief:
         return home is not None and is_at(node, home)
 
     def _is_ready(self, node: NodeStatus, look: _Look) -> bool:
-        can_fly = node.on and node.connected and not node.crashed and not node.why_not_fly
+        is_well = node.on and _is_connected(node, look) and not node.crashed
+        can_fly = is_well and not node.why_not_fly
         if not can_fly or node.battery < READY_PERCENT or not self._is_home(node):
             return False
         home = self._reserves.homes[node.id]
@@ -204,11 +218,12 @@ class Relief:
         ready = [d for d in spares if d not in busy and self._is_ready(known[d], look)]
 
         free = [post for post in self._posts if post.holder is None and post.turn is None]
-        for post, new in itertools.product(free, ready):
-            to = ways.to(homes[new], post)
-            if to is not None:
-                self._send(post, new, to, look)
-                return True
+        for post in free:
+            for new in sorted(ready, key=lambda d: homes[d].distance_m(post.places[0])):
+                to = ways.to(homes[new], post)
+                if to is not None:
+                    self._send(post, new, to, look)
+                    return True
 
         at_rest = [d for d in held.keys() & known.keys() if not len(known[d].path)]
         waits_s = {d: self._reserves.flight_s(d, place_of(known[d])) for d in at_rest}
@@ -255,8 +270,9 @@ class Relief:
         else:
             turn.arrived = True
             since_s = now_s if turn.there_s is None else turn.there_s
-            turn.there_s = since_s if new.connected else None
-            if new.connected and now_s - since_s >= CARRIES_S:
+            is_connected = _is_connected(new, look)
+            turn.there_s = since_s if is_connected else None
+            if is_connected and now_s - since_s >= CARRIES_S:
                 self._end(post, look)
                 old, post.holder, post.heard_s = post.holder, turn.new, now_s
                 if old is not None:
@@ -284,11 +300,16 @@ class Relief:
             self._send_home(new.id, look)
 
     def _send_home(self, drone: int, look: _Look) -> None:
-        home, number = self._reserves.homes.get(drone), None
-        if home is not None:
+        leg = None
+        if drone in self._reserves.homes:
+            to = self._way_home(look.known[drone], look)
             name = f"drone {drone} goes home"
-            number = look.orders.give(name, {drone: home}, look.mesh.stamp_s)
-        self._homing[drone] = number  # without a known home too: it holds no post any more
+            leg = _Leg(look.orders.give(name, {drone: to}, look.mesh.stamp_s), to)
+        self._homing[drone] = leg  # without a known home too: it holds no post any more
+
+    def _way_home(self, node: NodeStatus, look: _Look) -> Location:
+        home = self._reserves.homes[node.id]
+        return home if len(node.path) else self._ways(look).home(node, home, look.mesh.max_distance)
 
     # For a restart ---------------------------------------------------------------------------
 
@@ -305,9 +326,21 @@ class Relief:
     def restore(self, saved: Mapping[str, Any]) -> None:
         """Go on with what `saved` returned. Raises KeyError, TypeError or ValueError."""
         posts = [Post.restored(post) for post in saved["posts"]]
-        self._homing = {int(drone): number for drone, number in saved["homing"]}
+        self._homing = {
+            int(drone): leg and _Leg(int(leg[0]), Location(*leg[1]))
+            for drone, leg in saved["homing"]
+        }
         self._reserves.homes.update({int(n): Location(*home) for n, home in saved["homes"]})
         self._posts, self._silent, self._away = posts, set(saved["silent"]), set(saved["away"])
+
+
+def _is_connected(node: NodeStatus, look: _Look) -> bool:
+    return node.connected and not _is_cut_off(node, look)
+
+
+def _is_cut_off(node: NodeStatus, look: _Look) -> bool:
+    """Whether nobody hears it, or it hears nobody, while others hear each other."""
+    return len(look.heard) > 0 and (node.id not in look.heard or not len(node.neighbours))
 
 
 def _is_off(node: NodeStatus, to: Location, number: int | None, orders: StandingOrders) -> bool:

@@ -461,3 +461,69 @@ def test_who_ends_a_repair_away_from_all_posts_goes_home_when_they_are_held_and_
     mesh.spare.position = place.to_vector()
     assert mesh.sent(8) == {1: OTHER}
     assert list(mesh.posts()) == [2]
+
+
+def neighbours(mesh):
+    """Holder, spare and a third drone hear each other."""
+    third = NodeStatus(3, connected=True, position=(-3.0, 2.0, 4.0), battery=50.0)
+    mesh.others = [third]
+    for node, heard in ((mesh.holder, (2, 3)), (mesh.spare, (1, 3)), (third, (1, 2))):
+        node.neighbours = bytes(heard)
+    mesh.sent(2)
+
+
+def test_a_drone_that_nobody_hears_any_more_is_replaced_although_it_believes_to_be_connected():
+    mesh = Mesh()
+    neighbours(mesh)
+    mesh.spare.neighbours, mesh.others[0].neighbours = bytes([3]), bytes([2])
+    assert mesh.sent() == {}
+    assert list(mesh.sent()) == [2]
+
+
+def test_a_drone_that_hears_nobody_is_replaced_as_soon():
+    mesh = Mesh()
+    neighbours(mesh)
+    mesh.holder.neighbours, mesh.holder.connected = b"", False
+    assert mesh.sent() == {}
+    assert list(mesh.sent()) == [2]
+
+
+def test_a_drone_that_looks_for_a_route_among_its_neighbours_is_left_time_for_that():
+    mesh = Mesh()
+    neighbours(mesh)
+    mesh.holder.connected = False
+    assert mesh.sent(10) == {}
+    assert list(mesh.sent(2)) == [2]
+
+
+def test_a_gap_is_filled_by_the_nearest_drone_that_is_full():
+    mesh = Mesh()
+    near = NodeStatus(3, connected=True, position=(4.0, 6.0, 0.0), battery=100.0)
+    mesh.spare.position, mesh.others = (20.0, 4.0, 0.0), [near]
+    mesh.relief = Relief(relief_policy("spare_first"))
+    mesh.sent()
+    mesh.holder.on = False
+    assert list(mesh.sent()) == [3]
+
+
+def test_a_drone_whose_way_home_leads_past_a_drone_at_rest_goes_up_first():
+    mesh = Mesh()
+    mesh.spare.battery = 50.0
+    mesh.holder.position = (4.0, 3.0, 4.0)
+    mesh.others = [NodeStatus(3, connected=True, position=(7.2, 1.2, 4.0), battery=90.0)]
+    mesh.sent()
+    mesh.hover(mesh.holder, 22.0)
+    ((drone, above),) = mesh.sent().items()
+    assert (drone, above[:2]) == (1, (3.0, 4.0))
+    assert 5.0 < above.height < 12.0
+    mesh.orders.forget_complete()
+    assert mesh.sent(3) == {}
+    assert fly(mesh, mesh.holder, above) == {1: OTHER}
+    left = json.loads(json.dumps([mesh.orders.saved(), mesh.relief.saved()]))
+    mesh.orders, mesh.relief = StandingOrders(), Relief(relief_policy("spare_first"))
+    mesh.orders.restore(left[0])
+    mesh.relief.restore(left[1])
+    assert mesh.sent(30) == {1: OTHER}
+    fly(mesh, mesh.holder, OTHER)
+    assert mesh.sent(30) == {}
+    assert mesh.posts().keys() == {None, 3}
