@@ -11,8 +11,8 @@ APPLY = """async (events) => {
   const list = document.createElement("ol");
   document.body.append(list);
   new EventLog(mesh, list, () => true);
-  for (const [t, node, kind, peers] of events) {
-    const event = { t, node, kind, peers: peers ?? [], detail: "" };
+  for (const [t, node, kind, peers, detail] of events) {
+    const event = { t, node, kind, peers: peers ?? [], detail: detail ?? "" };
     mesh.apply({ clock: {}, events: [event] });
   }
   list.querySelector(".when")?.click();
@@ -62,3 +62,9 @@ def test_orders_to_several_drones_are_orders(log):
 def test_a_flight_back_to_its_own_place_is_a_return(log):
     assert log((1.0, 2, "flight decided", [2])) == ["1.0 s 2 returns to where it was"]
     assert log((1.0, 3, "flight decided", [2]))[0].startswith("1.0 s 3 flies to the place of 2")
+
+
+def test_the_last_flight_of_a_drone_without_a_mesh_is_no_repair(log):
+    why = "flies home: no gateway for 120 s"
+    rows = log(*((1.0, node, "flight decided", [], why) for node in (2, 3)))
+    assert rows[0].startswith(f"1.0 s 2, 3 leave the lost mesh ({why})")

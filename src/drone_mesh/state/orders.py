@@ -75,6 +75,12 @@ class FollowedOrder:
         return ", ".join(parts)
 
 
+def _deed(event: EventRecord) -> str:
+    """What its drone did, in words; a flight to no node's place is its last one, and says why."""
+    is_last = event.kind == MeshEventKind.FLIGHT_DECIDED.value and not event.peers
+    return event.detail if is_last else _DEEDS[event.kind]
+
+
 def way_left(node: NodeStatus, goal: Location) -> tuple[float, float] | None:
     """Straight metres and about how many seconds a drone still flies to `goal`; None: it does not.
 
@@ -166,7 +172,7 @@ class OrderWatch:
         for event in events:
             if event.kind in _DEEDS and event.node in self._latest:
                 latest = self._latest[event.node]
-                latest.deeds = (*latest.deeds, _DEEDS[event.kind])[-2:]
+                latest.deeds = (*latest.deeds, _deed(event))[-2:]
             order = _order_in(event)
             if order is not None:
                 self._follow(event.peers[0], order)

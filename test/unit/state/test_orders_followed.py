@@ -100,6 +100,8 @@ def test_what_a_drone_did_after_its_arrival_is_told():
     followed.on_events([EventRecord(9.0, 5, "flight decided", (2,))])
     away = NodeStatus(5, position=(1.0, 190.0, 3.0))
     assert followed.since(away) == "flew to repair the mesh, is 188 m from there"
+    followed.on_events([EventRecord(9.5, 5, "flight decided", (), "lands: no gateway for 120 s")])
+    assert followed.since(away).startswith("flew to repair the mesh, lands: no gateway for 120 s")
     followed.on_events([event(10.0, *SENT_EIGHT)])
     assert followed.since(away) == ""
 

@@ -25,6 +25,7 @@ const SENTENCES = {
   "negotiation ended": ["", "NODE learned that PEERS flies"],
   "flight decided": ["flight", "NODE flies|fly to the place of PEERS, to repair the mesh"],
   return: ["flight", "NODE returns to where it was"],
+  "last flight": ["flight", "NODE leaves|leave the lost mesh"],
   "flight ordered": ["flight", "NODE flies|fly, ordered by PEERS"],
   landed: ["flight", "NODE landed"],
   crashed: ["bad", "NODE crashed"],
@@ -114,8 +115,7 @@ export class EventLog {
 
   #write(said) {
     const { kind, ofPeers, others, events, row } = said;
-    const returns = kind === "flight decided" && String(others) === String(events[0].id);
-    const [tone, sentence] = SENTENCES[returns ? "return" : kind] ?? ["", `NODE ${kind} PEERS`];
+    const [tone, sentence] = SENTENCES[deed(said)] ?? ["", `NODE ${kind} PEERS`];
     const ids = sorted(events.map(({ id }) => id));
     const [nodes, peers] = ofPeers ? [others, ids] : [ids, sorted(others)];
     const text = document.createElement("span");
@@ -166,6 +166,13 @@ export class EventLog {
     }
     return each;
   }
+}
+
+/** Its kind; of a flight that the node decided on itself, whether that repairs the mesh. */
+function deed({ kind, others, events }) {
+  if (kind !== "flight decided") return kind;
+  if (!others.length) return "last flight";
+  return String(others) === String(events[0].id) ? "return" : kind;
 }
 
 function sorted(ids) {
