@@ -36,19 +36,26 @@ class Turn(NamedTuple):
     """Where a way round something may turn."""
 
     at: Point
-    beside: tuple[Point, Point] | None = None  # corners to both sides; None: it may turn anyhow
+    corners: tuple[Point, Point, Point] | None = None  # its own between two; None: it may anyhow
 
     def is_touched_from(self, other: Point) -> bool:
-        """Whether a straight way from there passes both of them on one side.
+        """Whether a straight way from there passes both corners beside its own on one side.
 
-        A shortest way touches what it goes round: it has no other pieces.
+        A shortest way touches what it goes round: it has no other pieces. From nearer to an edge
+        than this turn is, it touches the corner itself.
         """
-        if self.beside is None:
+        if self.corners is None:
             return True
-        (x, y), (dx, dy) = self.at, (self.at[0] - other[0], self.at[1] - other[1])
-        one, two = (dx * (v - y) - dy * (u - x) for u, v in self.beside)
-        slack = _SHORT_M * (abs(dx) + abs(dy))
-        return max(one, two) <= slack or min(one, two) >= -slack
+        before, corner, after = self.corners
+        return _passes(other, self.at, before, after) or _passes(other, corner, before, after)
+
+
+def _passes(start: Point, end: Point, one: Point, other: Point) -> bool:
+    """Whether both places are on one side of the line from start to end."""
+    (x, y), (dx, dy) = end, (end[0] - start[0], end[1] - start[1])
+    left, right = (dx * (v - y) - dy * (u - x) for u, v in (one, other))
+    slack = _SHORT_M * (abs(dx) + abs(dy))
+    return max(left, right) <= slack or min(left, right) >= -slack
 
 
 @dataclass(frozen=True)
@@ -348,7 +355,7 @@ def _turns(points: Sequence[Point], ring: Sequence[Point]) -> Iterator[Turn]:
     """Turns at these points: one off each corner of this ring, or off every few of them."""
     for number, at in enumerate(points):
         corner = number * len(ring) // len(points)
-        yield Turn(at, (ring[corner - 1], ring[(corner + 1) % len(ring)]))
+        yield Turn(at, (ring[corner - 1], ring[corner], ring[(corner + 1) % len(ring)]))
 
 
 def _around(center: Point, radius_m: float, corners: int) -> Ring:

@@ -150,7 +150,9 @@ def test_a_way_round_many_corners_asks_of_few_legs():
     assert len(asked) < 1200  # of the 2145 between two of its corners
 
 
-def test_the_shortest_way_is_found_among_ways_that_touch_corners(monkeypatch):
+@pytest.mark.parametrize("beside_m", [None, 0.1])
+def test_the_shortest_way_is_found_among_ways_that_touch_corners(monkeypatch, beside_m):
+    """Between any places, and between places nearer to an edge than a way round turns."""
     rng = random.Random(3)
     found = []
     for _ in range(40):
@@ -159,6 +161,8 @@ def test_the_shortest_way_is_found_among_ways_that_touch_corners(monkeypatch):
             for n in range(4)
         ]
         ends = [(rng.uniform(-5, 65), rng.uniform(-5, 65)) for _ in "ab"]
+        if beside_m is not None:
+            ends = [_beside(*rng.choice(rng.choice(zones).edges), beside_m) for _ in "ab"]
         found.append((Fence.of([], zones).rules, *ends))
     ways = [way_round(rules, a, b, 5.0) for rules, a, b in found]
     monkeypatch.setattr(Turn, "is_touched_from", lambda *_places: True)
@@ -170,6 +174,13 @@ def _jagged(rng, x, y):
     for n in range(12):
         metres = rng.uniform(3.0, 12.0)
         yield x + metres * math.cos(n * math.tau / 12), y + metres * math.sin(n * math.tau / 12)
+
+
+def _beside(one, other, metres):
+    """Outside the middle of an edge of a ring that turns left."""
+    (x, y), (dx, dy) = one, (other[0] - one[0], other[1] - one[1])
+    share = metres / math.hypot(dx, dy)
+    return x + dx / 2 + share * dy, y + dy / 2 - share * dx
 
 
 def _metres(start, way, end):
