@@ -78,6 +78,15 @@ def test_one_that_turns_in_the_air_does_not_rest_there():
     assert close_ones(record({1: (0, 0, 0), 2: (5, 5, 0)}, *legs)) == (0, 1)
 
 
+def test_one_that_cannot_climb_higher_does_not_rest_there():
+    """2 sets out at its ceiling and hangs there as long as it would climb: 1 passes just then."""
+    legs = (
+        flight(1, (0, 0, 0), (10, 0, 0)),
+        Leg(2, FlightPath((5, 0, 5), (5, 16, 0), 2.0, ceiling_m=5.0), True, False),
+    )
+    assert close_ones(record({1: (0, 0, 0), 2: (5, 0, 5)}, *legs)) == (0, 1)
+
+
 def test_an_ordered_flight_is_no_repair():
     places = {1: (0, 0, 0), 2: (10, 0, 0)}
     assert approaches(record(places, flight(1, (0, 0, 0), (10, 0, 0)), kind=ORDERED), 1.0) == []

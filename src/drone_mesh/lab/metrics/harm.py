@@ -38,6 +38,7 @@ class _Piece(NamedTuple):
     end_s: float
     start: Place
     end: Place
+    in_flight: bool
     is_repair: bool
 
 
@@ -52,7 +53,7 @@ def approaches(run: RunRecord, within_m: float) -> list[Approach]:
         for piece, others in itertools.product(ways[flier], ways[other]):
             if not piece.is_repair or not _overlap(piece, others):
                 continue
-            found = Approach(flier, other, *_moment(piece, others), others.start != others.end)
+            found = Approach(flier, other, *_moment(piece, others), others.in_flight)
             pair = (min(flier, other), max(flier, other), found.in_the_air)
             before_m = nearest[pair].metres if pair in nearest else within_m
             if found.metres < before_m:
@@ -66,10 +67,10 @@ def _way(run: RunRecord, node: int, place: Place) -> Iterator[_Piece]:
         if leg.node != node:
             continue
         if now_s < leg.path.start_s:  # it did not only turn in the air
-            yield _Piece(now_s, leg.path.start_s, place, place, False)
+            yield _Piece(now_s, leg.path.start_s, place, place, False, False)
         yield from _pieces(leg, _is_repair(run, leg))
         now_s, place = leg.end_s, leg.path.position_at(leg.end_s)
-    yield _Piece(now_s, max(now_s, run.end_s), place, place, False)
+    yield _Piece(now_s, max(now_s, run.end_s), place, place, False, False)
 
 
 def _is_repair(run: RunRecord, leg: Leg) -> bool:
@@ -92,7 +93,7 @@ def _pieces(leg: Leg, is_repair: bool) -> Iterator[_Piece]:
         end_s = min(planned_s, leg.end_s)
         if start_s < end_s:
             ends = path.position_at(start_s), path.position_at(end_s)
-            yield _Piece(start_s, end_s, *ends, is_repair)
+            yield _Piece(start_s, end_s, *ends, True, is_repair)
 
 
 def _overlap(piece: _Piece, other: _Piece) -> bool:
