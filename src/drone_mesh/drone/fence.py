@@ -299,11 +299,15 @@ class Fence:
 
     def nearest_inside(self, place: Vector) -> Vector | None:
         """The nearest place at the same height that keeps all rules; None: there is none."""
+        return next(self.places_inside(place), None)
+
+    def places_inside(self, place: Vector) -> Iterator[Vector]:
+        """That one, and others beside edges and corners, the nearest first."""
         found = (point for zone, _inside in self.zones for point in zone.nearest(place))
         corners = (point for zone, _inside in self.zones for point in zone.beside)
         points = sorted({*found, *corners}, key=lambda point: math.dist(point, place[:2]))
         places = ((x, y, place[2]) for x, y in points)
-        return next((one for one in (place, *places) if not self.why_not(one)), None)
+        return (one for one in (place, *places) if not self.why_not(one))
 
 
 def called(names: str) -> str:

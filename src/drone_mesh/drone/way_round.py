@@ -28,7 +28,8 @@ def way_across(
     """The corners of a way from above `start` to above `goal`, at this height.
 
     None: there is no way, or the climb or the descent would break a rule. A drone that is outside
-    first flies to the nearest place inside, at this height; its climb may begin outside.
+    first flies straight to the nearest place inside that it can reach so, at this height; its climb
+    may begin outside.
     """
     above, entry = (*start[:2], height_m), (*start[:2], height_m)
     kept = [rule for rule in fence.rules if rule.allows(start)]
@@ -38,8 +39,10 @@ def way_across(
         return None
     begin: tuple[Point, ...] = ()
     if fence.why_not(above):
-        inside = fence.nearest_inside(above)
-        if inside is None or any(one.meets(above, inside) for one in (*boxes, *kept)):
+        shut = (*boxes, *kept)
+        places = fence.places_inside(above)
+        inside = next((p for p in places if not any(o.meets(above, p) for o in shut)), None)
+        if inside is None:
             return None
         entry, begin = inside, (inside[:2],)
     corners = way_round([*boxes, *fence.rules], entry[:2], goal[:2], height_m)
