@@ -213,7 +213,7 @@ class DroneEngine(IDroneEngine):
     def _piloted(self, pilot: TrackPilot, held: Vector, now_s: float) -> Vector:
         """Where its pilot wants it instead of there; at the fence the pilot pauses."""
         place = pilot.move(held, now_s)
-        why_not = self.fence.why_not(place) if self.fence else ""
+        why_not = self.fence.why_not_straight([held, place])
         if not why_not:
             return place
         self.pause_pilot(True)
