@@ -60,6 +60,11 @@ def is_at(node: NodeStatus, *places: Location) -> bool:
     return not len(node.path) and leads_to(node, places, AT_PLACE_M)
 
 
+def is_cut_off(node: NodeStatus, heard: Collection[int]) -> bool:
+    """Whether none of the others hears it, or it hears nobody; `heard`: whom anybody hears."""
+    return len(heard) > 0 and (node.id not in heard or not len(node.neighbours))
+
+
 def _end_of(node: NodeStatus) -> Location:
     return Location.from_vector(node.path[-3:]) if len(node.path) else place_of(node)
 

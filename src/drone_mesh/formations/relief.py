@@ -15,7 +15,7 @@ from drone_mesh.drone.fence import Fence
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
 from drone_mesh.formations.departures import FlightRules
-from drone_mesh.formations.posts import NEAR_M, Post, Turn, Ways, is_at, leads_to
+from drone_mesh.formations.posts import NEAR_M, Post, Turn, Ways, is_at, is_cut_off, leads_to
 from drone_mesh.formations.relief_policies import IReliefPolicy, ReliefView
 from drone_mesh.formations.reserves import Reserves, is_in_air, is_low, place_of, repairs
 from drone_mesh.formations.standing_orders import StandingOrders
@@ -136,7 +136,7 @@ class Relief:
             or (post.heard_s is not None and not self._is_in_reach(node, look))
         ):
             post.heard_s = look.mesh.stamp_s
-        patience_s = UNHEARD_S if node is not None and _is_cut_off(node, look) else SILENT_S
+        patience_s = UNHEARD_S if node is not None and is_cut_off(node, look.heard) else SILENT_S
         is_mute = post.heard_s is not None and look.mesh.stamp_s - post.heard_s > patience_s
         is_lost = node is None or not node.on or node.crashed or is_mute or repairs(node)
         if node is None or is_lost or (is_low(node) and not is_there):
@@ -335,12 +335,7 @@ class Relief:
 
 
 def _is_connected(node: NodeStatus, look: _Look) -> bool:
-    return node.connected and not _is_cut_off(node, look)
-
-
-def _is_cut_off(node: NodeStatus, look: _Look) -> bool:
-    """Whether nobody hears it, or it hears nobody, while others hear each other."""
-    return len(look.heard) > 0 and (node.id not in look.heard or not len(node.neighbours))
+    return node.connected and not is_cut_off(node, look.heard)
 
 
 def _is_off(node: NodeStatus, to: Location, number: int | None, orders: StandingOrders) -> bool:

@@ -9,7 +9,8 @@ from typing import Callable, Collection, Mapping, Sequence
 from drone_mesh.drone.location import Location
 from drone_mesh.formations.layouts import Layouts
 from drone_mesh.formations.preview import preview
-from drone_mesh.formations.standing_orders import PartState, StandingOrders
+from drone_mesh.formations.standing_order import PartState
+from drone_mesh.formations.standing_orders import StandingOrders
 from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.node import event_records
 from drone_mesh.lab.network_sample import gateways_of, physical_graph

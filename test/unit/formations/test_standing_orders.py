@@ -15,7 +15,8 @@ from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
 from drone_mesh.formations.departures import FlightRules
 from drone_mesh.formations.layouts import Layouts
-from drone_mesh.formations.standing_orders import PartState, StandingOrders
+from drone_mesh.formations.standing_order import PartState
+from drone_mesh.formations.standing_orders import StandingOrders
 from drone_mesh.inprocess.network import Network
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
 

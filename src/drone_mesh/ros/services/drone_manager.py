@@ -16,7 +16,7 @@ from drone_mesh.drone.fleet import ids_in_words
 from drone_mesh.drone.goal import check_apart, check_goal
 from drone_mesh.errors import GoalRefused
 from drone_mesh.formations.layouts import MAX_NAME, Layouts, Order, UnknownCase
-from drone_mesh.formations.standing_orders import PartState
+from drone_mesh.formations.standing_order import PartState
 from drone_mesh.msg import FlightOrderAnswer, RequestGatewayDroneFlight
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import start_node

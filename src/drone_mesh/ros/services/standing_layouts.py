@@ -22,7 +22,8 @@ from drone_mesh.formations.layouts import Order
 from drone_mesh.formations.preview import FormationPreview, LostRoutes, lost_routes, preview
 from drone_mesh.formations.relief import Relief, ReliefRules
 from drone_mesh.formations.relief_policies import relief_policy
-from drone_mesh.formations.standing_orders import PartState, StandingOrders, StandingProgress
+from drone_mesh.formations.standing_order import PartState, StandingProgress
+from drone_mesh.formations.standing_orders import StandingOrders
 from drone_mesh.msg import (
     LayoutAction,
     LayoutFeedback,
