@@ -128,10 +128,14 @@ class MeshHost:
 
     def keep_to(self, fence: Fence) -> None:
         """Let all nodes, and those that start later, know this fence from now on."""
-        obstacles = replace(self._settings.obstacles or Obstacles(()), fence=fence)
-        self._settings = replace(self._settings, obstacles=obstacles)
-        for node in list(self.nodes.values()):
-            node.slot.submit(functools.partial(node.keep_to, obstacles))
+
+        def keep(_now_s: float) -> None:
+            obstacles = replace(self._settings.obstacles or Obstacles(()), fence=fence)
+            self._settings = replace(self._settings, obstacles=obstacles)
+            for node in self.nodes.values():
+                node.slot.submit(functools.partial(node.keep_to, obstacles))
+
+        self.executor.submit(keep)  # not while a node starts, which would miss it
 
     def stop(self) -> None:
         """Stop all threads; returns when they have ended. Nodes not started yet never start."""
