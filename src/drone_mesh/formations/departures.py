@@ -37,29 +37,40 @@ class Reach:
         self, places: Mapping[int, Sequence[float]], gateways: Iterable[int], range_m: float
     ) -> None:
         """`places` of all nodes that are on, in metres."""
-        self._gateways = list(gateways)
-        ids: np.ndarray = np.fromiter(places, int, len(places))
+        self._gateways = set(gateways)
+        self._ids = [int(node) for node in places]
+        self._bits = {node: 1 << row for row, node in enumerate(self._ids)}
         points: np.ndarray = np.array(list(places.values()), dtype=float).reshape(-1, 3)
         away = points[:, None] - points[None]
-        near = (away * away).sum(axis=-1) < range_m**2
-        self._near = {int(one): set(ids[near[row]].tolist()) for row, one in enumerate(ids)}
+        near = np.packbits((away * away).sum(axis=-1) < range_m**2, axis=-1, bitorder="little")
+        self._near = [int.from_bytes(row.tobytes(), "little") for row in near]  # a bit a node
 
     def over(self, relays: Collection[int]) -> set[int]:
         """The drones, without gateways, that have a path to a gateway over these drones."""
-        return self.hops(relays).keys() - set(self._gateways)
+        return self.hops(relays).keys() - self._gateways
 
     def hops(self, relays: Collection[int]) -> dict[int, int]:
         """The hops of each of them and of the gateways."""
-        allowed = set(relays) | set(self._gateways)
-        reached = dict.fromkeys(self._gateways, 0)
-        left, frontier, count = allowed - reached.keys(), set(reached), 0
+        reached: dict[int, int] = {}
+        left = self._set_of(relays)
+        frontier, count = self._set_of(self._gateways), 0
         while frontier:
-            count += 1
-            near: set[int] = set().union(*(self._near[node] for node in frontier))
-            frontier = near & left
-            left -= frontier
-            reached.update(dict.fromkeys(frontier, count))
+            left &= ~frontier
+            near = 0
+            while frontier:
+                lowest = frontier & -frontier
+                frontier ^= lowest
+                row = lowest.bit_length() - 1
+                reached[self._ids[row]] = count
+                near |= self._near[row]
+            frontier, count = near & left, count + 1
         return reached
+
+    def _set_of(self, nodes: Iterable[int]) -> int:
+        bits = 0
+        for node in nodes:
+            bits |= self._bits.get(node, 0)
+        return bits
 
 
 class FlightRules(NamedTuple):
@@ -123,7 +134,8 @@ class Departures:
         self._rerouting: set[int] = set()  # their routes lead over a drone that is leaving
         self._keep_away: set[int] = set()  # drones at rest that others wait for
         self._hinder: set[int] = set()  # drones at rest in the way of others, who wait anyway
-        members = self._reach.over(self._resting)
+        self._members: dict[int | None, set[int]] = {}  # until the next drone leaves
+        members = self._members_without(None)
         self._at_home = {n for n in self._resting & goals.keys() if self._is_at(n, goals[n])}
         self._connected = {n for n, node in self._nodes.items() if node.connected}
         can_go = members | self._connected
@@ -228,9 +240,15 @@ class Departures:
 
     def _stay_without(self, drone: int) -> set[int] | None:
         """The drones at rest that keep a path; None if one loses it that is still to be ordered."""
-        before = self._reach.over(self._resting)
-        after = self._reach.over(self._resting - {drone})
+        before = self._members_without(None)
+        after = self._members_without(drone)
         return None if (before - after - {drone}) & self._to_go else after
+
+    def _members_without(self, drone: int | None) -> set[int]:
+        """The drones at rest that have a path over the others of them."""
+        if drone not in self._members:
+            self._members[drone] = self._reach.over(self._resting - {drone})
+        return self._members[drone]
 
     def _are_enough(self, connected: int) -> bool:
         return connected + self._flying_are_members >= CONNECTED_SHARE * self._fleet
@@ -277,6 +295,7 @@ class Departures:
 
     def _leave(self, drone: int, path: FlightPath | None) -> None:
         self._resting.discard(drone)
+        self._members.clear()
         self._rerouting |= self._behind[drone]
         self._to_go.discard(drone)
         if path is None:  # the drone will refuse

@@ -33,6 +33,8 @@ class Fleet:
         self.now_s = 0.0
         self.under_order = {}  # drone -> place, when it sets out
         self.flights = {}
+        self.row = {n: row for row, n in enumerate(self.nodes)}
+        self.places = np.array([node.position for node in self.nodes.values()])
         self.nearest_m = np.inf
 
     def fly(self, goals, within_s):
@@ -69,13 +71,12 @@ class Fleet:
         for drone in moving:
             path = self.flights[drone]
             self.nodes[drone].position = path.position_at(self.now_s)
+            self.places[self.row[drone]] = self.nodes[drone].position
             if path.share_flown(self.now_s) >= 1.0:
                 del self.flights[drone]
         if moving:
-            ids = list(self.nodes)
-            places = np.array([self.nodes[n].position for n in ids])
-            rows = [ids.index(n) for n in moving]
-            apart = np.linalg.norm(places[rows][:, None] - places[None], axis=2)
+            rows = [self.row[n] for n in moving]
+            apart = np.linalg.norm(self.places[rows][:, None] - self.places, axis=2)
             apart[range(len(rows)), rows] = np.inf
             self.nearest_m = min(self.nearest_m, float(apart.min()))
 

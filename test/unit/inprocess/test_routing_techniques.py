@@ -99,7 +99,7 @@ def share_on_losing_links(technique):
     """Of 100 nodes whose links lose a fifth of all packets."""
     network = grid(technique, nodes=100, loss=0.2)
     network.run_for(30.0)
-    return connected_share(network, seconds=60)
+    return connected_share(network, seconds=30)
 
 
 @pytest.mark.slow

@@ -47,15 +47,15 @@ def test_if_only_those_behind_move_inward_the_neighbour_goes_on_to_the_place():
 def flown_in_draws_that_split(repair):
     """(with packets, with ideal information): metres of all drones, for each draw."""
     where = f"where=repair == '{repair}' and layout.drones == 20"
-    plan = Plan(load_experiment(SUITE, ["seeds=20", where]))
-    metres = {"mesh": [], "ideal": []}
-    for planned in plan:
-        values = execute(planned.spec).values
-        if values["split"]:
-            assert values["healed"] == 1.0
-            metres[plan.cells[planned.cell].values["model"]].append(values["distance_total_m"])
-    assert len(metres["mesh"]) >= 5
-    return metres["mesh"], metres["ideal"]
+    runs, metres = iter(Plan(load_experiment(SUITE, ["seeds=20", where]))), []
+    for mesh, ideal in zip(runs, runs):
+        known = execute(ideal.spec).values
+        if known["split"]:
+            values = execute(mesh.spec).values
+            assert (values["split"], values["healed"], known["healed"]) == (1.0, 1.0, 1.0)
+            metres.append((values["distance_total_m"], known["distance_total_m"]))
+    assert len(metres) >= 5
+    return zip(*metres)
 
 
 def test_over_packets_nearest_flies_exactly_as_far_as_with_ideal_information():
