@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import ClassVar, Sequence
+from typing import Any, ClassVar, Sequence
 
 from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.drone.battery import Crews
@@ -18,7 +18,6 @@ from drone_mesh.world.dynamic_engine import BodyLimits, DynamicEngine
 from drone_mesh.world.engine import DroneEngine
 from drone_mesh.world.worlds import PhysicalWorld, World
 
-HALF_HEIGHT_M = 0.1  # of the higher kind of box
 HALF_WIDTH_M = 0.15  # from the centre of a drone's box to its corner, plus a margin
 
 
@@ -44,7 +43,7 @@ class VirtualDrone:
         self.node_id = place.node_id
         size_m = self.role.size_m
         half_height_m = size_m[2] / 2
-        centre = (place.longitude, place.latitude, half_height_m)
+        centre = _centre(place)
         self.engine: DroneEngine
         if wind is not None and isinstance(world, PhysicalWorld):
             self.box = world.add_body(size_m, centre, limits.mass_kg)
@@ -98,13 +97,13 @@ class DroneFactory:
         self._wind = wind
         self._limits, self._crews = limits, crews
         self._obstacles = obstacles or Obstacles((), cruise_m=cruise_height_m)
-        self._for_flights = self._obstacles.for_flights(HALF_WIDTH_M, HALF_HEIGHT_M)
+        self._for_flights = _for_flights(self._obstacles)
         for place in fleet:
-            if not _is_free(place, self._for_flights):
+            why_not = self._why_not_there(place)
+            if why_not:
                 raise ConfigurationError(
-                    f"obstacles: drone {place.node_id} would start in or against a box, at "
-                    f"x {place.longitude:g} m, y {place.latitude:g} m; move the box, or change "
-                    "spacing and gridsize"
+                    f"drone {place.node_id} would start {why_not}, at x {place.longitude:g} m, "
+                    f"y {place.latitude:g} m; move that, or change spacing and gridsize"
                 )
         for box in self._obstacles.boxes:
             world.add_obstacle(box)
@@ -118,14 +117,9 @@ class DroneFactory:
     def keep_to(self, fence: Fence) -> None:
         """Let all drones, and later ones, keep this fence from now on. World's thread."""
         self._obstacles = replace(self._obstacles, fence=fence)
-        self._for_flights = self._obstacles.for_flights(HALF_WIDTH_M, HALF_HEIGHT_M)
+        self._for_flights = _for_flights(self._obstacles)
         for drone in self.drones:
             drone.engine.keep_to(fence)
-
-    def _plan(
-        self, start: Vector, goal: Vector, start_s: float, speed_m_s: float
-    ) -> FlightPath | None:
-        return self._for_flights.plan_flight(start, goal, start_s, speed_m_s)
 
     def get(self, node_id: int) -> VirtualDrone | None:
         """The present drone with this id; None: there is none. Any thread."""
@@ -181,9 +175,10 @@ class DroneFactory:
         drone.engine.leave()
 
     def _make(self, place: StartPlace) -> VirtualDrone:
-        drone = _KINDS[place.role](
-            self._world, place, self._wind, self._plan, self._limits, self._crews
-        )
+        def plan(*flight: Any) -> FlightPath | None:
+            return self._for_flights[place.role].plan_flight(*flight)
+
+        drone = _KINDS[place.role](self._world, place, self._wind, plan, self._limits, self._crews)
         drone.engine.fence = self.fence
         return drone
 
@@ -192,16 +187,26 @@ class DroneFactory:
             check_goal(place.latitude, place.longitude, 0.0)
         except GoalRefused as error:
             raise FleetRefused(f"invalid place: {error}") from None
-        if not _is_free(place, self._for_flights):
+        why_not = self._why_not_there(place)
+        if why_not:
             raise FleetRefused(
-                f"invalid place: x {place.longitude:g} m, y {place.latitude:g} m is in or against "
-                "an obstacle"
+                f"invalid place: x {place.longitude:g} m, y {place.latitude:g} m is {why_not}"
             )
-        centre = (place.longitude, place.latitude, place.role.size_m[2] / 2)
+        centre = _centre(place)
         for drone in self.drones:
             if math.dist(centre, drone.engine.state.position) < 2 * HALF_WIDTH_M:
                 raise FleetRefused(f"invalid place: drone {drone.node_id} is there")
 
+    def _why_not_there(self, place: StartPlace) -> str:
+        """Why a drone cannot stand there; empty if it can."""
+        obstacles, centre = self._for_flights[place.role], _centre(place)
+        why_not = obstacles.fence.why_not(centre)
+        return why_not or ("" if obstacles.is_free(centre) else "in or against a box")
 
-def _is_free(place: StartPlace, for_flights: Obstacles) -> bool:
-    return for_flights.is_free((place.longitude, place.latitude, place.role.size_m[2] / 2))
+
+def _for_flights(obstacles: Obstacles) -> dict[Role, Obstacles]:
+    return {role: obstacles.for_flights(HALF_WIDTH_M, role.size_m[2] / 2) for role in Role}
+
+
+def _centre(place: StartPlace) -> Vector:
+    return place.longitude, place.latitude, place.role.size_m[2] / 2

@@ -147,19 +147,27 @@ def test_the_preview_of_a_formation_names_the_fence():
     assert found.stays == {1: "inside fence pond, which drones stay out of"}
 
 
-def test_a_drone_of_the_world_refuses_a_goal_outside_and_flies_lower_than_usual():
+@pytest.mark.parametrize(
+    ("role", "x", "height"),
+    [
+        (Role.ROUTER, 29.0, 8),  # as high as the fence, and its body is higher
+        (Role.GATEWAY, 29.0, 8),
+        (Role.ROUTER, 7.03, 0),  # as usual it would cross at 8.015 m
+    ],
+)
+def test_a_drone_of_the_world_refuses_a_goal_outside_and_flies_lower_than_usual(role, x, height):
     world = World()
     fence = Fence.of([YARD], [])
-    place = StartPlace(0, Role.ROUTER, -9.0, 0.0)
+    place = StartPlace(0, role, -9.0, 0.0)
     engine = DroneFactory(world, [place], obstacles=Obstacles((), fence=fence)).drones[0].engine
     with pytest.raises(GoalRefused, match="outside fence yard"):
         engine.set_goal(0.0, 31.0, 0.0)
-    engine.set_goal(0.0, 29.0, 8.0)  # as high as the fence, and its body is higher
+    engine.set_goal(0.0, x, height)
     heights = []
     while not heights or engine.state.is_flying:
         world.step()
         heights.append(engine.get_location().height)
-    assert engine.get_location().distance_m(Location(0.0, 29.0, 8.0)) < 0.01
+    assert engine.get_location().distance_m(Location(0.0, x, height)) < 0.01
     assert max(heights) < 8.0 + 1e-6
 
 

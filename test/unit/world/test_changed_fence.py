@@ -60,7 +60,7 @@ def test_a_flight_ends_where_it_is_or_leads_round(factory, fence, end, words):
     if words:
         with pytest.raises(GoalRefused, match=words):
             engine.set_goal(0.0, 12.0, 0.0)
-        with pytest.raises(FleetRefused, match="obstacle"):
+        with pytest.raises(FleetRefused, match=words):
             factory.add(Role.ROUTER, 20.0, 20.0)
     factory.keep_to(Fence())
     engine.set_goal(0.0, 14.0, 0.0)

@@ -145,7 +145,7 @@ def test_what_cannot_be_added_is_refused_and_changes_nothing(
 def test_a_place_against_an_obstacle_is_refused(make):
     box = Box(center=(20.0, 0.0, 1.0), size=(2.0, 2.0, 2.0))
     fleet = make(obstacles=Obstacles([box]))
-    with pytest.raises(FleetRefused, match="x 18.9 m, y 0 m is in or against an obstacle"):
+    with pytest.raises(FleetRefused, match="x 18.9 m, y 0 m is in or against a box"):
         fleet.add(Role.ROUTER, 18.9, 0.0)
     assert fleet.add(Role.ROUTER, 18.8, 0.0).node_id == 4
 
