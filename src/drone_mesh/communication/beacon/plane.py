@@ -300,6 +300,8 @@ class BeaconPlane(IControlPlane):
             self._show()
         if beacon.parent == self._me:
             self._host.on_leads(creator)
+        elif beacon.looks:
+            self._host.on_looks(creator)
         if beacon.looks and routes.hops != NO_ROUTE:
             self._trickle.answer(now_s, alone=False)
         if self._courier.holds:

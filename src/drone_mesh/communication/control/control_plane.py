@@ -48,6 +48,9 @@ class IControlHost:
     def on_neighbour_lost(self, node: int) -> None:
         """A neighbour is out of reach; the routes are already updated."""
 
+    def on_looks(self, neighbour: int) -> None:
+        """A neighbour looks for a gateway; only if it does not tell its place once it has one."""
+
     def on_leads(self, neighbour: int) -> None:
         """A neighbour shows that this node is its next hop; only if no question for places does."""
 

@@ -335,6 +335,9 @@ class MeshnetworkComponent(NodeSnapshots, IMeshNetwork, IControlHost):
 
     # For the control plane -------------------------------------------------------------------
 
+    def on_looks(self, neighbour: int) -> None:
+        self._whereabouts.on_looks(neighbour)
+
     def on_leads(self, neighbour: int) -> None:
         self._whereabouts.on_leads(neighbour)
 

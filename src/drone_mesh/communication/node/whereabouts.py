@@ -43,14 +43,18 @@ class Whereabouts:
 
     def __post_init__(self) -> None:
         self._tell_s: dict[int, float] = {}  # when to tell each of those behind this node
+        self._looked_s: dict[int, float] = {}  # when a neighbour may have been restarted
 
     @receives(MessageType.LOCATION)
     def on_location(self, payload: bytes, creator: int, from_: int) -> None:
         """A node's place or goal, and perhaps the place of a gateway."""
         place, is_goal = messages.place_in(payload), messages.is_goal(payload)
         self._set_place(creator, place, is_goal, GatewayPlace.from_payload(payload))
-        if is_goal and creator == from_ and messages.addressee(payload) == BROADCAST:
-            self._flies_to(creator, place)
+        if creator == from_ and messages.addressee(payload) == BROADCAST:
+            if is_goal:
+                self._flies_to(creator, place)
+            else:
+                self.on_looks(creator)
 
     def _set_place(
         self, node: int, place: Location, is_goal: bool, gateway: GatewayPlace | None
@@ -88,11 +92,17 @@ class Whereabouts:
         elif creator == from_ and messages.addressee(payload) == self._node_id:
             self.on_leads(creator)
 
+    def on_looks(self, neighbour: int) -> None:
+        """`neighbour` looks for a gateway or has just connected: it may have forgotten all."""
+        self._looked_s[neighbour] = self._deadlines.now_s
+        self._tell_s.pop(neighbour, None)
+
     def on_leads(self, neighbour: int) -> None:
         """`neighbour` goes on through this node, and may step back to its place one day.
 
-        Who is silent beside that, this node alone may know. It tells all: nobody else asks.
-        While drones move by themselves, those have mostly gone on.
+        Who is silent beside that, this node alone may know; beside the neighbour, too, if that may
+        have been restarted. It tells all: nobody else asks. While drones move by themselves, those
+        have mostly gone on.
         """
         now_s, here = self._deadlines.now_s, self._pilot.place()
         if here is None or now_s < self._tell_s.get(neighbour, -math.inf):
@@ -103,9 +113,12 @@ class Whereabouts:
             return
         near = neighbours.ids()
         packets = self._last_places(here, BROADCAST, but={*near, self._node_id})
+        there = neighbours.place_of(neighbour)
+        if there and now_s - self._looked_s.get(neighbour, -math.inf) < TELL_AGAIN_S:
+            packets += self._last_places(there.place, BROADCAST, but={*near, self._node_id})
         if packets:
             self._tell_s.update(dict.fromkeys(near, now_s + TELL_AGAIN_S))
-        for packet in packets:
+        for packet in dict.fromkeys(packets):
             self._antenna.broadcast_message(packet)
 
     def _is_taken(self, place: Location) -> None:
