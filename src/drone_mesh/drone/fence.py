@@ -265,11 +265,12 @@ class Fence:
         return ", ".join(zone.name for zone, _inside in self.zones)
 
     def raised(self, metres: float) -> Fence:
-        """The same for points that are so much above the places that count, as a body's centre."""
+        """The same for points that are so much above the places that count, as a body's centre.
+
+        A body that is to stay below an area does so as a whole: lower ends stay.
+        """
         rules = (
             replace(r, zones=tuple(replace(z, highest_m=z.highest_m + metres) for z in r.zones))
-            if r.inside
-            else r
             for r in self.rules
         )
         return Fence(tuple(rules))

@@ -108,6 +108,13 @@ def test_a_flight_goes_round_over_or_under_and_stays_inside(
     assert path.position_at(path.duration_s) == goal
 
 
+def test_a_body_is_above_an_area_once_its_underside_is():
+    of_centre = Fence.of([YARD], [SHED, BRIDGE]).raised(0.05)
+    assert [bool(of_centre.why_not((15.0, 15.0, z))) for z in (3.04, 3.06)] == [True, False]
+    assert [bool(of_centre.why_not((5.0, 5.0, z))) for z in (8.04, 8.06)] == [False, True]
+    assert [bool(of_centre.why_not((10.0, 5.0, z))) for z in (2.9, 3.0)] == [False, True]
+
+
 def test_a_way_through_a_corner_into_an_area_passes_it():
     """As rounded, it meets neither of the two edges there."""
     kite = Zone("kite", (((0.2, 1.4), (5.2, -1.6), (6.2, 8.4), (-1.8, 6.4)),))
