@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Sequence
 
 import pytest
 
@@ -15,10 +15,14 @@ from drone_mesh.lab.simulation import Simulation
 
 
 def run(
-    duration_s: float, obstacles: dict[str, Any] | None = None, **endurance: Any
+    duration_s: float,
+    obstacles: dict[str, Any] | None = None,
+    faults: Sequence[dict[str, Any]] = (),
+    **endurance: Any,
 ) -> dict[str, float]:
     scenario = Scenario(
         obstacles=obstacles or {},
+        faults=list(faults),
         layout={"kind": "line", "drones": 5, "spacing_m": 6.0},
         routing="beacon",
         endurance={"hover_min": 4.0, "spares": 0.5, "swap_s": 20.0, **endurance},
@@ -38,6 +42,14 @@ def test_without_relief_the_mesh_goes_home_and_with_spares_its_posts_stay_held()
     assert held["least_charge"] > 20.0
     assert held["min_distance_m"] > 0.99
     assert held["reliefs"] > 10
+
+
+@pytest.mark.parametrize("fault", ["mute", "deaf"])
+def test_a_drone_that_is_mute_or_deaf_is_replaced_in_the_time_to_miss_it_and_of_a_flight(fault):
+    broken = {"at_s": 20.0, fault: {"ids": [2], "for_s": 40.0}}
+    seen = run(70.0, faults=[broken], hover_min=20.0)
+    assert 5.0 < seen["post_gap_s"] <= 12.0  # five to miss it, six of flight, and a sample
+    assert seen["min_distance_m"] > 0.99
 
 
 def test_drones_whose_way_home_is_closed_land_where_they_are():
