@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import subprocess
@@ -100,6 +101,9 @@ class MeshMarkersTest(unittest.TestCase):
         self.assertEqual(sorted(heights), [2.05, 20.05])
         fence = [m.text for (name, _), m in self.markers.items() if name == "fence names"]
         self.assertEqual(fence, ["yard", "tower"])
+        # What starts later, or changes it, does not read the file again, which may be another now.
+        areas = json.loads(rospy.get_param("/DroneManager/fence"))
+        self.assertEqual([area["name"] for area in areas], fence)
         wait_for("a known link", WALL_LIMIT_S, lambda: self.points("links: known") == 2)
 
     def test_2_a_node_that_is_off_is_grey_and_its_links_are_lost(self) -> None:

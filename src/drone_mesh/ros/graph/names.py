@@ -36,7 +36,7 @@ LAYOUT_ACTION = "DroneManager/layout"  # Layout
 LAYOUTS_TOPIC = "DroneManager/layouts"  # LayoutProgress, latched: DroneManager -> users
 SET_FENCE_SERVICE = "DroneManager/setFence"  # SetFence
 FENCE_TOPIC = "DroneManager/fence"  # String, latched: DroneManager -> world and hosts
-FENCE_PARAM = "DroneManager/fence"  # the same, for those that start later; empty: never changed
+FENCE_PARAM = "DroneManager/fence"  # the same, from the start on; empty: there was none
 STANDING_PARAM = "DroneManager/standing"  # what is left to order, for a restarted DroneManager
 # The same services under their short names.
 SHORT_REQUEST_MOVEMENT_SERVICE = "requestDroneMovement"

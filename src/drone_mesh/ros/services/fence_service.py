@@ -24,7 +24,7 @@ class FenceService:
     """Service: /DroneManager/setFence (SetFence).
 
     Publishes: /DroneManager/fence (String, latched): the areas as JSON, once they have changed
-    Parameter: /DroneManager/fence, the same, for what starts later
+    Parameter: /DroneManager/fence, the same, for what starts later; set by the world at its start
     """
 
     def __init__(self, watch: MasterWatch) -> None:
@@ -32,9 +32,9 @@ class FenceService:
         self._watch = watch
         self._lock = threading.Lock()  # one change at a time
         self._publisher = rospy.Publisher(names.FENCE_TOPIC, String, queue_size=10, latch=True)
-        changed = rospy.get_param(names.FENCE_PARAM, "")
-        if changed:
-            self._tell(changed)
+        present = rospy.get_param(names.FENCE_PARAM, "")
+        if present:
+            watch.keep(names.FENCE_PARAM, present)
         rospy.Service(names.SET_FENCE_SERVICE, srv.SetFence, self._set)
 
     def _set(self, request: srv.SetFenceRequest) -> srv.SetFenceResponse:
@@ -47,7 +47,8 @@ class FenceService:
             except KeyError:
                 raise rospy.ServiceException("no simulation is running") from None
             rospy.set_param(names.FENCE_PARAM, areas)
-            self._tell(areas)
+            self._watch.keep(names.FENCE_PARAM, areas)
+            self._publisher.publish(areas)
         words = f"fence: {fence.names or 'none'}"
         _log.info("%s", words)
         return srv.SetFenceResponse(words)
@@ -64,7 +65,3 @@ class FenceService:
         if not request.keep:
             return read
         return changed_rows(areas_in(fence_areas(fleet)), read, request.remove)
-
-    def _tell(self, areas: str) -> None:
-        self._watch.keep(names.FENCE_PARAM, areas)
-        self._publisher.publish(areas)

@@ -32,6 +32,7 @@ from drone_mesh.ros.graph.parameters import (
     configured_missions,
     configured_obstacles,
     factory_configuration,
+    fence_areas,
     manager_layouts,
     or_exit,
 )
@@ -83,6 +84,8 @@ class FactoryParameters:
         if rospy.has_param(names.FENCE_PARAM):  # of a world that has ended
             rospy.delete_param(names.FENCE_PARAM)
         obstacles = configured_obstacles(configuration)
+        if configuration.fence:  # for what starts later: the file may be another then
+            rospy.set_param(names.FENCE_PARAM, fence_areas(configuration))
         if configuration.obstacles and configuration.cruise_height < MAX_HEIGHT_M:
             raise ConfigurationError(
                 "argument: cruise_height does not go with obstacles: flights cross over boxes"
