@@ -14,7 +14,7 @@ from drone_mesh.drone.battery import READY_PERCENT, PowerModel
 from drone_mesh.drone.fence import Fence
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
-from drone_mesh.formations.departures import FlightRules
+from drone_mesh.formations.departures import AT_PLACE_M, FlightRules
 from drone_mesh.formations.posts import NEAR_M, Post, Turn, Ways, is_at, is_cut_off, leads_to
 from drone_mesh.formations.relief_policies import IReliefPolicy, ReliefView
 from drone_mesh.formations.reserves import Reserves, is_in_air, is_low, place_of, repairs
@@ -95,10 +95,10 @@ class Relief:
         nodes = [node for node in known.values() if node.role != Role.GATEWAY]
         for node in nodes:
             self._reserves.look(node, mesh.stamp_s)
-            leg = self._homing.get(node.id)
+            leg, rests = self._homing.get(node.id), not len(node.path)
             if not is_in_air(node) or (leg and _is_off(node, leg.to, leg.number, orders)):
                 self._homing.pop(node.id, None)
-            elif leg and not len(node.path) and self._way_home(node, look) != leg.to:
+            elif leg and rests and self._way_home(node, look).distance_m(leg.to) > AT_PLACE_M:
                 self._send_home(node.id, look)
         for post in list(self._posts):
             self._watch_holder(post, look)
