@@ -34,11 +34,13 @@ HOT = {
     "communication": "neighbours timing",
     "communication/beacon": "connection courier disputes neighbour own_beacons packets plane routes"
     " times verdicts",
-    "communication/control": "delivery node_part pilot places",
+    "communication/control": "delivery node_part pilot places router_states",
     "communication/events": "complaints",
     "communication/heartbeats": "connection delivery forwarding gateway_plane introduction plane"
     " queued_delivery",
-    "communication/node": "component gateway router",
+    "communication/node": "component gateway router whereabouts",
+    "communication/routing": "child_table_tree",
+    "communication/wire": "messages",
     "drone": "location",
     "inprocess": "clock drone node radio shared_air shared_antenna",
     "nrf24/emulator": "links",

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Sequence
+from typing import Final, Sequence
 
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.routing.interfaces import IRoutingEssentials, IRoutingTechnique
 from drone_mesh.communication.wire.packet_types import MessageType
+from drone_mesh.compiled import mypyc_attr
 
-_HEARTBEAT = int(MessageType.HEARTBEAT)
+_HEARTBEAT: Final = int(MessageType.HEARTBEAT)
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class ChildTableTree(IRoutingTechnique):
     """Direct neighbours ("children"), and per child what it can reach ("grandchildren")."""
 
@@ -133,6 +135,7 @@ class ChildTableTree(IRoutingTechnique):
             self._next_hops.pop(node, None)
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class SteadyTree(ChildTableTree):
     """Keeps a known route until it fails; ChildTableTree follows the latest heartbeat."""
 

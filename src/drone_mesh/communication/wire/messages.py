@@ -17,7 +17,7 @@ import math
 import operator
 import struct
 from dataclasses import dataclass, fields
-from typing import Callable, ClassVar, Iterable, Mapping, NamedTuple, TypeVar
+from typing import Callable, ClassVar, Final, Iterable, Mapping, NamedTuple, TypeVar
 
 from drone_mesh.communication.interfaces import BROADCAST, PAYLOAD_BYTES
 from drone_mesh.communication.wire.packet_types import (
@@ -30,17 +30,21 @@ from drone_mesh.communication.wire.packet_types import (
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import PacketError
 
-CREATOR_AT, FROM_AT, TYPE_AT, TO_AT, FORWARD_AT = range(5)  # offsets of the header bytes
-HEADER_BYTES = 5
+CREATOR_AT: Final = 0  # offsets of the header bytes
+FROM_AT: Final = 1
+TYPE_AT: Final = 2
+TO_AT: Final = 3
+FORWARD_AT: Final = 4
+HEADER_BYTES: Final = 5
 BODY_BYTES = PAYLOAD_BYTES - HEADER_BYTES
-_BYTE = tuple(bytes((value,)) for value in range(256))
-_TWICE = tuple(bytes((value, value)) for value in range(256))
+_BYTE: Final = tuple(bytes((value,)) for value in range(256))
+_TWICE: Final = tuple(bytes((value, value)) for value in range(256))
 QUESTION = 193  # the only type of users' data that is sent again without an answer
 QUESTION_AT = HEADER_BYTES + 2  # offset of its nonce; 0: it wants no answer
-ROUTE_RECORD = 194  # the only type of users' data to which forwarding nodes add their ids
+ROUTE_RECORD: Final = 194  # the only type of users' data to which forwarding nodes add their ids
 ROUTE_RECORD_AT = HEADER_BYTES + 2  # offset of the number of ids; the ids follow it
-MOST_RECORDED = 16
-MAX_HOPS = 254  # of a heartbeat; docs/protocol.md, "Forwarding"
+MOST_RECORDED: Final = 16
+MAX_HOPS: Final = 254  # of a heartbeat; docs/protocol.md, "Forwarding"
 
 
 @dataclass(frozen=True)
@@ -85,9 +89,6 @@ class _TypedMessage:
     to: int  # receiver of this hop
     forward: int  # final addressee, 254 = every node in range
 
-    def __init_subclass__(cls, kind: MessageType) -> None:
-        cls.TYPE, cls.BODY = kind, kind.about.layout
-
     def to_payload(self) -> bytes:
         """The 32 bytes. Raises PacketError for a value that does not fit its field."""
         creator, from_, to, forward, *body = (getattr(self, field.name) for field in fields(self))
@@ -107,8 +108,11 @@ class _TypedMessage:
 
 
 @dataclass(frozen=True)
-class LocationMessage(_TypedMessage, kind=MessageType.LOCATION):
+class LocationMessage(_TypedMessage):
     """The position of its creator, or its goal in flight; see own_location."""
+
+    TYPE: ClassVar[MessageType] = MessageType.LOCATION
+    BODY: ClassVar[struct.Struct] = MessageType.LOCATION.about.layout
 
     latitude: float  # y, metres
     longitude: float  # x, metres
@@ -117,16 +121,22 @@ class LocationMessage(_TypedMessage, kind=MessageType.LOCATION):
 
 
 @dataclass(frozen=True)
-class IntroduceMessage(_TypedMessage, kind=MessageType.PRESENT):
+class IntroduceMessage(_TypedMessage):
     """PRESENT: introduces its creator."""
+
+    TYPE: ClassVar[MessageType] = MessageType.PRESENT
+    BODY: ClassVar[struct.Struct] = MessageType.PRESENT.about.layout
 
     hops_until_gateway: int  # 255 while not known
     know_gateway: bool  # whether its creator is connected
 
 
 @dataclass(frozen=True)
-class HeartbeatMessage(_TypedMessage, kind=MessageType.HEARTBEAT):
+class HeartbeatMessage(_TypedMessage):
     """Proof of a path; each node that forwards it adds a hop."""
+
+    TYPE: ClassVar[MessageType] = MessageType.HEARTBEAT
+    BODY: ClassVar[struct.Struct] = MessageType.HEARTBEAT.about.layout
 
     know_gateway: bool  # whether its creator is connected
     preferred_gateway: int  # 255 while not known
@@ -134,15 +144,21 @@ class HeartbeatMessage(_TypedMessage, kind=MessageType.HEARTBEAT):
 
 
 @dataclass(frozen=True)
-class MissingMessage(_TypedMessage, kind=MessageType.MISSING):
+class MissingMessage(_TypedMessage):
     """Its creator can no longer reach a node."""
+
+    TYPE: ClassVar[MessageType] = MessageType.MISSING
+    BODY: ClassVar[struct.Struct] = MessageType.MISSING.about.layout
 
     missing: int  # id of that node
 
 
 @dataclass(frozen=True)
-class GoToLocationMessage(_TypedMessage, kind=MessageType.MOVE_TO_LOCATION):
+class GoToLocationMessage(_TypedMessage):
     """MOVE_TO_LOCATION: an order to fly to a place."""
+
+    TYPE: ClassVar[MessageType] = MessageType.MOVE_TO_LOCATION
+    BODY: ClassVar[struct.Struct] = MessageType.MOVE_TO_LOCATION.about.layout
 
     latitude: float  # y, metres
     longitude: float  # x, metres
@@ -155,8 +171,11 @@ class GoToLocationMessage(_TypedMessage, kind=MessageType.MOVE_TO_LOCATION):
 
 
 @dataclass(frozen=True)
-class MovementNegotiationMessage(_TypedMessage, kind=MessageType.MOVEMENT_NEGOTIATION):
+class MovementNegotiationMessage(_TypedMessage):
     """The bid of its creator to fly."""
+
+    TYPE: ClassVar[MessageType] = MessageType.MOVEMENT_NEGOTIATION
+    BODY: ClassVar[struct.Struct] = MessageType.MOVEMENT_NEGOTIATION.about.layout
 
     cost: float  # its distance to the gateway in metres; negative: it does not fly
 
@@ -166,35 +185,37 @@ def _whole(body: str) -> struct.Struct:
     return struct.Struct(f"<{HEADER_BYTES}B{body}{BODY_BYTES - struct.calcsize('<' + body)}x")
 
 
-_GATEWAY_PLACE = MessageType.GATEWAY_PLACE.about.layout
+_GATEWAY_PLACE: Final = MessageType.GATEWAY_PLACE.about.layout
 _GATEWAY_PLACE_AT = {
     int(MessageType.LOCATION): HEADER_BYTES + LocationMessage.BODY.size,
     int(MessageType.MOVEMENT_NEGOTIATION): HEADER_BYTES + MovementNegotiationMessage.BODY.size,
     int(MessageType.GATEWAY_PLACE): HEADER_BYTES,
 }
 _OLDEST_AGE_S = 2**16 - 2
-_REQUESTLOCATION = int(MessageType.REQUESTLOCATION)
-_ASKER_PLACE = struct.Struct("<ffH")  # latitude, longitude, height + 1 and whether it flies there
-_NEW_REQUEST = _whole("ffH")
-_FLIES_THERE = 2**15
-_GOAL = 2**31  # highest bit of the time in a LOCATION; nothing else uses that
+_REQUESTLOCATION: Final = int(MessageType.REQUESTLOCATION)
+_ASKER_PLACE: Final = struct.Struct(
+    "<ffH"
+)  # latitude, longitude, height + 1 and whether it flies there
+_NEW_REQUEST: Final = _whole("ffH")
+_FLIES_THERE: Final = 2**15
+_GOAL: Final = 2**31  # highest bit of the time in a LOCATION; nothing else uses that
 _GOAL_AT = HEADER_BYTES + LocationMessage.BODY.size - 1  # the byte with that bit
-_GOAL_BYTE = 2**7
+_GOAL_BYTE: Final = 2**7
 _ORDER_NUMBER = struct.Struct("<H")
 _ORDER_NUMBER_AT = HEADER_BYTES + GoToLocationMessage.BODY.size
-_FRAME_DIGEST = struct.Struct("<H")
+_FRAME_DIGEST: Final = struct.Struct("<H")
 _FRAME_DIGEST_AT = PAYLOAD_BYTES - _FRAME_DIGEST.size  # the last bytes of a PRESENT
-_LOCATION = int(MessageType.LOCATION)
-_NEW_LOCATION = _whole(LocationMessage.BODY.format[1:])
-_PRESENT = int(MessageType.PRESENT)
+_LOCATION: Final = int(MessageType.LOCATION)
+_NEW_LOCATION: Final = _whole(LocationMessage.BODY.format[1:])
+_PRESENT: Final = int(MessageType.PRESENT)
 _NEW_PRESENT = _whole(IntroduceMessage.BODY.format[1:])
-_HEARTBEAT = int(MessageType.HEARTBEAT)
-_HEARTBEAT_HOPS = HEADER_BYTES + 2  # offset of the hop count
-_NEW_HEARTBEAT = _whole(HeartbeatMessage.BODY.format[1:])
+_HEARTBEAT: Final = int(MessageType.HEARTBEAT)
+_HEARTBEAT_HOPS: Final = HEADER_BYTES + 2  # offset of the hop count
+_NEW_HEARTBEAT: Final = _whole(HeartbeatMessage.BODY.format[1:])
 # A packet without the sender and receiver of its hop. Byte 7 counts: the hops of a HEARTBEAT, the
 # ids of a ROUTE_RECORD, which follow it.
-_WITHOUT_HOP = struct.Struct(f"<BxBx3sB{PAYLOAD_BYTES - ROUTE_RECORD_AT - 1}s")
-_NEXT_HOP = struct.Struct(f"<4B3sB{PAYLOAD_BYTES - ROUTE_RECORD_AT - 1}s")
+_WITHOUT_HOP: Final = struct.Struct(f"<BxBx3sB{PAYLOAD_BYTES - ROUTE_RECORD_AT - 1}s")
+_NEXT_HOP: Final = struct.Struct(f"<4B3sB{PAYLOAD_BYTES - ROUTE_RECORD_AT - 1}s")
 _EXTENSIONS = {  # the bytes after a body that a routing technique may use
     int(MessageType.PRESENT): range(HEADER_BYTES + IntroduceMessage.BODY.size, _FRAME_DIGEST_AT),
     int(MessageType.HEARTBEAT): range(HEADER_BYTES + HeartbeatMessage.BODY.size, PAYLOAD_BYTES),
