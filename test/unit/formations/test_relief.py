@@ -529,3 +529,17 @@ def test_a_drone_whose_way_home_leads_past_a_drone_at_rest_goes_up_first():
     fly(mesh, mesh.holder, OTHER)
     assert mesh.sent(30) == {}
     assert mesh.posts().keys() == {None, 3}
+
+
+@pytest.mark.parametrize(("x", "goes_up"), [(7.0, True), (8.0, False)])
+def test_a_drone_goes_up_only_where_the_gateway_hears_it(x, goes_up):
+    mesh = Mesh()
+    home = Location(1.0, x + 4.0, 0.0)
+    mesh.relief = Relief(relief_policy("spare_first"), homes={1: home})
+    mesh.holder.position, mesh.spare.connected = (x, 3.9, 4.0), False
+    mesh.others = [NodeStatus(3, position=(x + 3.2, 1.6, 4.0), battery=90.0)]
+    mesh.sent()
+    mesh.hover(mesh.holder, 22.0)
+    mesh.sent(3)
+    (order,) = mesh.orders.saved()["orders"]
+    assert (order["goals"]["1"] != list(home)) is goes_up
