@@ -142,3 +142,14 @@ def test_a_switch_at_the_pilots_transmitter_and_a_parameter_count_at_once():
     rig.up.send(mavlink.MAVLink_param_value_message(b"FENCE_TYPE", 3.0, 9, 1, 0))
     rig.run(0.2)
     assert rig.pilot.fences().names == f"{ITSELF}, around home"
+
+
+@pytest.mark.parametrize("autopilot", [ARDUPILOT, PX4])
+def test_a_breach_ends_when_the_fence_is_switched_off(autopilot):
+    """PX4 sends no FENCE_STATUS, and the report that the fence is on says no more of it."""
+    rig = Rig(autopilot).ready()
+    rig.vehicle.parameters["FENCE_ENABLE"], rig.vehicle.faults.fence_on = 0.0, True
+    rig.vehicle.faults.fence_breached = True
+    rig.run_until("it is outside", lambda: "outside" in rig.status().why_not_fly)
+    rig.vehicle.faults.fence_on = False
+    rig.run_until("it may fly", lambda: not rig.status().why_not_fly, within_s=3.0)

@@ -206,9 +206,10 @@ class Telemetry:
         self._battery_percent = float(remaining) if 0 <= remaining <= 100 else None
         self._battery_s = now_s
         health = message.onboard_control_sensors_health
+        kept = self.keeps_fence
         self.keeps_fence = bool(message.onboard_control_sensors_enabled & FENCE_SENSOR)
-        if self.keeps_fence:
-            self.is_outside_fence = not health & FENCE_SENSOR
+        if kept or self.keeps_fence:  # switched off, no breach of it is left
+            self.is_outside_fence = self.keeps_fence and not health & FENCE_SENSOR
 
     def _take_landed(self, message: Message, now_s: float) -> None:
         self._landed = message.landed_state
