@@ -213,6 +213,15 @@ def test_a_fence_that_changes_ends_an_order_by_name_or_its_flight_leads_round(
         assert network.location(1) == Location(0.0, 12.0, 0.0)
 
 
+def test_a_fence_with_a_way_round_is_not_blamed_for_a_drone_that_does_not_set_out():
+    network = fenced()
+    network.nodes[1].drone.set_goal = lambda *_goal: None
+    network.order(1, 12.0, 0.0)
+    network.run_for(40.0)
+    (order,) = network.nodes[0].component.get_orders()
+    assert order.reason == "the drone did not set out; 8.0 m from the goal"
+
+
 def test_a_drone_that_a_new_fence_leaves_outside_is_told_at_once():
     network = fenced(((0.0, 0.0), (4.0, 0.0)), Fence(), positions=PositionErrors(sigma_m=0.01))
     network.set_fence(Fence.of([], [Zone.circle("pond", (4.0, 0.0), 2.0, inside=False)]))

@@ -206,7 +206,9 @@ class OrderIntake:
                 continue
             why = engine.why_ended() or engine.why_not_fly()
             if not why and here is not None:
-                why = engine.fences().why_not_straight([here.to_vector(), order.goal.to_vector()])
+                ends = here.to_vector(), order.goal.to_vector()
+                if engine.plan(*ends, self._deadlines.now_s) is None:
+                    why = engine.fences().why_not_straight(ends)
             why = why or pilot.flight_end
             where = "its place is not known" if here is None else f"{off_m:.1f} m from the goal"
             self._reply(order, OrderOutcome.GIVEN_UP, f"{why}; {where}")
