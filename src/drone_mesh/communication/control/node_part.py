@@ -20,6 +20,7 @@ _Works = TypeVar("_Works", bound=Callable[[Any], None])
 
 _received: dict[object, tuple[int, ...]] = {}  # by method: the types of packets
 _due: dict[object, Due] = {}  # by method
+_declared: dict[type, list[Callable[..., None]]] = {}  # by class of a part that was asked
 
 
 def receives(*kinds: int) -> Callable[[_Receives], _Receives]:
@@ -45,27 +46,27 @@ def due(work: Due) -> Callable[[_Works], _Works]:
 def receivers(parts: Sequence[object]) -> dict[int, Receiver]:
     """By type of packet: the method that handles it, of the first part that has one."""
     found: dict[int, Receiver] = {}
-    for part, method in _methods(parts):
-        for kind in _received.get(method, ()):
-            found.setdefault(kind, MethodType(method, part))
+    for part in parts:
+        for method in _methods(type(part)):
+            handle = MethodType(method, part)
+            for kind in _received.get(method, ()):
+                found.setdefault(kind, handle)
     return found
 
 
 def timers(parts: Sequence[object]) -> list[tuple[Due, Callable[[], None]]]:
     """What is called when which work is due, in the order of Due."""
     found: dict[Due, Callable[[], None]] = {}
-    for part, method in _methods(parts):
-        if method in _due:
-            found.setdefault(_due[method], MethodType(method, part))
+    for part in parts:
+        for method in _methods(type(part)):
+            if method in _due:
+                found.setdefault(_due[method], MethodType(method, part))
     return sorted(found.items())
 
 
-def _methods(parts: Sequence[object]) -> list[tuple[object, Callable[..., None]]]:
-    """The functions of their classes; those of a derived class before those that it overrides."""
-    return [
-        (part, method)
-        for part in parts
-        for owner in type(part).__mro__
-        for method in vars(owner).values()
-        if callable(method)
-    ]
+def _methods(part: type) -> list[Callable[..., None]]:
+    """What a class declares; that of a derived class before what it overrides."""
+    if part not in _declared:  # a search through all its methods, and not for each node again
+        methods = [method for owner in part.__mro__ for method in vars(owner).values()]
+        _declared[part] = [m for m in methods if callable(m) and (m in _received or m in _due)]
+    return _declared[part]

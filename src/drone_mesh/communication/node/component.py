@@ -19,7 +19,7 @@ from drone_mesh.communication.control.control_plane import (
     IControlTechnique,
     ITechnique,
 )
-from drone_mesh.communication.control.node_part import due, receivers, receives, timers
+from drone_mesh.communication.control.node_part import Receiver, due, receivers, receives, timers
 from drone_mesh.communication.control.pilot import Pilot
 from drone_mesh.communication.control.places import Claims, CommonFrame, KnownPlaces
 from drone_mesh.communication.control.router_states import RouterStates
@@ -64,6 +64,7 @@ from drone_mesh.drone.interfaces import IDroneEngine
 _PRESENT = int(MessageType.PRESENT)
 _LOCATION = int(MessageType.LOCATION)
 _MOVE_TO_LOCATION = int(MessageType.MOVE_TO_LOCATION)
+_OF_ROUTERS = [kind for kind, about in enumerate(ABOUT) if about.handler is Handler.ROUTER]
 
 
 @dataclass(frozen=True)
@@ -167,10 +168,11 @@ class MeshnetworkComponent(NodeSnapshots, IMeshNetwork, IControlHost):
     def start(self, now_s: float) -> None:
         """Start the antenna and what is due; introduce the node."""
         self._deadlines.now_s = now_s
-        handlers = receivers(self._parts)
-        ignored = [number for number in range(256) if ABOUT[number].handler is Handler.ROUTER]
-        handlers = {**dict.fromkeys(ignored, _ignore), **handlers}
-        self._receivers = [handlers.get(number, self._drop_unknown) for number in range(256)]
+        self._receivers: list[Receiver] = [self._drop_unknown] * 256
+        for kind in _OF_ROUTERS:
+            self._receivers[kind] = _ignore
+        for kind, handle in receivers(self._parts).items():
+            self._receivers[kind] = handle
         self._timers = [(int(work), do) for work, do in timers(self._parts)]
         self._antenna.start_antenna(self)
         if self._debug:
