@@ -386,8 +386,12 @@ class EveryInterfaceTest(unittest.TestCase):
         names = [area.name for area in self.heard["/mesh/state"][-1].fence]
         self.assertEqual(names, ["near"])
         self.assertGreater(self.node(1).position[0], -4.5)
-        for wrong in ({"remove": ["sea"], "keep": True}, {"areas": "areas: [{name: sea}]"}):
-            with self.assertRaisesRegex(rospy.ServiceException, "no area sea|expected a polygon"):
+        for wrong, words in (
+            ({"remove": ["sea"], "keep": True}, "no area sea"),
+            ({"remove": ["near"]}, "remove goes with keep"),
+            ({"areas": "areas: [{name: sea}]"}, "expected a polygon"),
+        ):
+            with self.assertRaisesRegex(rospy.ServiceException, words):
                 self.ask(name, srv.SetFence, **{**change, **wrong})
         self.assertEqual(self.ask(name, srv.SetFence, **change).message, "fence: none")
         self.mesh.wait("no fence", 30, lambda: not self.heard["/mesh/state"][-1].fence)

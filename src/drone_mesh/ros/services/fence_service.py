@@ -63,5 +63,7 @@ class FenceService:
         is_empty = not request.areas.strip()
         read = [] if is_empty else rows_of_text(request.areas, "areas", earth_origin(""))
         if not request.keep:
+            if request.remove:  # instead of all areas
+                raise ConfigurationError("remove goes with keep: true")
             return read
         return changed_rows(areas_in(fence_areas(fleet)), read, request.remove)
