@@ -179,7 +179,6 @@ class MeshExecutor:
             self._thread.join()
 
     def slot(self) -> ExecutorSlot:
-        """A slot for one more component."""
         return ExecutorSlot(self)
 
     def submit(self, function: Work, slot: ExecutorSlot | None = None) -> None:

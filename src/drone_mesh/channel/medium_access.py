@@ -135,7 +135,6 @@ class MediumAccess:
         self.contention = 0.0
 
     def __len__(self) -> int:
-        """Packets that wait."""
         return len(self._queue)
 
     def offer(
@@ -295,7 +294,6 @@ class MediumAccess:
         return self.rules.train_retransmits, self.rules.retransmit_delays[0]
 
     def clear(self) -> None:
-        """Give up all waiting packets."""
         self._queue.clear()
 
     def _learn(self, first_try_failed: bool) -> None:

@@ -66,7 +66,6 @@ class PacketQueue:
             del self._lines[packet.receiver]
 
     def clear(self) -> None:
-        """Remove all packets."""
         self._lines.clear()
         self._length = self.data = 0
 

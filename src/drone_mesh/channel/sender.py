@@ -41,7 +41,6 @@ class Sender:
         self._task: Task | None = None
 
     def start(self) -> None:
-        """Start sending."""
         self._closed = False
         self._task = self._runtime.start(self._run, f"sender {self._radio.node_id}")
 

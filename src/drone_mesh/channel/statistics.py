@@ -50,7 +50,6 @@ class ChannelMeter:
         self._share = 0.0
 
     def read(self, statistics: RadioStatistics, now_s: float) -> ChannelUse:
-        """The current figures."""
         passed_s = now_s - self._since_s
         if passed_s >= AIRTIME_WINDOW_S:
             self._share = (statistics.airtime_s - self._airtime_s) / passed_s

@@ -175,7 +175,6 @@ class Neighbours:
         self._out_of_reach.clear()
 
     def ids(self) -> frozenset[int]:
-        """The current neighbours."""
         return frozenset(self._heard_s)
 
     def note_known_elsewhere(self, nodes: Iterable[int], now_s: float) -> None:

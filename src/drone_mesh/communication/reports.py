@@ -211,7 +211,6 @@ class ReportBook:
 
     @receives(MessageType.NODE_REPORT)
     def on_report(self, payload: bytes, creator: int, _from: int) -> None:
-        """The figures of a node."""
         report = NodeReport.from_payload(payload)
         words = "" if report.can_fly else self._known(creator).why_not_fly
         self._put(ReportedNode(creator, report, words, self._deadlines.now_s))

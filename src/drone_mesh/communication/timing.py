@@ -225,7 +225,6 @@ class Deadlines:
             self.next_s = min(self.at_s)
 
     def clear(self) -> None:
-        """Cancel everything."""
         self.at_s[:] = [math.inf] * len(Due)
         self.next_s = math.inf
 

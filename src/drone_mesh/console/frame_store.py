@@ -191,7 +191,6 @@ class FrameStore:
 
     @property
     def mesh(self) -> MeshStatus | None:
-        """The newest state."""
         return self._mesh
 
     def restart(self, samples: Sequence[MeshSample]) -> None:

@@ -143,7 +143,6 @@ class History:
         return max(0, bisect.bisect_right(self.times, at_s) - 1)
 
     def state(self, index: int) -> MeshStatus:
-        """The state at this index."""
         return unpacked(self._states[index])
 
     def spread(self, most: int) -> list[bytes]:
@@ -160,7 +159,6 @@ class History:
         return self._samples[: bisect.bisect_right(self.times, at_s)]
 
     def states_after(self, at_s: float) -> list[KeptState]:
-        """The states after this time."""
         first = bisect.bisect_right(self.times, at_s)
         kept = zip(self.times[first:], self._states[first:], self._samples[first:])
         return list(map(KeptState._make, kept))
@@ -185,7 +183,6 @@ class History:
         self._samples.append(state.sample)
 
     def _forget(self, states: int) -> None:
-        """Drop the oldest `states` states."""
         self._bytes -= sum(map(len, self._states[:states]))
         for kept in (self._states, self.times, self._samples):
             del kept[:states]

@@ -143,7 +143,6 @@ class ConsoleMemory:
         )
 
     def save(self) -> None:
-        """Save what was collected."""
         while self._unsaved and self._path is not None:
             try:
                 with _open(self._path) as database:

@@ -37,7 +37,6 @@ class Player:
         return self.now_s >= self._history.times[-1]
 
     def advance(self, wall_s: float) -> None:
-        """Advance by `wall_s` wall seconds."""
         if not self.paused:
             self.show(self.now_s + wall_s * self.factor)
 

@@ -52,7 +52,6 @@ class GatewayLink(IInternetConnection):
         self._server.stop()
 
     def observe(self, event: MeshEvent) -> None:
-        """A MeshObserver."""
         kind, node, now_s, peer, detail, order, place = event
         peers = (peer,) if peer <= MAX_NODE_ID else ()
         self._server.tell(EventRecord(now_s, node, kind.value, peers, detail, order, place))

@@ -135,7 +135,6 @@ class Fleet:
         return mavlink.MAVLink_heartbeat_message(kind, autopilot, mode, own_mode, state, version)
 
     def landed(self, vehicle: Vehicle) -> Message:
-        """Whether it is in the air."""
         state = mavlink.MAV_LANDED_STATE_UNDEFINED
         if vehicle.flying is not None:
             ground, air = mavlink.MAV_LANDED_STATE_ON_GROUND, mavlink.MAV_LANDED_STATE_IN_AIR

@@ -174,7 +174,6 @@ class GroundStationServer:
         self._work.put(functools.partial(self._show, list(vehicles), now_s))
 
     def tell(self, event: EventRecord) -> None:
-        """An event of the mesh."""
         self._work.put(functools.partial(self._tell, event))
 
     # Its thread ------------------------------------------------------------------------------

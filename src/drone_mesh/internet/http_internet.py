@@ -57,7 +57,6 @@ class HttpInternet(IInternetConnection):
 
     @property
     def url(self) -> str:
-        """Address of this server."""
         return self._server.url
 
     def connect(self, commands: IGatewayCommands) -> None:

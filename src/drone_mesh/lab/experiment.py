@@ -84,7 +84,6 @@ class Cell(NamedTuple):
 
     @property
     def texts(self) -> Dict[str, str]:
-        """The values as text."""
         return {axis: as_text(value) for axis, value in self.values.items()}
 
     @property

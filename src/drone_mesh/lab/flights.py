@@ -49,7 +49,6 @@ class Flights:
 
     @property
     def in_the_air(self) -> list[int]:
-        """Drones that currently fly."""
         nodes = self._network.nodes
         return [node for node in self._current if nodes[node].drone.path is not None]
 

@@ -31,7 +31,6 @@ class Verdict(NamedTuple):
 
     @property
     def name(self) -> str:
-        """The expectation with its cell."""
         return f"{self.expectation.text} [{self.cell}]" if self.cell else self.expectation.text
 
 

@@ -87,12 +87,10 @@ class PlacementPolicy(Policy, IRepairStrategy):
             self._look(LOOK_S)
 
     def on_landed(self) -> None:
-        """Look around."""
         if not self.mesh.connected:
             self._look(LOOK_S)
 
     def on_stopped(self) -> None:
-        """It flies."""
         self._waits = self._is_ready = False
 
     def on_gateway_found(self) -> None:
@@ -105,7 +103,6 @@ class PlacementPolicy(Policy, IRepairStrategy):
         self._bids[node] = score
 
     def on_time(self) -> None:
-        """It has looked around."""
         self._waits, self._is_ready = False, True
         if self.may_act and not self.commanded:
             self.act(self.decide(self.observe()))

@@ -44,7 +44,6 @@ def code_with(own: str) -> str:
 
 
 def describe_session(command: list[str], loaded: LoadedExperiment, workers: str) -> dict[str, Any]:
-    """One entry of provenance.json."""
     return {
         "started": datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds"),
         "command": command,

@@ -38,7 +38,6 @@ class Results(NamedTuple):
 
     @property
     def metrics(self) -> list[str]:
-        """The columns that the experiment requests."""
         wanted = self.loaded.experiment.metrics or DEFAULT_METRICS
         return list(map(extensions.column_of, wanted))
 

@@ -172,7 +172,6 @@ class MotionSettings(PartOfKind):
 
     @property
     def mobility(self) -> Mobility:
-        """The same for the models."""
         given = self.model_dump(exclude={"told", "area", "path", "speed_m_s", "waypoints", "knots"})
         speed = self.speed_m_s if isinstance(self.speed_m_s, list) else [self.speed_m_s] * 2
         knots: Dict[int, List[Knot]] = {}

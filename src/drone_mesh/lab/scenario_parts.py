@@ -297,7 +297,6 @@ class Fault(Part):
 
     @property
     def action(self) -> str:
-        """The name of its action."""
         return self._given[0]
 
     @property
@@ -306,5 +305,4 @@ class Fault(Part):
 
     @property
     def what(self) -> Any:
-        """The settings of its action."""
         return getattr(self, self.action)

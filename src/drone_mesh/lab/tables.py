@@ -49,7 +49,6 @@ class Table:
         return text.getvalue()
 
     def to_markdown(self) -> str:
-        """As Markdown."""
         rows = [self.header, ["---"] * len(self.header), *self.rows]
         return (
             "".join(f"| {' | '.join(row)} |\n" for row in rows)
@@ -75,7 +74,6 @@ class Table:
 
 
 def all_tables(results: Results) -> list[Table]:
-    """The tables of a report."""
     kinds = (cells_table, healing_table, paired_table, worst_table)
     return [table for kind in kinds if (table := kind(results)) is not None]
 

@@ -34,7 +34,6 @@ class Progress:
         self._started_s = self._shown_s = time.monotonic()
 
     def count(self, failed: bool) -> None:
-        """One run has ended."""
         self.done += 1
         self.failed += failed
         now_s = time.monotonic()
@@ -43,7 +42,6 @@ class Progress:
             self._show()
 
     def close(self) -> None:
-        """Print the final state."""
         self._show()
         if self._on_terminal:
             self._stream.write("\n")

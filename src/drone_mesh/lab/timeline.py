@@ -136,7 +136,6 @@ class Timeline:
             self.note(action, nodes)
 
     def note(self, action: str, nodes: Sequence[int]) -> None:
-        """Record what happens now."""
         self.happened.append(Happened(self._network.clock.now_s, action, tuple(nodes)))
 
     def _after(self, seconds: float | None, undo: Callable[[object], None]) -> None:

@@ -43,7 +43,6 @@ class RunTimeout(Exception):
 
 
 def execute_batch(specs: list[RunSpec]) -> list[Outcome]:
-    """Execute one after the other."""
     return [execute(spec) for spec in specs]
 
 
@@ -108,12 +107,10 @@ def measured(record: RunRecord, own_metrics: tuple[str, ...]) -> dict[str, float
 
 @functools.lru_cache(maxsize=1024)
 def scenario_of(text: str) -> Scenario:
-    """The scenario of a spec's JSON."""
     return Scenario.model_validate(json.loads(text))
 
 
 def metric_columns(own_metrics: tuple[str, ...]) -> list[str]:
-    """The metric columns of runs.csv."""
     return [*METRICS, *map(extensions.column_of, own_metrics)]
 
 

@@ -47,7 +47,6 @@ class ChipLink:
         return self.command(Command.R_REGISTER | register, b"\0")[0]
 
     def write(self, register: Register, value: bytes) -> None:
-        """W_REGISTER."""
         self.command(Command.W_REGISTER | register, value)
 
     def write_byte(self, register: Register, value: int) -> None:

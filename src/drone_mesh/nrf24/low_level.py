@@ -122,7 +122,6 @@ class NRF24LowLevelInterface:
         self._spi.close()
 
     def statistics(self) -> RadioStatistics:
-        """The current counters."""
         return self.access.statistics()
 
     def send(self, node_id: int, payload: bytes) -> bool:

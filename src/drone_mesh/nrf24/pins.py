@@ -150,7 +150,6 @@ class GpiodCe:
 
     @property
     def value(self) -> bool:
-        """The level of the pin."""
         return self._value
 
     @value.setter

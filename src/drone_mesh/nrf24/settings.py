@@ -197,7 +197,6 @@ class RadioSettings:
 
     @property
     def answer_frame_s(self) -> float:
-        """Duration of an acknowledgement."""
         return frame_bits(ADDRESS_BYTES, 0, self.crc_bytes) / self.data_rate.value
 
     @property

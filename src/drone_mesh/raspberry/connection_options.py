@@ -76,7 +76,6 @@ TOKEN_VARIABLE = "DRONE_MESH_TOKEN"
 
 
 def add_http_options(http: argparse._ArgumentGroup) -> None:
-    """Add the group to a parser."""
     http.add_argument(
         "--bind",
         metavar="ADDRESS",
@@ -135,7 +134,6 @@ class MqttOptions:
 
 
 def add_mqtt_options(parser: argparse.ArgumentParser) -> None:
-    """Add the group to a parser."""
     group = parser.add_argument_group("MQTT", "docs/data.md explains the topics.")
     group.add_argument(
         "--mqtt",
@@ -190,7 +188,6 @@ def mqtt_options(parsed: argparse.Namespace, environment: Mapping[str, str]) -> 
 
 
 def add_ground_station_options(parser: argparse.ArgumentParser) -> None:
-    """Add the group to a parser."""
     group = parser.add_argument_group("ground stations", "docs/ground-stations.md explains these.")
     group.add_argument(
         "--ground-station",

@@ -70,7 +70,6 @@ class EmulatedAir:
             self._air.observe(self._trace.see)
 
     def place(self, node_id: int) -> Location:
-        """The position of a node."""
         return column_place(node_id, self._settings.data_rate, self._in_column)
 
     def serve(self, host: str, port: int) -> tuple[str, int]:

@@ -13,7 +13,6 @@ from drone_mesh.errors import ConfigurationError, naming_argument
 
 
 def add_flight_options(parser: argparse.ArgumentParser) -> None:
-    """Add the group to a parser."""
     limits = FlightLimits()
     group = parser.add_argument_group("drone", "docs/flying.md explains these options.")
     group.add_argument(

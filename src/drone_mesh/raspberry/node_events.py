@@ -44,7 +44,6 @@ class EventHistory:
         self.others = Observers()  # that also get each event
 
     def observe(self, event: MeshEvent) -> None:
-        """A MeshObserver."""
         with self._lock:
             self._number += 1
             self._kept.append((self._number, event))

@@ -180,7 +180,6 @@ class EmulatedPartner:
         return EmulatedChip(self._air, "radio")
 
     def close(self) -> None:
-        """Stop answering."""
         self._ended = True
         self._answering.join()
         self._radio.close()

@@ -148,7 +148,6 @@ _CLASS_OF = {int(kind.TYPE): kind for kind in _CLASSES}
 
 
 def decoded(payload: bytes) -> str:
-    """One packet in words."""
     creator, from_, kind, to, forward = messages.header(payload)
     with contextlib.suppress(ValueError):
         name = MessageType(kind).name

@@ -20,7 +20,6 @@ class ServiceManager:
             self._address = "\0" + self._address[1:]  # an abstract socket
 
     def ready(self) -> None:
-        """The program is ready."""
         self._send("READY=1")
 
     def alive(self, status: str) -> None:

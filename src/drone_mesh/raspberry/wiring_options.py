@@ -46,7 +46,6 @@ class Hardware:
 
 
 def add_wiring_options(parser: argparse.ArgumentParser) -> None:
-    """Add the group to a parser."""
     wiring = parser.add_argument_group("wiring")
     wiring.add_argument(
         "--spi",
@@ -79,7 +78,6 @@ def add_wiring_options(parser: argparse.ArgumentParser) -> None:
 
 
 def wired_hardware(parsed: argparse.Namespace) -> Hardware:
-    """The parsed options."""
     return Hardware(parsed.spi, parsed.ce, parsed.irq, parsed.spi_hz)
 
 

@@ -120,7 +120,6 @@ class MeshSample:
 
 
 def take_sample(mesh: MeshStatus) -> MeshSample:
-    """The numbers for charts over time."""
     routers = [node for node in mesh.nodes if node.role == Role.ROUTER and node.on]
     hops = [node.hops for node in routers if node.connected]
     return MeshSample(

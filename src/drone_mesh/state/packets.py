@@ -34,7 +34,6 @@ class PacketSampler:
         self._sample: list[SampledPacket] = []
 
     def note(self, packet: bytes, at_s: float) -> None:
-        """Record a packet that arrived."""
         self._carried += 1
         place = len(self._sample)
         if place >= self._most:  # Vitter's algorithm R

@@ -89,7 +89,6 @@ class RepairStory:
 
     @property
     def is_over(self) -> bool:
-        """Whether no repair is under way."""
         return not self._lost
 
     def _describe_power(self, nodes: dict[int, NodeStatus], now_s: float) -> None:

@@ -57,7 +57,6 @@ class LocalSocket:
         )
 
     def start(self) -> None:
-        """Start serving."""
         self._thread.start()
 
     def stop(self) -> None:
@@ -109,7 +108,6 @@ class _Client(socketserver.StreamRequestHandler):
     timeout = REQUEST_WITHIN_S
 
     def handle(self) -> None:
-        """Handle one request."""
         if not self.server.clients.acquire(blocking=False):
             self._say({"error": f"{MOST_CLIENTS} programs use this node already"})
             return

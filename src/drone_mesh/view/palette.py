@@ -39,20 +39,16 @@ class Palette:
     accent_ink: Colour
 
     def of_node(self, role: int, condition: Condition) -> Colour:
-        """The colour of a node."""
         return self.colour(node_colour_name(role, condition))
 
     def of_link(self, use: LinkUse) -> Colour:
-        """The colour of a link."""
         return self.colour(_LINK_COLOUR_NAMES[use])
 
     def of_packet(self, kind: PacketKind) -> Colour:
-        """The colour of a packet."""
         return self.colour(_PACKET_COLOUR_NAMES[kind])
 
     @property
     def path(self) -> Colour:
-        """The colour of a flight path."""
         return self.flying
 
     def colour(self, name: str) -> Colour:

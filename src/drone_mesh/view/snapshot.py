@@ -60,7 +60,6 @@ class Sketch:
                 self._draw.line(piece, colour, round(width * OVERSAMPLING))
 
     def area(self, points: Sequence[Vector], colour: Colour) -> None:
-        """A filled polygon."""
         self._draw.polygon([tuple(pixel) for pixel in self.camera.project(points)], colour)
 
     def ring(self, point: Vector, radius: float, colour: Colour) -> None:

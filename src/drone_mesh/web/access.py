@@ -42,7 +42,6 @@ class Allowance:
         return self._used_up_s.get(client, 0.0) - self._clock() > self._slack_s
 
     def note(self, client: str = "") -> None:
-        """This client did it once more."""
         with self._lock:
             until_s = max(self._clock(), self._used_up_s.pop(client, 0.0))
             self._used_up_s[client] = until_s + self._period_s

@@ -62,7 +62,6 @@ class PromptProtocol(H11Protocol):
         return self._head_timer.when() if self._head_timer is not None else 0.0
 
     def give_up(self) -> None:
-        """Close the connection."""
         self._head_is_there()
         self.transport.abort()
 

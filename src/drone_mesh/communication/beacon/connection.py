@@ -169,7 +169,6 @@ class Proofs:
             self._requests.ask(self._routes.gateway)
 
     def on_time(self) -> None:
-        """Do what is due."""
         now_s = self._routes.now_s
         if now_s >= self._ask_s:
             self._ask()

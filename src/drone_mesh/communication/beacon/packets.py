@@ -245,12 +245,10 @@ class Search(NamedTuple):
     hops_left: int
 
     def to_body(self) -> bytes:
-        """Its bytes."""
         return bytes(_SEARCH.pack(*self))
 
     @classmethod
     def from_body(cls, body: bytes) -> Search:
-        """Decode."""
         return cls(*_SEARCH.unpack_from(body))
 
 
@@ -260,12 +258,10 @@ class Found(NamedTuple):
     node: int
 
     def to_body(self) -> bytes:
-        """Its bytes."""
         return bytes(_FOUND.pack(*self))
 
     @classmethod
     def from_body(cls, body: bytes) -> Found:
-        """Decode."""
         return cls(*_FOUND.unpack_from(body))
 
 

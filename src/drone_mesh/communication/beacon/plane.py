@@ -113,7 +113,6 @@ class BeaconPlane(IControlPlane):
 
     @due(Due.ROUTING)
     def on_due(self) -> None:
-        """Do what is due."""
         self._set_time()
         now_s = self._routes.now_s
         self._look_round()
@@ -251,7 +250,6 @@ class BeaconPlane(IControlPlane):
 
     @receives(MessageType.BEACON)
     def on_beacon(self, payload: bytes, creator: int, from_: int) -> None:
-        """A neighbour's beacon."""
         if creator != from_:
             return
         self._set_time()
@@ -405,7 +403,6 @@ class BeaconPlane(IControlPlane):
 
     @receives(MessageType.SEARCH)
     def on_search(self, payload: bytes, creator: int, from_: int) -> None:
-        """Answer or repeat another node's search."""
         self._set_time()
         if self._searches.heard(creator, from_, messages.body(payload)):
             me, body = self._me, Found(Search.from_body(messages.body(payload)).node).to_body()
@@ -427,7 +424,6 @@ class BeaconPlane(IControlPlane):
 
     @property
     def gateway(self) -> int:
-        """The preferred gateway."""
         return self._routes.gateway
 
     @property
@@ -471,5 +467,4 @@ class BeaconTechnique(IControlTechnique):
     connection_lost_after_s = 10.0  # it notices a loss within seconds
 
     def control_plane(self, node: ControlledNode) -> BeaconPlane:
-        """The control plane of one node."""
         return BeaconPlane(node)

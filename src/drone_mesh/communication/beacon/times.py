@@ -39,7 +39,6 @@ class Trickle:
         self.due_s = now_s + self._rng.random() * 4 * self._soon_s
 
     def sent(self, now_s: float) -> None:
-        """A beacon leaves now."""
         if not self._changed:
             self.interval_s = min(RARER * self.interval_s, self._most_s)
         self._changed = False

@@ -182,7 +182,6 @@ class Pilot:
         return True
 
     def forget_flight(self) -> None:
-        """No longer watch the flight."""
         self._flight = self.goal = None
         self._deadlines.set(Due.ASK_POSITION, math.inf)
 

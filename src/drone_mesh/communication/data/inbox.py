@@ -98,7 +98,6 @@ class Reassembly:
         return Whole(head, payload, count)
 
     def __len__(self) -> int:
-        """The number of incomplete messages."""
         return len(self._partial)
 
     def is_done(self, number: int, head: Head | None) -> bool:

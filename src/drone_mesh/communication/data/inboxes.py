@@ -93,7 +93,6 @@ class Inboxes:
             self._acknowledge_due(now_s)
 
     def poll(self, sender: int, poll: Poll) -> None:
-        """Answer the POLL of a sender."""
         now_s = self._deadlines.now_s
         self._inbox(sender, to_all=False).poll(poll, now_s)
         self._acknowledge_due(now_s)

@@ -120,7 +120,6 @@ class Outbox:
         return sum(message.in_flight for message in self._open.values())
 
     def on_sent(self, packet: DataPacket, now_s: float) -> None:
-        """The packet was sent."""
         message, train = packet.message, self._train
         if packet.ends_train:
             assert train is not None

@@ -64,7 +64,6 @@ class Outboxes:
             self._outbox(message.ticket.to).waiting.append(message)
 
     def answered(self, by: int, ack: Ack) -> None:
-        """Process an ACK of a receiver."""
         outbox = self._outboxes.get(by)
         if outbox is not None:
             outbox.answered(ack, self._deadlines.now_s)

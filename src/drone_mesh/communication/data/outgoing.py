@@ -48,7 +48,6 @@ class Ticket:
     changed: Callable[[Ticket], None] | None = None
 
     def set_state(self, state: TicketState, reason: str = "") -> None:
-        """Change the state."""
         if state is not self.state:
             self.state, self.reason = state, reason
             if self.changed is not None:
@@ -67,7 +66,6 @@ class Ticket:
 
 
 def destination_in_words(to: int) -> str:
-    """A destination as text."""
     return {TO_ALL: "all nodes", TO_GATEWAY: "the gateway"}.get(to, f"node {to}")
 
 

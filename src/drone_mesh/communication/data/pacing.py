@@ -110,7 +110,6 @@ class Train:
         return MOST_IN_TURN if is_slow else MOST_OPEN
 
     def fragment_left(self, kind: int) -> None:
-        """A fragment was sent."""
         self.left += 1
         self.is_open |= kind != packets.FRAGMENTS.start
 

@@ -152,7 +152,6 @@ def joined(bodies: list[bytes], length: int, room: int) -> bytes:
 
 
 def ack_body(ack: Ack) -> bytes:
-    """The body of an ACK."""
     return _ACK.pack(*ack)
 
 
@@ -167,7 +166,6 @@ def untagged(body: bytes) -> bytes:
 
 
 def poll_body(poll: Poll) -> bytes:
-    """The body of a POLL."""
     return _POLL.pack(*poll)
 
 

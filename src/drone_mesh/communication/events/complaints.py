@@ -54,5 +54,4 @@ class Complaints:
         self.add(f"another radio uses id {self._node_id}", "give each node its own", now_s)
 
     def dropped(self, reason: str, payload: bytes, now_s: float) -> None:
-        """Count and log a dropped packet."""
         self.add(f"dropped {reason}", payload.hex(), now_s)

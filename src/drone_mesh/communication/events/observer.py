@@ -109,7 +109,6 @@ class Observers:
         self._observers.append(observer)
 
     def __call__(self, event: MeshEvent) -> None:
-        """Pass an event on."""
         for observer in self._observers:
             observer(event)
 

@@ -146,7 +146,6 @@ class Delivery(IDelivery):
         """Hand a packet to the antenna, as for `send`."""
 
     def begin(self) -> None:
-        """The node starts."""
         self._begun_s = self._deadlines.now_s
 
     def own_passage(self, payload: bytes) -> Passage | None:

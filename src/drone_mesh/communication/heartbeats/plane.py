@@ -202,7 +202,6 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
 
     @receives(MessageType.PRESENT)
     def on_present(self, payload: bytes, creator: int, _from: int) -> None:
-        """A neighbour introduces itself."""
         hops, know_gateway = messages.present_body(payload)
         self._neighbours.set_hops(creator, hops)
         if know_gateway and hops == 0:
@@ -217,7 +216,6 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
 
     @receives(MessageType.HEARTBEAT)
     def on_heartbeat(self, payload: bytes, creator: int, from_: int) -> None:
-        """A heartbeat for this node."""
         if creator == self._node_id:
             return  # its own heartbeat came back, which proves nothing
         know_gateway, preferred_gateway, hops = messages.heartbeat_body(payload)

@@ -207,7 +207,6 @@ class MeshnetworkComponent(NodeSnapshots, IMeshNetwork, IControlHost):
         return self._deadlines.next_s
 
     def tick(self, now_s: float) -> None:
-        """Do what is due."""
         self._deadlines.now_s = now_s
         at_s = self._deadlines.at_s
         for work, do in self._timers:

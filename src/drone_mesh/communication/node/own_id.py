@@ -41,7 +41,6 @@ class OwnId:
         self._introductions = RateLimit(INTRODUCTIONS, OFF_S)
 
     def connected(self) -> None:
-        """The node is connected."""
         self._connected_s = min(self._connected_s, self._deadlines.now_s)
 
     def heard(self, kind: int, payload: bytes) -> None:
@@ -59,7 +58,6 @@ class OwnId:
 
     @due(Due.OWN_ID)
     def come_back(self) -> None:
-        """The time off is over."""
         self._deadlines.set(Due.OWN_ID, math.inf)
         self._antenna.switch_power(True)
 

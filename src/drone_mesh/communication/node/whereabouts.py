@@ -156,7 +156,6 @@ class Whereabouts:
 
     @receives(MessageType.LAST_PLACE)
     def on_last_place(self, payload: bytes, _creator: int, _from: int) -> None:
-        """Where another node was last heard."""
         last = LastPlace.from_payload(payload)
         if last.node != self._node_id:
             self._was_heard(last)
@@ -251,6 +250,5 @@ class LastPlace(NamedTuple):
 
     @classmethod
     def from_payload(cls, payload: bytes) -> LastPlace:
-        """Decode."""
         age, node, *place = _BODY.unpack_from(payload, messages.HEADER_BYTES)
         return cls(node, Location(*place), float(age))

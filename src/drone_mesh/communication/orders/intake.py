@@ -92,7 +92,6 @@ class OrderQuery:
 
     @classmethod
     def number_in(cls, payload: bytes) -> int:
-        """The number of the order."""
         return int(cls.BODY.unpack_from(payload, HEADER_BYTES)[0])
 
 

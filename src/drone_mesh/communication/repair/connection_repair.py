@@ -98,12 +98,10 @@ class ConnectionRepair(RepairActions):
             self._checked_s = due_s
 
     def on_connected_check(self) -> None:
-        """A check finds the router connected."""
         if self.state is RepairState.AT_REST:
             self._strategy.on_connected_check()
 
     def on_connected(self) -> None:
-        """A gateway answers again."""
         self._last.begin_anew()
         self._clear()
         self._tried_goals.clear()
@@ -114,7 +112,6 @@ class ConnectionRepair(RepairActions):
             self._flight.stop_here(self._control.next_hop())
 
     def on_antenna_off(self) -> None:
-        """The antenna is off."""
         self._control.end(RouterEvent.ANTENNA_OFF)
         self._last.begin_anew()
         self._clear()
@@ -122,7 +119,6 @@ class ConnectionRepair(RepairActions):
         self._strategy.on_stopped()
 
     def on_ordered_flight(self) -> None:
-        """An ordered flight has started."""
         self._last.begin_anew()
         self._flight = None
         self._took_off()
@@ -144,11 +140,9 @@ class ConnectionRepair(RepairActions):
                 self._check_spot()
 
     def on_neighbour_lost(self, node: int) -> None:
-        """A neighbour is out of reach."""
         self._strategy.on_neighbour_lost(node)
 
     def on_place(self, node: int, place: Location) -> None:
-        """`node` reports its place."""
         if self._flight is None:
             self._strategy.on_place(node, place)
         elif self._flight.lands:
@@ -311,7 +305,6 @@ class ConnectionRepair(RepairActions):
         return flight.stops_when_connected
 
     def on_flight_second(self) -> None:
-        """The drone is still in flight."""
         flight = self._flight
         if flight is None:
             return
@@ -333,7 +326,6 @@ class ConnectionRepair(RepairActions):
         return is_there and lands
 
     def on_landed(self) -> None:
-        """The flight is over."""
         flight, self._flight = self._flight, None
         was_repair = flight is not None
         self._landed_unheard = flight is not None and not (

@@ -70,7 +70,6 @@ class Election:
         return before != score and score >= 0 and self.winner() == node
 
     def knows(self, node: int) -> bool:
-        """Whether `node` has bid."""
         return node in self._bids
 
     def due_s(self, neighbours: AbstractSet[int]) -> float:

@@ -75,7 +75,6 @@ class RepairFlight:
         return self._step.owner == self._node_id
 
     def each_second(self) -> None:
-        """Called once a second in flight."""
         self._requests.ask_all()
         if self.stops_when_connected:
             self._introduce()

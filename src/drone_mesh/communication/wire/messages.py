@@ -166,7 +166,6 @@ class GoToLocationMessage(_TypedMessage):
 
     @property
     def location(self) -> Location:
-        """The place in the message."""
         return Location(self.latitude, self.longitude, self.height)
 
 
@@ -450,7 +449,6 @@ def frame_digest(present: bytes) -> int:
 
 
 def with_frame_digest(present: bytes, digest: int) -> bytes:
-    """The same PRESENT with this digest."""
     return present[:_FRAME_DIGEST_AT] + _FRAME_DIGEST.pack(digest)
 
 
@@ -460,7 +458,6 @@ def order_number(order: bytes) -> int:
 
 
 def with_order_number(order: bytes, number: int) -> bytes:
-    """The same MOVE_TO_LOCATION with this number."""
     end = _ORDER_NUMBER_AT + _ORDER_NUMBER.size
     return order[:_ORDER_NUMBER_AT] + _ORDER_NUMBER.pack(number) + order[end:]
 

@@ -183,7 +183,6 @@ class ModeChoice:
         self.by = Chooser.ENGINE
 
     def on_heartbeat(self, now_s: float) -> None:
-        """Compare with the heartbeat before."""
         telemetry = self._telemetry
         assert telemetry.autopilot is not None  # otherwise the heartbeat is not the drone's
         before, was_armed = self._mode, self._armed
@@ -225,7 +224,6 @@ class Authority:
         self._permissions = permissions
 
     def on_heartbeat(self, now_s: float, phase: Phase) -> None:
-        """The telemetry has a new heartbeat."""
         self.choice.on_heartbeat(now_s)
         autopilot = self._telemetry.autopilot
         assert autopilot is not None  # otherwise the heartbeat is not the drone's

@@ -46,7 +46,6 @@ class Autopilot:
         return float(mode), 0.0
 
     def parameter_value(self, value: float, kind: int) -> float:
-        """The value in a PARAM_VALUE."""
         if not self.integers_as_bytes or kind == mavlink.MAV_PARAM_TYPE_REAL32:
             return value
         return float(struct.unpack("<i", struct.pack("<f", value))[0])

@@ -96,7 +96,6 @@ class PendingCommand:
 
 
 def result_name(result: int) -> str:
-    """The name of a MAV_RESULT."""
     entry: Any = mavlink.enums["MAV_RESULT"].get(result)
     return str(entry.name)[len("MAV_RESULT_") :].lower() if entry else f"result {result}"
 
@@ -162,7 +161,6 @@ class Commander:
         return current.refusal(now_s)
 
     def no_command(self) -> None:
-        """Forget the current command."""
         self._current = None
 
     def words(self) -> str:
@@ -170,7 +168,6 @@ class Commander:
         return "" if self._current is None else self._current.words
 
     def on_ack(self, message: Message, now_s: float) -> None:
-        """COMMAND_ACK."""
         current = self._current
         if current is not None and message.command == current.number:
             current.acknowledged(message.result, now_s)

@@ -49,7 +49,6 @@ class FlightLimits:
         return self.cruise_height_m + self.layer_m * (node_id % layers)
 
     def ceiling_m(self, home: Location) -> float:
-        """The greatest height."""
         return home.height + self.max_height_m
 
     def check(self, goal: Location, home: Location) -> None:

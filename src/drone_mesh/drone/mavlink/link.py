@@ -114,7 +114,6 @@ class UdpLine:
 
     @property
     def port(self) -> int:
-        """The port on this side."""
         return int(self._socket.getsockname()[1])
 
     def receive(self, timeout_s: float) -> bytes:
@@ -223,7 +222,6 @@ class MavlinkLink:
             self._broke(error)
 
     def close(self) -> None:
-        """Close the line."""
         if self._line is not None:
             self._line.close()
             self._line = None

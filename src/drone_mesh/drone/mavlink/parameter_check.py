@@ -60,7 +60,6 @@ class ParameterCheck:
         return tuple(finding.complaint for finding in self.findings if not finding.is_safe)
 
     def tick(self, now_s: float) -> None:
-        """Request the next one."""
         autopilot = self._telemetry.autopilot
         if autopilot is None:
             return
@@ -77,7 +76,6 @@ class ParameterCheck:
         self._due_s = now_s + PERIOD_S
 
     def on_value(self, message: Message) -> None:
-        """PARAM_VALUE."""
         autopilot = self._telemetry.autopilot
         if not self._open or autopilot is None or message.param_id not in self._open[0].names:
             return

@@ -81,7 +81,6 @@ class MavlinkPilot:
         self._slept_s = -math.inf  # no heartbeat was heard since the caller awoke then
 
     def on_message(self, message: Message, now_s: float) -> None:
-        """Process a message from the link."""
         if not self._telemetry.on_message(message, now_s):
             return
         if message.get_type() == "HEARTBEAT":
@@ -157,7 +156,6 @@ class MavlinkPilot:
         self._act(passed_s, now_s)
 
     def status(self, now_s: float) -> PilotStatus:
-        """The current status."""
         telemetry = self._telemetry
         trouble = telemetry.link_trouble(now_s) or telemetry.position_trouble(now_s)
         autopilot = telemetry.autopilot

@@ -145,7 +145,6 @@ _TEMPLATE = Path(__file__).resolve().parent / "page.html"
 
 
 def render_page(story: RunStory, title: str) -> str:
-    """The page as HTML text."""
     environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined)
     template = environment.from_string(_TEMPLATE.read_text(encoding="utf-8"))
     return template.render(

@@ -81,7 +81,6 @@ class Air:
         self._observers.append(observer)
 
     def moved(self) -> None:
-        """An antenna has moved."""
         self._pairs.clear()
 
     def listen(self, antenna: Antenna, channel: int, bits_per_s: int) -> None:

@@ -85,7 +85,6 @@ class AirServer(socketserver.ThreadingTCPServer):
         return len(self._connections) <= MOST_CHIPS
 
     def shutdown_request(self, request: Any) -> None:
-        """A connection has ended."""
         self._connections.discard(request)
         super().shutdown_request(request)
 
@@ -159,7 +158,6 @@ class RemoteChip:
         return list(self.request(Opcode.TRANSFER, bytes(data)))
 
     def move(self, position: Position) -> None:
-        """Move the chip to this position."""
         if position != self._position:
             self._position = position
             with contextlib.suppress(OSError):  # the next chip is created there
@@ -211,7 +209,6 @@ class RemoteCe:
 
     @property
     def value(self) -> bool:
-        """The level of the pin."""
         return self._value
 
     @value.setter

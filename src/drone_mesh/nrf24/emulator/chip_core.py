@@ -37,7 +37,6 @@ class EmulatedCe:
 
     @property
     def value(self) -> bool:
-        """The level of the pin."""
         return self._value
 
     @value.setter
@@ -201,7 +200,6 @@ class ChipCore(abc.ABC):
     # -- flags ---------------------------------------------------------------------------------
 
     def status(self) -> int:
-        """The current STATUS register."""
         oldest = self.rx_fifo.oldest
         pipe = RX_FIFO_IS_EMPTY if oldest is None else oldest.pipe
         return self.flags | pipe << RX_P_NO.lsb | self.tx_fifo.full
@@ -212,7 +210,6 @@ class ChipCore(abc.ABC):
         self.update_irq()
 
     def clear_flags(self, flags: int) -> None:
-        """Clear some of them."""
         self.flags &= ~flags
         self.update_irq()
 

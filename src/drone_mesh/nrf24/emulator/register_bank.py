@@ -57,7 +57,6 @@ class RegisterBank:
         self.reset()
 
     def reset(self) -> None:
-        """The values after power-on."""
         # By address; unimplemented registers read as 0.
         self._values = [bytearray(1) for _ in range(_ADDRESSES)]
         for register, value in RESET_VALUES.items():

@@ -44,7 +44,6 @@ class Transmitter:
             self.start(SETTLING_NS)
 
     def ce_rose(self) -> None:
-        """CE rises in standby."""
         if self._chip.flags & MAX_RT.mask and self._chip.tx_fifo.oldest is not None:
             self._chip.warn("CE high while MAX_RT is set: nothing is sent")
         elif self.reuse:

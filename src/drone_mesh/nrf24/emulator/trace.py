@@ -73,7 +73,6 @@ class PcapngWriter:
         self._file.write(_block(_ENHANCED_PACKET, head + _padded(packet.data) + comment))
 
     def close(self) -> None:
-        """Close the file."""
         self._file.close()
 
 
@@ -114,7 +113,6 @@ class FrameTrace:
         self._frames: deque[TracedFrame] = deque(maxlen=limit)
 
     def see(self, transmission: Transmission) -> None:
-        """Record a frame that has ended."""
         self._frames.append(
             TracedFrame(
                 transmission.start_ns,

@@ -40,7 +40,6 @@ def ros_time(seconds: float) -> rospy.Time:
 
 
 def location_of(message: PlaceMsg) -> Location:
-    """The position in a message."""
     return Location(message.latitude, message.longitude, float(message.height))
 
 
@@ -65,7 +64,6 @@ def location_msg(latitude: float, longitude: float, height: float) -> LocationMs
 
 
 def event_msg(event: EventRecord) -> MeshEventMsg:
-    """An event as a message."""
     return MeshEventMsg(
         stamp=ros_time(event.stamp_s),
         node=event.node,

@@ -74,10 +74,8 @@ class DirectPublisher(rospy.SubscribeListener):
         return bool(implementation.has_connections())
 
     def connections(self) -> list[Transport]:
-        """The open connections to subscribers."""
         implementation = self._publisher.impl
         return [] if implementation is None else implementation.connections
 
     def close(self) -> None:
-        """Withdraw the topic."""
         self._publisher.unregister()

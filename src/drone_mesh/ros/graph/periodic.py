@@ -103,7 +103,6 @@ class PacketSamples(Periodic):
         return bool(self._publisher.get_num_connections())
 
     def note(self, packet: bytes) -> None:
-        """A packet was delivered."""
         with self._lock:
             self._sampler.note(packet, time.monotonic())
 

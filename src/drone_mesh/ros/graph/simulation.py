@@ -74,7 +74,6 @@ class PresentDrones:
 
     @classmethod
     def from_parameter(cls, value: Mapping[str, Any]) -> PresentDrones:
-        """Parse the result of `to_parameter`."""
         roles = {node_id: Role.GATEWAY for node_id in value["gateways"]}
         roles.update({node_id: Role.ROUTER for node_id in value["routers"]})
         hosts = dict(zip(value["added"], value["hosts"]))

@@ -221,7 +221,6 @@ class GroundedDrones:
         return self._reasons.get(node_id, "")
 
     def stop(self) -> None:
-        """Leave the topic."""
         self._subscriber.unregister()
 
     def _changed(self, message: GroundedDronesMsg) -> None:

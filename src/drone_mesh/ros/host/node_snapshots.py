@@ -50,7 +50,6 @@ class NodeSnapshots(Generic[S]):
         self._fills[node_id] = (worker, fill)
 
     def drop(self, node_id: int) -> None:
-        """Forget this node."""
         self._fills.pop(node_id, None)
         self._latest.pop(node_id, None)
 

@@ -86,7 +86,6 @@ class AntennaPanel:
         self._offered, self._debugging = ExitStack(), ExitStack()  # what ends with each
 
     def start(self) -> None:
-        """Offer the switch."""
         name = names.power_switch(self._node_id)
         service = rospy.Service(name, PowerSwitch, self._power_switched)
         self._offered.callback(service.shutdown)
@@ -96,7 +95,6 @@ class AntennaPanel:
         self._offered.close()
 
     def debugging_mode(self, info: IMeshDebugInfo, on: bool) -> None:
-        """Start or stop publishing NodeDebugInfo."""
         self._debugging.close()
         if on:
             publisher = rospy.Publisher(

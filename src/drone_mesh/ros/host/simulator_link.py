@@ -65,7 +65,6 @@ class SimulatorConnection:
         return all(service.is_connected() for service in self._services)
 
     def close(self) -> None:
-        """Close all connections."""
         for service in self._services:
             service.close()
 
@@ -151,7 +150,6 @@ class SimulatorLink(Radios, rospy.SubscribeListener):
         self.jammed = on.data
 
     def start(self) -> None:
-        """Start looking for a simulator."""
         self._thread.start()
 
     def fall_silent(self) -> None:

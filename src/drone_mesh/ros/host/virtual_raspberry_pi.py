@@ -116,7 +116,6 @@ class VirtualRaspberryPi(abc.ABC):
         )
 
     def start(self, now_s: float) -> None:
-        """Switch on."""
         self.engine.connect()
         self.users.open(self.component.data)
         self._users_of_node.start(self.component.data)
@@ -129,7 +128,6 @@ class VirtualRaspberryPi(abc.ABC):
         self.component.on_fence(now_s)
 
     def stop(self, _now_s: float) -> None:
-        """Switch off."""
         self._users_of_node.stop()
         self.component.stop()
         self.engine.disconnect()

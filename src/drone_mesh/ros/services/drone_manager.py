@@ -326,7 +326,6 @@ def _refusing() -> Iterator[None]:
 
 
 def main() -> None:
-    """Run the node."""
     with OrderlyStop() as stop:  # first: rospy may swallow the KeyboardInterrupt of a Ctrl-C
         start_node(DroneManager.__doc__, "DroneManager", disable_signals=True)
         show_library_logs_on_rosout()

@@ -68,7 +68,6 @@ class FlyActions:
         rospy.Subscriber(names.EVENTS_TOPIC, MeshEvent, self._later(self._take_event))
 
     def run(self, ended: Callable[[], bool]) -> None:
-        """Serve until `ended`."""
         polled_s = -math.inf
         while not ended():
             if time.monotonic() - polled_s >= POLL_PERIOD_S:
@@ -202,7 +201,6 @@ class FlyActions:
 
 
 def main() -> None:
-    """Run the node."""
     start_node(FlyActions.__doc__, "fly_actions", disable_signals=True)
     show_library_logs_on_rosout()
     with OrderlyStop() as stop:

@@ -82,7 +82,6 @@ def _carry_out(node: int, goal: Location) -> str:
 
 
 def main() -> None:
-    """Run the node."""
     start_node(GroundStationNode.__doc__, "ground_station", disable_signals=True)
     show_library_logs_on_rosout()
     with OrderlyStop() as stop:

@@ -193,7 +193,6 @@ def _usual_topic(node_id: int) -> str:
 
 
 def main() -> None:
-    """Run the node."""
     start_node(WirelessSignalSimulator.__doc__, "WirelessSignalSimulator")
     configuration = or_exit(
         lambda: factory_configuration("max_distance", "obstacles", "obstacle_radio")

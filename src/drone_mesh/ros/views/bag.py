@@ -53,13 +53,11 @@ class RecordedMesh:
         self._of_gateway = _is_gateway_record(path)
 
     def states(self) -> Iterator[MeshStatus]:
-        """Every state."""
         if self._of_gateway:
             return self._answers(lambda answer: real_mesh(answer)[0])
         return self._messages(names.STATE_TOPIC, lambda message, _at_s: mesh_status(message))
 
     def events(self) -> Iterator[EventRecord]:
-        """Every event."""
         if self._of_gateway:
             return itertools.chain.from_iterable(self._answers(events_of))
         return self._messages(names.EVENTS_TOPIC, lambda message, _at_s: event_record(message))

@@ -22,7 +22,6 @@ Position = Tuple[float, int, Sequence[float]]
 
 
 def main() -> None:
-    """Entry point of nodes/flight_trace."""
     parser = argparse.ArgumentParser(
         prog="rosrun drone_mesh flight_trace",
         description="Writes the positions in a recording as CSV (t,id,x,y,z; seconds from its "

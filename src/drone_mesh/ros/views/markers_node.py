@@ -95,7 +95,6 @@ def _transform(node: NodeStatus, stamp: rospy.Time) -> TransformStamped:
 
 
 def main() -> None:
-    """Run the node."""
     start_node(MeshMarkers.__doc__, "mesh_markers")
     show_library_logs_on_rosout()
     MeshMarkers()

@@ -30,7 +30,6 @@ THERE_M = 1.0  # of the last waypoint: physics holds a drone within half a metre
 
 
 def mission() -> None:
-    """Entry point of nodes/mission."""
     parser = argparse.ArgumentParser(
         prog="rosrun drone_mesh mission",
         description="Lets the pilot of a drone fly a mission that was drawn in another program, "

@@ -39,7 +39,6 @@ SHOW_EVERY_S = 2.0  # simulated
 
 
 def fly() -> None:
-    """Entry point of nodes/fly."""
     parser = argparse.ArgumentParser(
         prog="rosrun drone_mesh fly",
         description="Orders a drone to a place, through the mesh, and shows how far it is. "
@@ -131,7 +130,6 @@ def _follow_flight(
 
 
 def layout() -> None:
-    """Entry point of nodes/layout."""
     parser = argparse.ArgumentParser(
         prog="rosrun drone_mesh layout",
         description="Sends the drones of a layout to their places, and shows how far they are. "

@@ -16,7 +16,6 @@ from drone_mesh.ros.views.bag import BagUnusable, RecordedMesh
 
 
 def main() -> None:
-    """Entry point of nodes/report."""
     parser = argparse.ArgumentParser(
         prog="rosrun drone_mesh report",
         description="Writes an HTML report of a run that launch/record.launch recorded: the "

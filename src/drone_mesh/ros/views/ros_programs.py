@@ -28,7 +28,6 @@ NOT_PLAYED = {"/rosout", "/rosout_agg"}
 
 
 def record() -> None:
-    """Entry point of nodes/record."""
     parser = argparse.ArgumentParser(
         prog="rosrun drone_mesh record",
         description="Records states, events, samples of packets, debug topics, diagnostics, the "
@@ -102,7 +101,6 @@ def _replay(options: argparse.Namespace) -> int:
 
 
 def rviz_window() -> None:
-    """Entry point of nodes/rviz_window."""
     parser = argparse.ArgumentParser(
         prog="rosrun drone_mesh rviz_window",
         description="Starts rviz; without a screen, prints one line and ends.",

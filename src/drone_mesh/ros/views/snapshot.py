@@ -17,7 +17,6 @@ SMALLEST, LARGEST = 200, 8000  # pixels
 
 
 def main() -> None:
-    """Entry point of nodes/snapshot."""
     parser = argparse.ArgumentParser(
         prog="rosrun drone_mesh snapshot",
         description="Writes a picture of drones, links and flights. Needs no screen.",

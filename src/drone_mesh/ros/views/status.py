@@ -31,7 +31,6 @@ CLEAR_SCREEN = "\x1b[H\x1b[2J"
 
 
 def main() -> None:
-    """Entry point of nodes/status."""
     parser = argparse.ArgumentParser(
         prog="rosrun drone_mesh status",
         description="Prints the state of the mesh as a table.",

@@ -70,7 +70,6 @@ class EngineServer:
         ]
 
     def close(self) -> None:
-        """Withdraw the topic and the service."""
         self._goals.unregister()
         for service in self._services:
             service.shutdown()
@@ -158,7 +157,6 @@ class EngineServers(rospy.SubscribeListener):
         self._report(drone)
 
     def withdraw(self, node_id: int) -> None:
-        """Withdraw the engine of this drone."""
         self._servers.pop(node_id).close()
 
     def peer_subscribe(self, _topic: str, _publish: object, _peer_publish: object) -> None:

@@ -180,7 +180,6 @@ class WorldRunner:
                     raise FleetRefused("the simulation ends") from None
 
     def run(self, is_over: Callable[[], bool]) -> None:
-        """Step until `is_over` returns True."""
         pace = Pace(self.wanted_factor)
         begun = self._world.now_s, time.monotonic()
         try:
