@@ -113,20 +113,18 @@ class Neighbour:
         if beacon.motion is not None:
             self.motion, self.reported_s = beacon.motion, now_s
             self.apart_m = 0.0 if own is None else math.dist(own.place, beacon.motion.place)
-        if beacon.near:
-            self.near_s.update(dict.fromkeys(beacon.near, now_s))
+        near_s, announced_s, listed_s = self.near_s, self.announced_s, self.listed_s
+        for node in beacon.near:
+            near_s[node] = now_s
         _after, listed, new = below = beacon.below
-        announced_s = self.announced_s
         if announced_s:
             for node in below.left_out(announced_s):
                 del announced_s[node]
-        if listed:
-            for node in listed:
-                announced_s.setdefault(node, now_s)
-            self.listed_s.update(dict.fromkeys(listed, now_s))
-        if new:
-            announced_s.update(dict.fromkeys(new, now_s))
-            self.listed_s.update(dict.fromkeys(new, now_s))
+        for node in listed:
+            announced_s.setdefault(node, now_s)
+            listed_s[node] = now_s
+        for node in new:
+            announced_s[node] = listed_s[node] = now_s
 
     def proved(self, now_s: float) -> None:
         """Note that the link works both ways: it took a packet of this node, or names it."""
