@@ -14,7 +14,7 @@ import abc
 import itertools
 import math
 from dataclasses import dataclass
-from typing import Any, Callable, Final, Iterable, Tuple
+from typing import Callable, Final, Iterable, Tuple
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from drone_mesh.channel.packet_queue import ALL_NODES, OutgoingPacket
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
 from drone_mesh.inprocess.clock import VirtualClock
+from drone_mesh.inprocess.close_pairs import Surroundings
 from drone_mesh.inprocess.interfaces import IInProcessAir, IInProcessAntenna
 from drone_mesh.nrf24.emulator.air import CAPTURE_DB, RPD_DBM, RPD_NS
 from drone_mesh.nrf24.emulator.links import Hop, LinkModel
@@ -29,6 +30,7 @@ from drone_mesh.nrf24.emulator.space import Space
 from drone_mesh.nrf24.registers import NS_PER_S
 from drone_mesh.nrf24.settings import RadioSettings
 
+MARGIN: Final = 0.05  # of the reach: the link model is asked about each radio in it
 ROUNDED: Final = 1.000001  # factor on a distance: more than its last digits
 MOST_GAIN_DB: Final = 10.0  # Rayleigh fading exceeds it once in 22,000 blocks
 
@@ -108,6 +110,7 @@ class SharedAir(IInProcessAir):
         self._reached: dict[tuple[int, bool], list[SharedRadio]] = {}
         self._where: dict[int, Location] = {}  # of those at rest
         self._places: np.ndarray | None = None  # (n, 3); those in flight may be anywhere: NaN
+        self._surroundings: dict[float, Surroundings] = {}  # by reach
         self._flying: set[int] = set()
 
     # The radios on the air -------------------------------------------------------------------
@@ -210,6 +213,7 @@ class SharedAir(IInProcessAir):
         self._reached.clear()
         self._where.pop(node, None)
         self._places = None
+        self._surroundings.clear()
         self._links = {pair: link for pair, link in self._links.items() if node not in pair}
 
     def _power(self, sender: int, receiver: int) -> float:
@@ -297,12 +301,14 @@ class SharedAir(IInProcessAir):
             flying, place = self._flying, self._place
             places = [unknown if other in flying else place(other) for other in self._radios]
             self._places = np.fromiter(itertools.chain.from_iterable(places), float).reshape(-1, 3)
-        away = self._places - self._place(node)
+            for surroundings in self._surroundings.values():
+                surroundings.follow(self._places)
         furthest_m = ROUNDED * self.space.links.furthest_m(
             self._sent_dbm, self._carrier_mhz, self._bits_per_s, more_db
         )
-        is_far = np.einsum("ij,ij->i", away, away) > furthest_m**2  # False for NaN
-        rows: Any = np.flatnonzero(~is_far).tolist()
+        if furthest_m not in self._surroundings:
+            self._surroundings[furthest_m] = Surroundings(furthest_m, MARGIN, self._places)
+        rows = self._surroundings[furthest_m].of(radios.index(self._radios[node]))
         return [radios[row] for row in rows]
 
     def _reaches(self, node: int, other: int, more_db: float) -> bool:
