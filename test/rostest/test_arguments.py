@@ -21,9 +21,10 @@ from unittest import mock
 import roslaunch
 import rostest
 import yaml
-from rostest_support import WALL_LIMIT_S, free_port, in_order, program
+from rostest_support import WALL_LIMIT_S, free_port, in_order, run_program
 
 from drone_mesh.configuration import FactoryConfiguration
+from drone_mesh.ros.graph import launching
 
 LAUNCH = Path(__file__).resolve().parents[2] / "launch"
 OUR_LAUNCH = ("python3", "-m", "drone_mesh.ros.graph.launching")  # roslaunch exits with 0
@@ -162,6 +163,20 @@ def launched(*arguments: str, by: tuple[str, ...] = OUR_LAUNCH) -> subprocess.Co
     return ended(*words, ROS_MASTER_URI=f"http://127.0.0.1:{port}")
 
 
+def refused(*arguments: str, uri: str = "") -> object:
+    """With what OUR_LAUNCH exits before it starts anything, without a process of its own."""
+    words = ["roslaunch", "drone_mesh", "factory.launch", *arguments]
+    given = mock.patch.object(sys, "argv", words)
+    master = mock.patch.dict(os.environ, {"ROS_MASTER_URI": uri} if uri else {})
+    starts = mock.patch.object(roslaunch, "main", side_effect=AssertionError("it starts"))
+    try:
+        with given, master, starts:
+            launching.main()
+    except SystemExit as end:
+        return end.code
+    raise AssertionError("it starts")
+
+
 class BadArgumentsTest(unittest.TestCase):
     def test_a_node_that_refuses_its_arguments_ends_the_whole_launch(self) -> None:
         for argument, line in (
@@ -186,23 +201,24 @@ class BadArgumentsTest(unittest.TestCase):
             ("d", "config:=mine.yaml", "config:=mine.yaml: no such file in "),
             ("e", "key:=/no/such", "key: /no/such: No such file or directory"),
         ):
-            factory = ended(*program("drone_factory", f"__name:={name}", f"_{argument}"))
-            self.assertIn(line, factory.stdout)
-            self.assertNotIn("Traceback", factory.stdout)
-            self.assertEqual(factory.returncode, 1, factory.stdout)
+            factory = run_program("drone_factory", f"__name:={name}", f"_{argument}")
+            said = factory.stdout + factory.stderr
+            self.assertIn(line, said)
+            self.assertNotIn("Traceback", said)
+            self.assertEqual(factory.returncode, 1, said)
 
     def test_before_anything_starts_a_bad_namespace_and_a_bad_address_are_refused(self) -> None:
         name = "must be letters, digits and _, and begin with a letter"
         address = "is no address of a master: it must look like http://localhost:11311"
         for argument, uri, line in (
-            ("namespace:=site-a", "", f"invalid namespace 'site-a': {name}"),
             ("namespace:=01", "", f"invalid namespace '01': {name}"),
             ("namespace:=site a", "", f"invalid namespace 'site a': {name}"),
             ("routers:=2", "localhost:11311", f"ROS_MASTER_URI=localhost:11311 {address}"),
         ):
-            environment = {"ROS_MASTER_URI": uri} if uri else {}
-            launch = ended(*OUR_LAUNCH, "drone_mesh", "factory.launch", argument, **environment)
-            self.assertEqual((launch.stdout, launch.returncode), (f"roslaunch: {line}\n", 1))
+            self.assertEqual(refused(argument, uri=uri), f"roslaunch: {line}")
+        launch = ended(*OUR_LAUNCH, "drone_mesh", "factory.launch", "namespace:=site-a")
+        line = f"roslaunch: invalid namespace 'site-a': {name}\n"
+        self.assertEqual((launch.stdout, launch.returncode), (line, 1))
 
     def test_the_nodes_themselves_refuse_such_a_namespace(self) -> None:
         launch = launched("namespace:=site-a", by=("roslaunch",))
@@ -219,10 +235,7 @@ class BadArgumentsTest(unittest.TestCase):
                 (f"console_port:={used}", used),
                 ("origin:=abc", "invalid origin 'abc'"),
             ):
-                launch = launched(*WITH_CONSOLE, argument)
-                (said,) = launch.stdout.splitlines()
-                self.assertIn(line, said)
-                self.assertEqual(launch.returncode, 1)
+                self.assertIn(line, str(refused(*WITH_CONSOLE, argument)))
         for number in ("99999", "abc"):
             launch = launched(*WITH_CONSOLE, f"console_port:={number}", by=("roslaunch",))
             (said,) = [line for line in launch.stdout.splitlines() if line.startswith("console: ")]
