@@ -91,12 +91,12 @@ def _add(found: Placemarks, feature: Any, origin: Origin) -> None:
     for kind, coordinates in shapes_in(geometry):
         if kind not in _LINES_AND_POINTS:
             continue
-        parts = _list(coordinates) if kind.startswith("Multi") else [coordinates]
+        parts = list_in(coordinates) if kind.startswith("Multi") else [coordinates]
         for part in parts:
             if kind.endswith("Point"):
                 found.add_point(drone, _place(part, height, origin))
             else:
-                places = [_place(position, height, origin) for position in _list(part)]
+                places = [_place(position, height, origin) for position in list_in(part)]
                 found.add_path(drone, places)
 
 
@@ -125,12 +125,13 @@ def shapes_in(geometry: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
         if kind not in _SHAPES:
             raise ConfigurationError(f"{reprlib.repr(shape)} is not a geometry")
         if kind == "GeometryCollection":
-            waiting += reversed(_list(shape.get("geometries"), "geometries"))
+            waiting += reversed(list_in(shape.get("geometries"), "geometries"))
         else:
             yield kind, shape.get("coordinates")
 
 
-def _list(value: Any, what: str = "coordinates") -> list[Any]:
+def list_in(value: Any, what: str = "coordinates") -> list[Any]:
+    """This part of a stranger's JSON, `what`. Raises ConfigurationError unless it is a list."""
     if not isinstance(value, list):
         raise ConfigurationError(f"{what} {reprlib.repr(value)} are not a list")
     return value

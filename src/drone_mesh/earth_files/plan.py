@@ -12,7 +12,7 @@ import reprlib
 from typing import Any, Mapping, NamedTuple, Sequence
 
 from drone_mesh.arguments import MOST, finite, is_up_to
-from drone_mesh.earth_files.geojson import read_json
+from drone_mesh.earth_files.geojson import list_in, read_json
 from drone_mesh.errors import ConfigurationError
 
 MAX_PLAN_CHARACTERS = 1_500_000  # 1000 waypoints of a survey, as QGroundControl indents them
@@ -54,7 +54,7 @@ def read_plan(text: str) -> Plan:
     speed: Any = mission.get("hoverSpeed")
     items: list[PlanItem] = []
     unread: list[str] = []
-    for row in _list(mission.get("items", []), "items"):
+    for row in list_in(mission.get("items", []), "items"):
         item = _mapping(row, f"item {len(items) + 1}")
         parts: Any = [item]
         if item.get("type") != "SimpleItem":
@@ -129,12 +129,6 @@ def _section(content: Mapping[str, Any], key: str) -> Mapping[str, Any]:
 def _mapping(value: Any, what: str) -> Mapping[str, Any]:
     if not isinstance(value, dict):
         raise ConfigurationError(f"{what} is not an object: {reprlib.repr(value)}")
-    return value
-
-
-def _list(value: Any, what: str) -> list[Any]:
-    if not isinstance(value, list):
-        raise ConfigurationError(f"{what} {reprlib.repr(value)} are not a list")
     return value
 
 

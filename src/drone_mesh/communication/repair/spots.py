@@ -58,7 +58,6 @@ def everywhere(_place: Location) -> bool:
 
 BLOCK = 8  # spots along each side of a block
 BLOCKS = (2, 4, BLOCK)  # each divides the next one
-FLOORS = 4  # BLOCK * BLOCK * FLOORS spots: one for each of the 256 ids
 WITHIN_REACH = 0.9  # of the range: how far behind a node that moved a drone stays
 PITCH = 1.1  # distance of spots in clearances, with a margin for rounding
 ROUNDING_M = 0.09  # a place in a beacon has tenths of a metre, on three axes

@@ -82,11 +82,6 @@ def repair_rows(story: RunStory) -> list[dict[str, str]]:
     ]
 
 
-def repairs_left(story: RunStory) -> list[tuple[int, str]]:
-    """Each node whose repair was not finished at the end, and its own description of it."""
-    return [(node.id, node.repair) for node in story.after.nodes if node.repair]
-
-
 def write_csv(story: RunStory, folder: Path) -> list[Path]:
     """samples.csv, events.csv and outages.csv; returns their paths. Raises OSError."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -156,7 +151,7 @@ def render_page(story: RunStory, title: str) -> str:
         repairs=repair_rows(story),
         outages_in_words=outages_in_words(story),
         rows_shown=ROWS_SHOWN,
-        left=repairs_left(story),
+        left=[(node.id, node.repair) for node in story.after.nodes if node.repair],
         blips=story.blips,
         timeline=timeline_figure(story),
         outages=outages_figure(story) if story.outages else "",
