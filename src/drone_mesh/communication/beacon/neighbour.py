@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Final, Tuple
 
-from drone_mesh.communication.beacon.packets import Beacon, Motion
+from drone_mesh.communication.beacon.packets import Beacon, Motion, left_out
 from drone_mesh.drone.location import Location
 
 WEIGHT: Final = 0.1  # of one beacon in the moving mean
@@ -118,7 +118,7 @@ class Neighbour:
             near_s[node] = now_s
         _after, listed, new = below = beacon.below
         if announced_s:
-            for node in below.left_out(announced_s):
+            for node in left_out(below, announced_s):
                 del announced_s[node]
         for node in listed:
             announced_s.setdefault(node, now_s)

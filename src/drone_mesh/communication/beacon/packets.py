@@ -70,14 +70,6 @@ class Below(NamedTuple):
     listed: tuple[int, ...]
     new: tuple[int, ...] = ()  # since the last beacon, wherever their turn is
 
-    def left_out(self, nodes: Iterable[int]) -> list[int]:
-        """Those of `nodes` that would be listed if they were below, and are not."""
-        if not self.listed:
-            return [] if self.after == NO_LIST else list(nodes)
-        listed, first = self.listed, self.after + 1
-        span = (listed[-1] - first) % 256
-        return [node for node in nodes if (node - first) % 256 <= span and node not in listed]
-
     def list_bytes(self) -> bytes:
         """`listed` as ids, or as the first id and a bit for each one from there on, if shorter."""
         ids = bytes(self.listed)
@@ -86,6 +78,15 @@ class Below(NamedTuple):
         bits = sum(1 << (node - ids[0]) % 256 for node in ids)
         as_bits = bytes((_AS_BITS, ids[0])) + bits.to_bytes((bits.bit_length() + 7) // 8, "little")
         return min(ids, as_bits, key=len)
+
+
+def left_out(below: Below, nodes: Iterable[int]) -> list[int]:
+    """Those of `nodes` that would be listed if they were below, and are not."""
+    listed, first = below.listed, below.after + 1
+    if not listed:
+        return [] if below.after == NO_LIST else list(nodes)
+    span = (listed[-1] - first) % 256
+    return [node for node in nodes if (node - first) % 256 <= span and node not in listed]
 
 
 def ids_that_fit(ids: Sequence[int], room: int) -> tuple[int, ...]:
@@ -122,16 +123,6 @@ class Beacon(NamedTuple):
     below: Below = NONE_BELOW
     near: tuple[int, ...] = ()  # some of its neighbours
     offline: bool = False  # the gateway has no internet
-
-    def shows_that_it_hears(self, node: int, as_child: bool) -> bool:
-        """Whether the sender hears `node`; of those below it, it does only if they are children."""
-        if node == self.parent or node in self.near:
-            return True
-        return as_child and (node in self.below.listed or node in self.below.new)
-
-    def named_nodes(self) -> tuple[int, ...]:
-        """The nodes that the sender hears or leads to, as far as they fit this beacon."""
-        return (*self.below.listed, *self.below.new, *self.near)
 
     def to_body(self, room: int) -> bytes:
         """Its `room` bytes. It has to fit: see `room_below`."""
@@ -225,6 +216,18 @@ class Beacon(NamedTuple):
             tuple(near),
             bool(interval & _OFFLINE),
         )
+
+
+def shows_that_it_hears(beacon: Beacon, node: int, as_child: bool) -> bool:
+    """Whether the sender hears `node`; of those below it, it does only if they are children."""
+    if node == beacon.parent or node in beacon.near:
+        return True
+    return as_child and (node in beacon.below.listed or node in beacon.below.new)
+
+
+def named_nodes(beacon: Beacon) -> tuple[int, ...]:
+    """The nodes that the sender hears or leads to, as far as they fit this beacon."""
+    return beacon.below.listed + beacon.below.new + beacon.near
 
 
 def names_gateway(payload: bytes) -> bool:

@@ -9,7 +9,13 @@ from drone_mesh.communication.beacon.connection import Connection, Proofs
 from drone_mesh.communication.beacon.courier import Courier, QueuedCourier
 from drone_mesh.communication.beacon.neighbour import LUCKY
 from drone_mesh.communication.beacon.own_beacons import NodesBelow, OwnBeacons, OwnMotion
-from drone_mesh.communication.beacon.packets import Beacon, Found, Search, names_gateway
+from drone_mesh.communication.beacon.packets import (
+    Beacon,
+    Found,
+    Search,
+    named_nodes,
+    names_gateway,
+)
 from drone_mesh.communication.beacon.routes import BeaconRoutes
 from drone_mesh.communication.beacon.times import ParentWatch, Trickle
 from drone_mesh.communication.beacon.verdicts import Searches, Verdicts
@@ -288,7 +294,7 @@ class BeaconPlane(IControlPlane):
         """Update what depends on a neighbour's new beacon."""
         routes, now_s = self._routes, self._routes.now_s
         self._look_s = now_s + LOOK_S
-        self._neighbours.note_known_elsewhere(beacon.named_nodes(), now_s)
+        self._neighbours.note_known_elsewhere(named_nodes(beacon), now_s)
         if is_new:
             self._trickle.reset(now_s)
         if self._below.has_news and not routes.is_root:

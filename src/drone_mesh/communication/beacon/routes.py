@@ -20,6 +20,7 @@ from drone_mesh.communication.beacon.packets import (
     Motion,
     apart_m,
     newer,
+    shows_that_it_hears,
 )
 from drone_mesh.communication.control.delivery import IRoutes
 from drone_mesh.communication.interfaces import NO_ROUTE
@@ -114,7 +115,7 @@ class BeaconRoutes(IRoutes):
         neighbour.heard(beacon, self.motion, self.clock.now_s)
         if beacon.parent == self._node_id and neighbour.announced_s:
             self._compare(neighbour)
-        if beacon.shows_that_it_hears(self._node_id, as_child=node == self.parent):
+        if shows_that_it_hears(beacon, self._node_id, as_child=node == self.parent):
             self._proved(neighbour)
         if self.motion is not None and neighbour.motion is not None:  # maybe of an earlier beacon
             neighbour.loss = self._losses.heard(

@@ -14,6 +14,7 @@ from drone_mesh.communication.beacon.packets import (
     Motion,
     Search,
     ids_that_fit,
+    left_out,
     newer,
 )
 from drone_mesh.drone.location import Location
@@ -85,16 +86,16 @@ def test_sequence_numbers_go_round(number, than, by):
 
 
 def test_a_part_of_the_list_leaves_out_the_other_ids_since_the_part_before():
-    assert Below(200, (250, 3)).left_out((200, 201, 250, 255, 0, 3, 4)) == [201, 255, 0]
+    assert left_out(Below(200, (250, 3)), (200, 201, 250, 255, 0, 3, 4)) == [201, 255, 0]
 
 
 def test_a_complete_list_leaves_out_every_other_id():
-    assert Below(8, (2, 8)).left_out(range(256)) == [n for n in range(256) if n not in (2, 8)]
+    assert left_out(Below(8, (2, 8)), range(256)) == [n for n in range(256) if n not in (2, 8)]
 
 
 def test_an_empty_list_leaves_out_every_id_unless_there_was_no_room_for_any():
-    assert NONE_BELOW.left_out((0, 7)) == [0, 7]
-    assert NOT_LISTED.left_out((0, 7)) == []
+    assert left_out(NONE_BELOW, (0, 7)) == [0, 7]
+    assert left_out(NOT_LISTED, (0, 7)) == []
 
 
 def test_many_nodes_below_stand_as_the_first_id_and_a_bit_for_each():
