@@ -127,7 +127,6 @@ class NodeTable:
     # Requests --------------------------------------------------------------------------------
 
     def node(self, node_id: int) -> Node | None:
-        """The registered node with this id, or None."""
         return self._nodes.get(node_id)
 
     def position(self, node_id: int) -> Position | None:

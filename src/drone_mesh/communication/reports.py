@@ -53,7 +53,6 @@ class NodeReport:
     shares_id: bool = False  # another radio uses its id
 
     def packet(self, creator: int, gateway: int) -> bytes:
-        """The 32 bytes, from `creator` for `gateway`."""
         steps = [NO_PLACE] * 3
         if self.place is not None:
             steps = [_int16(round(metres * STEPS_PER_M)) for metres in self.place]
@@ -217,7 +216,6 @@ class ReportBook:
 
     @receives(MessageType.NODE_WORDS)
     def on_words(self, payload: bytes, creator: int, _from: int) -> None:
-        """A part of the reason why its drone cannot fly."""
         assembly = self._words.setdefault(creator, TextAssembly())
         whole = assembly.add(*NodeWords.BODY.unpack_from(payload, HEADER_BYTES))
         if whole is not None:

@@ -58,7 +58,6 @@ class Player:
         self.show(times[self._history.index_at(self.now_s)] if paused else self.now_s)
 
     def show(self, at_s: float) -> None:
-        """Show the mesh as it was at this time."""
         times = self._history.times
         self.now_s = min(max(at_s, times[0]), times[-1])
         index = self._history.index_at(self.now_s)

@@ -43,7 +43,6 @@ class Table:
     rows: Sequence[Sequence[str]]
 
     def to_csv(self) -> str:
-        """As CSV, with the header as the first line."""
         text = io.StringIO()
         csv.writer(text, lineterminator="\n").writerows([self.header, *self.rows])
         return text.getvalue()

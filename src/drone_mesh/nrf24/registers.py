@@ -77,7 +77,6 @@ class BitField:
         object.__setattr__(self, "mask", ((1 << self.width) - 1) << self.lsb)
 
     def get(self, register_value: int) -> int:
-        """The field's value in a register's value."""
         return (register_value & self.mask) >> self.lsb
 
     def put(self, value: int, register_value: int = 0) -> int:

@@ -151,7 +151,6 @@ class RadioSettings:
 
     @property
     def access_rules(self) -> AccessRules:
-        """The rules of access for radios with these settings."""
         return AccessRules.for_cycle(CYCLE_S[self.data_rate])
 
     @property
@@ -192,7 +191,6 @@ class RadioSettings:
 
     @property
     def frame_s(self) -> float:
-        """Duration of a frame with a payload."""
         return frame_bits(ADDRESS_BYTES, PAYLOAD_BYTES, self.crc_bytes) / self.data_rate.value
 
     @property

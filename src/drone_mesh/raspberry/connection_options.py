@@ -35,7 +35,6 @@ class AirOptions:
 
 
 def add_air_options(node: argparse._ActionsContainer, gateway: bool) -> None:
-    """Add the options to a parser or a group."""
     node.add_argument(
         "--emulated-air",
         metavar="[HOST:]PORT",

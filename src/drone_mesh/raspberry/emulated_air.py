@@ -99,7 +99,6 @@ class EmulatedAir:
         )
 
     def move(self, node_id: int, place: Location) -> None:
-        """Move the radio of that node to this position."""
         self._chips[node_id].position = place.to_vector()
 
     def close(self) -> None:

@@ -52,7 +52,6 @@ class FieldRadio:
         self._ce.value = False
 
     def close(self) -> None:
-        """Power the radio down and release the devices."""
         with contextlib.suppress(RadioError):  # the chip is gone: nothing is left to power down
             self._chip.power_down()
         self._ce.close()

@@ -131,7 +131,6 @@ def _known(number: int) -> int | None:
 
 
 def version() -> str:
-    """The version of this package, as installed."""
     try:
         return metadata.version("drone_mesh")
     except metadata.PackageNotFoundError:

@@ -219,7 +219,6 @@ def _parser(program: str, description: str) -> argparse.ArgumentParser:
 
 
 def add_node_settings(group: argparse._ActionsContainer) -> None:
-    """Add an option for each setting of a node."""
     for one in NODE_SETTINGS:
         default = one.plain_default
         built_in = f"; built in: {', '.join(_BUILT_IN[one.name])}" if one.name in _BUILT_IN else ""

@@ -204,12 +204,10 @@ def describe_drone(
 
 
 def describe_obstacles(boxes: Iterable[Box]) -> list[ObstacleStatus]:
-    """These boxes as parts of a MeshStatus."""
     return [ObstacleStatus(box.center, box.size, box.yaw_rad) for box in boxes]
 
 
 def describe_fence(fence: Fence) -> list[AreaStatus]:
-    """The areas of this fence as parts of a MeshStatus."""
     return [
         AreaStatus(
             zone.name,

@@ -190,7 +190,6 @@ class _Client(socketserver.StreamRequestHandler):
                 _log.warning("node %d: that listener lost %d messages", node, listener.dropped)
 
     def _is_gone(self) -> bool:
-        """Whether the client has closed the connection."""
         readable, _, _ = select.select([self.request], [], [], 0.0)
         return bool(readable) and not self.request.recv(1, socket.MSG_PEEK)
 

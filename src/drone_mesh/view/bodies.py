@@ -44,12 +44,10 @@ class Bodies:
         return self._add(frame, (lamp,), drone.underside(scale))
 
     def move_drone(self, body: int, drone: DronePicture, scale: float) -> None:
-        """Move a drone's body to its current position."""
         place = drone.centre(scale) if self._shape is Shape.BOX else drone.underside(scale)
         pybullet.resetBasePositionAndOrientation(body, place, UPRIGHT, physicsClientId=self._client)
 
     def colour_drone(self, body: int, drone: DronePicture) -> None:
-        """Give a drone's body its current colour."""
         pybullet.changeVisualShape(
             body,
             BASE if self._shape is Shape.BOX else 0,

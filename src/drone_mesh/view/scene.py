@@ -106,7 +106,6 @@ class DronePicture:
 
     @property
     def colour(self) -> Colour:
-        """The colour of its role and condition."""
         return LIGHT.of_node(self.role, self.condition)
 
     def size_m(self, scale: float = 1.0) -> Vector:

@@ -140,7 +140,6 @@ def own_names(*more: str) -> frozenset[str]:
 
 
 def is_loopback(name: str) -> bool:
-    """Whether this host name or address is loopback."""
     address = numeric_address(name)
     return name.lower() == "localhost" or (address is not None and address.is_loopback)
 

@@ -156,7 +156,6 @@ def ack_body(ack: Ack) -> bytes:
 
 
 def ack_of(body: bytes) -> Ack:
-    """The content of the body of an ACK."""
     return Ack(*_ACK.unpack_from(body))
 
 
@@ -170,7 +169,6 @@ def poll_body(poll: Poll) -> bytes:
 
 
 def poll_of(body: bytes) -> Poll:
-    """The content of the body of a POLL."""
     return Poll(*_POLL.unpack_from(body))
 
 

@@ -26,7 +26,6 @@ class OwnGateway(GatewayConnection):
         return self._node_id
 
     def on_present(self, neighbour: int, hops: int, know_gateway: bool) -> bool:
-        """Answer a node that looks for a gateway."""
         return not know_gateway
 
     def on_gateway_heartbeat(self, gateway: int, hops: int) -> bool:

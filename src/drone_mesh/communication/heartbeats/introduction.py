@@ -79,7 +79,6 @@ class Introduction:
             self._plan(wait_s)
 
     def heartbeat(self, to: int, forward: int, connected: bool, gateway: int) -> bytes:
-        """A heartbeat of this node for `forward`."""
         me = self._node_id
         return self._extended(
             messages.heartbeat(me, me, to, forward, connected, gateway), _HEARTBEAT
@@ -98,7 +97,6 @@ class Introduction:
         self.broadcast()
 
     def on_power(self, on: bool) -> None:
-        """The antenna was switched on or off."""
         if on:
             self._plan(AFTER_POWER_S)
         else:

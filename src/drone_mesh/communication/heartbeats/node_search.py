@@ -64,7 +64,6 @@ class NodeSearch:
             self._pauses_s[node] = until_s, min(2.0 * pause_s, LONGEST_PAUSE_S)
 
     def found(self, node: int) -> None:
-        """End the search for a node that was heard again."""
         self._pauses_s.pop(node, None)
 
     @receives(MessageType.NODE_SEARCH)

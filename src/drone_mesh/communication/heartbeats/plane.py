@@ -118,7 +118,6 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
     # Time and surroundings -------------------------------------------------------------------
 
     def start(self) -> None:
-        """Start the technique, which introduces the node."""
         self._delivery.begin()
         self._technique.start_routing(self)
 
@@ -141,12 +140,10 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
 
     @due(Due.ANSWER)
     def on_answer_missed(self) -> None:
-        """The gateway did not answer in time."""
         self._connection.answer_missed()
 
     @due(Due.ROUTING)
     def on_technique_due(self) -> None:
-        """Let the technique do what it planned."""
         self._deadlines.set(Due.ROUTING, math.inf)
         self._technique.on_time(self._deadlines.now_s)
 
@@ -262,7 +259,6 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
 
     @receives(*_OF_TECHNIQUES)
     def on_packet_of_technique(self, payload: bytes, creator: int, from_: int) -> None:
-        """A packet of the technique's own types."""
         kind = messages.type_of(payload)
         self._technique.on_packet(creator, from_, kind, messages.body(payload))
 

@@ -295,7 +295,6 @@ class MeshnetworkComponent(NodeSnapshots, IMeshNetwork, IControlHost):
             self._antenna_is_off()
 
     def on_fence(self, now_s: float) -> None:
-        """The fence of its engine has changed."""
         self._deadlines.now_s = now_s
         self._pilot.on_fence()
         self._look_at_fence()

@@ -78,7 +78,6 @@ class RouterFlights(Flights):
 
     @due(Due.GOAL)
     def announce_goal_again(self) -> None:
-        """Tell the neighbours once more where the drone flies."""
         self._deadlines.set(Due.GOAL, math.inf)
         goal = self._pilot.goal
         if goal is not None:
@@ -93,7 +92,6 @@ class RouterFlights(Flights):
 
     @due(Due.REPAIR)
     def on_repair_due(self) -> None:
-        """Go on with the repair, which may end its flight."""
         if self._repair.on_due():
             self._landed()
 

@@ -76,7 +76,6 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         self._parts += [self._book, self._reports, self._whereabouts, self._flights]
 
     def start(self, now_s: float) -> None:
-        """Start the node and its internet connection."""
         super().start(now_s)
         self._internet.connect(self)
 

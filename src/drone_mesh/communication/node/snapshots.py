@@ -67,9 +67,7 @@ class NodeSnapshots(IMeshDebugInfo):
         return self._own_id.is_shared()
 
     def get_repair_status(self) -> RepairStatus:
-        """What the node does about a lost connection, and why."""
         return NOTHING_TO_REPAIR
 
     def get_channel_use(self) -> ChannelUse:
-        """The antenna's use of a shared channel."""
         return self._antenna.channel_use()

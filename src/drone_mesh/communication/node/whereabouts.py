@@ -242,7 +242,6 @@ class LastPlace(NamedTuple):
     age_s: float
 
     def packet(self, creator: int, to: int) -> bytes:
-        """The 32 bytes, from `creator` for `to`."""
         latitude, longitude, height = self.place
         age = max(0, min(_OLDEST_AGE_S, math.ceil(self.age_s)))
         body = _BODY.pack(age, self.node, latitude, longitude, round(height))

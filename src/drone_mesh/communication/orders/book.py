@@ -175,7 +175,6 @@ class OrderBook:
             order.dropped = f"node {drone} dropped the order: {reason}"
 
     def on_outcome(self, number: int, outcome: OrderOutcome, reason: str) -> None:
-        """A drone has reported the outcome of an order."""
         order = self._orders.get(number)
         if order is None or order.settled:
             return

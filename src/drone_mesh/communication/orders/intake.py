@@ -87,7 +87,6 @@ class OrderQuery:
 
     @classmethod
     def packet(cls, number: int, gateway: int, drone: int) -> bytes:
-        """The 32 bytes, from `gateway` for `drone`."""
         return messages.packet(cls.TYPE, gateway, gateway, drone, drone, cls.BODY.pack(number))
 
     @classmethod
@@ -186,7 +185,6 @@ class OrderIntake:
 
     @receives(MessageType.ORDER_QUERY)
     def on_query(self, payload: bytes, gateway: int, _from: int) -> None:
-        """A gateway queries the state of an order."""
         number = OrderQuery.number_in(payload)
         known = self._find(gateway, number)
         if known is None:

@@ -70,7 +70,6 @@ class PendingCommand:
         return bool(self.result == LATER)
 
     def sent_at(self, now_s: float) -> None:
-        """Record that the command is being sent now."""
         self.tries += 1
         self.sent_s = now_s
 

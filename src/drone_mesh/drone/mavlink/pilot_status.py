@@ -44,5 +44,4 @@ class PilotStatus:
 
     @property
     def is_flying(self) -> bool:
-        """Whether a flight to a goal is under way."""
         return self.phase in UNDER_WAY

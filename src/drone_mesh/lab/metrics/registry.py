@@ -49,7 +49,6 @@ def unit_of(column: str) -> str:
 
 
 def measure_all(record: RunRecord) -> dict[str, float]:
-    """Every metric of a run, by name."""
     return {name: float(metric.measure(record)) for name, metric in METRICS.items()}
 
 
@@ -71,7 +70,6 @@ def percentiles(values: Sequence[float], *shares: float) -> list[float]:
 
 
 def per_drone_and_s(record: RunRecord, count: float) -> float:
-    """This count of a whole run, per drone and second."""
     return count / record.end_s / len(record.start.places)
 
 

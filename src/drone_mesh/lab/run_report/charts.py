@@ -66,7 +66,6 @@ def with_gaps(values: Iterable[float | None]) -> list[float]:
 
 
 def messages_figure(story: RunStory) -> str:
-    """The number of messages that each node sent."""
     ids = sorted(story.messages_of)
     figure, (axes,) = figure_with(2.4)
     gateways = {node.id for node in story.after.nodes if node.role == Role.GATEWAY}

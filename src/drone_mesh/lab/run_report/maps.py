@@ -51,7 +51,6 @@ def _limits(story: RunStory, axis: int) -> tuple[float, float]:
 
 
 def draw_map(axes: Axes, mesh: MeshStatus, title: str) -> None:
-    """All nodes whose position is known, with their links."""
     placed = {node.id: node for node in mesh.nodes if position_is_known(node)}
     for use, links in links_by_use(list(placed.values())).items():
         for low, high in shortest(links, list(placed.values()), MOST_LINKS):

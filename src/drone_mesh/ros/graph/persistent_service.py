@@ -158,7 +158,6 @@ class PersistentService(Generic[Request, Response]):
         return answer
 
     def close(self) -> None:
-        """Close the connection, if there is one."""
         connection, self._connection = self._connection, None
         if connection is not None:
             connection.close()

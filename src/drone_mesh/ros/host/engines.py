@@ -149,7 +149,6 @@ class RosDroneEngineConnector(IDroneEngine):
             self._connect()
 
     def disconnect(self) -> None:
-        """Close the connection and unregister the topic of the goals."""
         self._silent.drop(self._gps)
         self._gps.close()
         self._goal.unregister()

@@ -47,7 +47,6 @@ _log = logging.getLogger(__name__)
 
 
 def progress_msg(progress: StandingProgress, over: bool) -> LayoutProgress:
-    """The progress of a standing order as a message."""
     ids = {state: bytes(drones) for state, drones in progress.drones.items()}
     return LayoutProgress(
         id=progress.number,
