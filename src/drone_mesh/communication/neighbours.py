@@ -5,6 +5,7 @@ The table belongs to the control plane, which makes it; the parts of a node writ
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Final, Iterable, Iterator, NamedTuple
 
@@ -263,5 +264,4 @@ class Neighbours:
 
     def taken(self) -> Iterator[tuple[int, HeardPlace]]:
         """Where each node may be: its reported place, and where it was seen on the way there."""
-        yield from self.places.items()
-        yield from self._seen.items()
+        return itertools.chain(self.places.items(), self._seen.items())

@@ -142,16 +142,15 @@ class Whereabouts:
 
     def _last_places(self, goal: Location, to: int, but: Container[int]) -> list[bytes]:
         """Packets that tell `to` which nodes, `but` these, were last heard near a goal."""
-        me, now_s = self._node_id, self._deadlines.now_s
-        near = sorted(
-            (heard.place.distance_m(goal), node, heard.place, heard.heard_s)
-            for node, heard in self._control.neighbours.taken()
-            if node not in but
-        )
+        me, now_s, near = self._node_id, self._deadlines.now_s, []
+        for node, heard in self._control.neighbours.taken():
+            if node not in but:
+                away_m = math.dist(heard.place, goal)
+                if away_m < NEAR_CLEARANCES * self._clearance_m:  # few are
+                    near.append((away_m, node, heard.place, heard.heard_s))
         return [
             LastPlace(node, place, now_s - heard_s).packet(me, to)
-            for away_m, node, place, heard_s in near[:MOST_TOLD]
-            if away_m < NEAR_CLEARANCES * self._clearance_m
+            for _away_m, node, place, heard_s in sorted(near)[:MOST_TOLD]
         ]
 
     @receives(MessageType.LAST_PLACE)
