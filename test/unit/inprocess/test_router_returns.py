@@ -53,29 +53,16 @@ def mesh(strategy):
 @functools.lru_cache(maxsize=None)
 def moments(strategy):
     """The first moment of each state of each router, without any event."""
-    network, found = mesh(strategy), {}
-
-    def watch(router, states):
-        happened = states.happened
-
-        def record(event):
-            happened(event)
-            note(router, states.connection, states.repair)
-
-        states.happened = record
-
-    def note(router, connection, repair):
-        on_ground = network.nodes[router].component.get_repair_status().landed
-        moment = Moment(connection, repair, on_ground, router, network.now_s())
-        found.setdefault(moment[:4], moment)
-
-    for router in (1, 3, 4):
-        watch(router, network.nodes[router].component._states)
+    network, found, last = mesh(strategy), {}, {}
     while network.now_s() < 100.0:
-        network.run_for(0.05)
-        for router in (3, 4):
-            states = network.nodes[router].component._states
-            note(router, states.connection, states.repair)
+        network.clock.run_until(network.clock.next_event_s())
+        for router in (1, 3, 4):
+            component = network.nodes[router].component
+            states, on_ground = component._states, component.get_repair_status().landed
+            state = (states.connection, states.repair, on_ground, router)
+            if last.setdefault(router, state) != state:
+                last[router] = state
+                found.setdefault(state, Moment(*state, network.now_s()))
     return tuple(found.values())
 
 
