@@ -136,7 +136,8 @@ class Relief:
             or (post.heard_s is not None and not self._is_in_reach(node, look))
         ):
             post.heard_s = look.mesh.stamp_s
-        patience_s = UNHEARD_S if node is not None and is_cut_off(node, look.heard) else SILENT_S
+        is_unheard = node is not None and is_there and is_cut_off(node, look.heard)
+        patience_s = UNHEARD_S if is_unheard else SILENT_S
         is_mute = post.heard_s is not None and look.mesh.stamp_s - post.heard_s > patience_s
         is_lost = node is None or not node.on or node.crashed or is_mute or repairs(node)
         if node is None or is_lost or (is_low(node) and not is_there):

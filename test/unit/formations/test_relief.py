@@ -543,3 +543,15 @@ def test_a_drone_goes_up_only_where_the_gateway_hears_it(x, goes_up):
     mesh.sent(3)
     (order,) = mesh.orders.saved()["orders"]
     assert (order["goals"]["1"] != list(home)) is goes_up
+
+
+def test_who_is_sent_away_takes_its_post_along_although_nobody_hears_it_for_seconds_on_the_way():
+    mesh = Mesh()
+    mesh.holder.neighbours, mesh.spare.neighbours = bytes([0, 2]), bytes([0, 1])
+    mesh.sent(2)
+    mesh.holder.neighbours, mesh.spare.neighbours = b"", bytes([0])
+    mesh.holder.position, mesh.holder.path = (2.0, 3.0, 2.0), list(OTHER.to_vector())
+    assert mesh.sent(5) == {}
+    mesh.holder.position, mesh.holder.path = OTHER.to_vector(), []
+    assert mesh.sent(5) == {}
+    assert mesh.posts() == {}
