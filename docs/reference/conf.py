@@ -15,7 +15,12 @@ release = ElementTree.parse(str(ROOT / "package.xml")).findtext("version") or ""
 extensions = ["sphinx.ext.autodoc", "sphinx.ext.autosummary"]
 autosummary_generate = True
 # What a package re-exports is described where it is defined.
-autodoc_default_options = {"members": True, "show-inheritance": True, "ignore-module-all": True}
+autodoc_default_options = {
+    "members": True,
+    "undoc-members": True,  # a name and a signature may say it all
+    "show-inheritance": True,
+    "ignore-module-all": True,
+}
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_use_type_comments = False  # there are none, and each function is parsed for them

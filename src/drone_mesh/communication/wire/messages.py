@@ -192,9 +192,8 @@ _GATEWAY_PLACE_AT = {
 }
 _OLDEST_AGE_S = 2**16 - 2
 _REQUESTLOCATION: Final = int(MessageType.REQUESTLOCATION)
-_ASKER_PLACE: Final = struct.Struct(
-    "<ffH"
-)  # latitude, longitude, height + 1 and whether it flies there
+# Latitude, longitude, height + 1 and whether it flies there.
+_ASKER_PLACE: Final = struct.Struct("<ffH")
 _NEW_REQUEST: Final = _whole("ffH")
 _FLIES_THERE: Final = 2**15
 _GOAL: Final = 2**31  # highest bit of the time in a LOCATION; nothing else uses that
