@@ -94,8 +94,10 @@ class Whereabouts:
 
     def on_looks(self, neighbour: int) -> None:
         """`neighbour` looks for a gateway or has just connected: it may have forgotten all."""
-        self._looked_s[neighbour] = self._deadlines.now_s
-        self._tell_s.pop(neighbour, None)
+        now_s = self._deadlines.now_s
+        if now_s - self._looked_s.get(neighbour, -math.inf) >= LOOK_AGAIN_S:  # anybody may say so
+            self._looked_s[neighbour] = now_s
+            self._tell_s.pop(neighbour, None)
 
     def on_leads(self, neighbour: int) -> None:
         """`neighbour` goes on through this node, and may step back to its place one day.

@@ -1485,6 +1485,23 @@ def test_who_asks_this_router_alone_makes_it_tell_all_who_is_silent_beside_it(as
     assert sum(sent[2] == LAST_PLACE for sent in rig.antenna.broadcasts) == 2 * len(told)
 
 
+def test_who_says_again_and_again_that_it_has_just_connected_is_told_once_in_ten_seconds():
+    rig = Rig()
+    rig.know_neighbour(3)
+    rig.hear("05 03 02 01 01 00 00 00 40 00 00 00 00 01 00")  # 5 asks, from latitude 2
+    rig.wait(60.0)
+    for _ in range(18):
+        rig.hear("03 03 01 01 fe 00 00 e0 40")  # 3 is at latitude 7
+        rig.hear("03 03 02 01 01 00 00 e0 40 00 00 00 00 01 00")  # and asks this router
+        rig.wait(0.5)
+    told = [packet("01 01 45 fe fe 3c 00 05 00 00 00 40")]
+    assert [sent for sent in rig.antenna.broadcasts if sent[2] == LAST_PLACE] == told
+    rig.wait(2.0)
+    rig.hear("03 03 01 01 fe 00 00 e0 40")
+    rig.hear("03 03 02 01 01 00 00 e0 40 00 00 00 00 01 00")
+    assert sum(sent[2] == LAST_PLACE for sent in rig.antenna.broadcasts) == 2
+
+
 class Impatient(Thesis):
     """Notes when it is asked for its patience."""
 
