@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
-from typing import Callable
+from dataclasses import dataclass, field
+from typing import Callable, Iterator
 
 from drone_mesh.communication.events.observer import MeshEventKind
+from drone_mesh.communication.repair.options import CLEARANCE_M
 from drone_mesh.drone.flight_path import CLIMB_ENDS_AT, DESCENT_STARTS_AT, FlightPath
+from drone_mesh.drone.location import Location
 from drone_mesh.inprocess import Network
+from drone_mesh.inprocess.node import InProcessNode
 from drone_mesh.lab.network_sample import gateways_of, physical_graph
 
 EVENTS_BACK = 20  # when a flight starts, its event is among this many latest ones
@@ -23,6 +26,9 @@ class Leg:
     is_start: bool  # the drone was at rest before
     had_path: bool  # a repair flight although a path to a gateway existed
     replaced_s: float | None = None
+    warned_of: set[int] = field(
+        default_factory=set
+    )  # drones on its way that it could have known of
 
     @property
     def end_s(self) -> float:
@@ -74,7 +80,40 @@ class Flights:
         leg = Leg(node, path, before is None, is_false)
         self._current[node] = leg
         self.legs.append(leg)
+        self._note_known(leg)
         self._plan_end_of_battery(leg)
+
+    def look(self) -> None:
+        """Note what those in the air could know by now of the drones on their way."""
+        for node in self.in_the_air:
+            self._note_known(self._current[node])
+
+    def _note_known(self, leg: Leg) -> None:
+        """Note who is nearer to the rest of its way than the clearance, and known to be there.
+
+        Known as the tables say of the drone itself, and of the live nodes with a path to it.
+        """
+        nodes, now_s = self._network.nodes, self._network.clock.now_s
+        on_way = {
+            node: place
+            for node, place in self._resting_places()
+            if node not in leg.warned_of
+            and node != leg.node
+            and leg.path.passes_m(place.to_vector(), now_s) < CLEARANCE_M
+        }
+        if on_way:
+            in_reach = {leg.node, *physical_graph(self._network).hops_from([leg.node])}
+            leg.warned_of.update(
+                node
+                for node, place in on_way.items()
+                if node in in_reach or any(_knows(nodes[one], node, place) for one in in_reach)
+            )
+
+    def _resting_places(self) -> Iterator[tuple[int, Location]]:
+        """Where each drone is, or will be at the end of its flight."""
+        for node_id, node in self._network.nodes.items():
+            path = node.drone.path
+            yield node_id, Location.from_vector(path.goal) if path else node.drone.get_location()
 
     def _plan_end_of_battery(self, leg: Leg) -> None:
         if leg.node not in self._may_fly_m:
@@ -102,3 +141,13 @@ class Flights:
             if event.node == node and event.kind is MeshEventKind.FLIGHT_DECIDED:
                 return event.now_s == self._network.clock.now_s
         return False
+
+
+def _knows(node: InProcessNode, other: int, place: Location) -> bool:
+    """Whether the tables of `node` have the drone `other` within the clearance of `place`."""
+    component = node.component
+    control, gateway = component.control, component.places.gateway
+    told = [heard.place for known, heard in control.neighbours.taken() if known == other]
+    if gateway is not None and control.gateway == other:
+        told.append(gateway)
+    return any(place.distance_m(known) < CLEARANCE_M for known in told)

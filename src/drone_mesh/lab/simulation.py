@@ -164,6 +164,9 @@ class Simulation:
                 if not node.is_gateway and node.antenna.powered and not network.connected(n)
             },
             able=frozenset(filter(self.is_able, nodes)),
+            informed=frozenset(
+                n for n, node in nodes.items() if node.is_gateway or node.component.places.gateway
+            ),
             endless_packets=sum(
                 count
                 for node in nodes.values()
@@ -191,6 +194,7 @@ class Simulation:
         while clock.now_s < until_s:
             if self.flights.in_the_air:
                 clock.run_until(min(until_s, clock.now_s + FLIGHT_SAMPLE_S))
+                self.flights.look()
                 self._watch_distances()
             else:
                 clock.run_until(until_s)

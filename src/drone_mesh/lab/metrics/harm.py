@@ -118,7 +118,7 @@ def _at(piece: _Piece, now_s: float) -> Place:
     return between(piece.start, piece.end, (now_s - piece.start_s) / length_s if length_s else 1.0)
 
 
-ROUNDING_M = 1e-6
+TOO_CLOSE_M = CLEARANCE_M - 1e-6  # for rounding
 PROMPT_S = 120.0  # a node that is cut off should be connected again by then
 
 
@@ -128,24 +128,38 @@ PROMPT_S = 120.0  # a node that is cut off should be connected again by then
     "and endless_packets is above 0",
 )
 def harm(run: RunRecord) -> float:
-    kinds = (
-        resting_close,
-        flew_connected,
-        flew_grounded,
-        left_able,
-        left_placeless,
-        endless_packets,
-    )
-    return close_ones(run)[0] > 0 or any(count(run) > 0 for count in kinds)
+    return close_ones(run)[0] > 0 or resting_close(run) + left_placeless(run) > 0 or _is_wrong(run)
+
+
+@less(
+    "0/1",
+    "harm that nodes could avoid: of the places in resting_close, flew_close and left_placeless, "
+    "only those that a live node knew whom the drone could ask: itself, or one to which links led",
+)
+def avoidable_harm(run: RunRecord) -> float:
+    warned = {frozenset((leg.node, other)) for leg in run.legs for other in leg.warned_of}
+    close, resting = set(), set(_resting_close(run))
+    if (warned or resting) and run.scenario.mobility.kind == "none":
+        close = {frozenset(it[:2]) for it in approaches(run, TOO_CLOSE_M) if not it.in_the_air}
+    placeless = _placeless(run) & run.end.graph.hops_from(run.informed).keys()
+    return bool(close & warned or resting - (close - warned) or placeless) or _is_wrong(run)
+
+
+def _is_wrong(run: RunRecord) -> bool:
+    """Whether there is harm of a kind that no knowledge of places excuses."""
+    counts = (flew_connected, flew_grounded, left_able, endless_packets)
+    return any(count(run) > 0 for count in counts)
 
 
 @less("", "pairs of drones at rest, on or off, nearer than the clearance, 1 m, at the end")
 def resting_close(run: RunRecord) -> float:
-    at_rest = sorted(run.end.places.keys() - run.in_the_air)
-    return sum(
-        math.dist(run.end.places[one], run.end.places[other]) < CLEARANCE_M - ROUNDING_M
-        for one, other in itertools.combinations(at_rest, 2)
-    )
+    return len(_resting_close(run))
+
+
+def _resting_close(run: RunRecord) -> list[frozenset[int]]:
+    places, at_rest = run.end.places, sorted(run.end.places.keys() - run.in_the_air)
+    pairs = itertools.combinations(at_rest, 2)
+    return [frozenset(it) for it in pairs if math.dist(places[it[0]], places[it[1]]) < TOO_CLOSE_M]
 
 
 @metrics(
@@ -158,7 +172,7 @@ def resting_close(run: RunRecord) -> float:
 def close_ones(run: RunRecord) -> tuple[float, float]:
     if run.scenario.mobility.kind != "none":
         return NAN, NAN
-    found = approaches(run, CLEARANCE_M - ROUNDING_M)
+    found = approaches(run, TOO_CLOSE_M)
     passed = sum(approach.in_the_air for approach in found)
     return len(found) - passed, passed
 
@@ -220,6 +234,10 @@ def left_able(run: RunRecord) -> float:
     "were connected since they started",
 )
 def left_placeless(run: RunRecord) -> float:
+    return len(_placeless(run))
+
+
+def _placeless(run: RunRecord) -> set[int]:
     informed: set[int] = set()
     for event in run.events:
         if event.kind == MeshEventKind.CONNECTED.value:
@@ -227,7 +245,7 @@ def left_placeless(run: RunRecord) -> float:
         elif event.kind == MeshEventKind.STARTED.value:
             informed.discard(event.node)  # a restarted node has forgotten
     told = run.end.graph.hops_from(informed)
-    return sum(node in told and "knows no place" in why for node, why in run.left_behind.items())
+    return {n for n, why in run.left_behind.items() if n in told and "knows no place" in why}
 
 
 @less("", "packets that were dropped at the limit of hops")
