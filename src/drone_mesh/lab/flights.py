@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass, field
-from typing import Callable, Iterator
+from typing import Callable, Iterator, Mapping
 
 from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.communication.repair.options import CLEARANCE_M
@@ -89,11 +89,8 @@ class Flights:
             self._note_known(self._current[node])
 
     def _note_known(self, leg: Leg) -> None:
-        """Note who is nearer to the rest of its way than the clearance, and known to be there.
-
-        Known as the tables say of the drone itself, and of the live nodes with a path to it.
-        """
-        nodes, now_s = self._network.nodes, self._network.clock.now_s
+        """Note who is nearer to the rest of its way than the clearance, and could be known."""
+        now_s = self._network.clock.now_s
         on_way = {
             node: place
             for node, place in self._resting_places()
@@ -102,12 +99,7 @@ class Flights:
             and leg.path.passes_m(place.to_vector(), now_s) < CLEARANCE_M
         }
         if on_way:
-            in_reach = {leg.node, *physical_graph(self._network).hops_from([leg.node])}
-            leg.warned_of.update(
-                node
-                for node, place in on_way.items()
-                if node in in_reach or any(_knows(nodes[one], node, place) for one in in_reach)
-            )
+            leg.warned_of |= could_know(self._network, leg.node, on_way)
 
     def _resting_places(self) -> Iterator[tuple[int, Location]]:
         """Where each drone is, or will be at the end of its flight."""
@@ -141,6 +133,20 @@ class Flights:
             if event.node == node and event.kind is MeshEventKind.FLIGHT_DECIDED:
                 return event.now_s == self._network.clock.now_s
         return False
+
+
+def could_know(network: Network, asker: int, places: Mapping[int, Location]) -> set[int]:
+    """Which of these drones `asker` could know to be within the clearance of these places.
+
+    From its own table, or from a live node to which links lead now: that is there itself, or has
+    the place in its table.
+    """
+    in_reach = {asker, *physical_graph(network).hops_from([asker])}
+    return {
+        node
+        for node, place in places.items()
+        if node in in_reach or any(_knows(network.nodes[one], node, place) for one in in_reach)
+    }
 
 
 def _knows(node: InProcessNode, other: int, place: Location) -> bool:

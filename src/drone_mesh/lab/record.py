@@ -82,6 +82,7 @@ class RunRecord:
     grounded: frozenset[int]  # drones that cannot fly
     left_behind: Mapping[int, str]  # live routers that are not connected at the end -> why
     able: frozenset[int]  # drones that can fly and know roughly where a gateway is, at the end
+    able_knowing: frozenset[int]  # of these, the ones that could know of a node with a link to them
     informed: frozenset[int]  # nodes that know a place of a gateway, at the end
     endless_packets: int  # dropped at the limit of hops
     links: LinkWatch  # empty in a run without motion, churn and probes

@@ -10,6 +10,7 @@ from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.communication.repair.options import DEFAULT_REPAIR
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.inprocess.radio import InProcessAir
+from drone_mesh.lab.flights import could_know
 from drone_mesh.lab.network_sample import physical_graph
 from drone_mesh.lab.record import RunRecord
 from drone_mesh.lab.scenario import Layout, Radio, Scenario, Sequence, Streams
@@ -74,12 +75,20 @@ class SequenceRun(Simulation):
 
     def is_able(self, node: int) -> bool:
         """Also requires a working link to a node with a path to the gateway."""
-        air = self.network.air
-        assert isinstance(air, InProcessAir)
         if node in self.impairments.one_way.mute | self.impairments.one_way.deaf:
             return False
-        helpers = physical_graph(self.network).hops_from([GATEWAY], {node})
-        return super().is_able(node) and not all(air.is_cut(node, other) for other in helpers)
+        return super().is_able(node) and bool(self._helpers(node))
+
+    def could_know_a_link(self, node: int) -> bool:  # noqa: D102
+        helpers = {helper: self.network.location(helper) for helper in self._helpers(node)}
+        return GATEWAY in helpers or bool(could_know(self.network, node, helpers))
+
+    def _helpers(self, node: int) -> list[int]:
+        """The nodes with a path to the gateway whose link to this one is not cut."""
+        air = self.network.air
+        assert isinstance(air, InProcessAir)
+        connected = physical_graph(self.network).hops_from([GATEWAY], {node})
+        return [other for other in connected if not air.is_cut(node, other)]
 
     def _alive(self) -> list[int]:
         nodes = self.network.nodes

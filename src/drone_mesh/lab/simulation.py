@@ -123,6 +123,7 @@ class Simulation:
         """The record up to the latest sample, of which there must be one; to be read at once."""
         network, scenario, nodes = self.network, self.scenario, self.network.nodes
         assert self._start is not None  # a run has at least one sample
+        able = frozenset(filter(self.is_able, nodes))
         return RunRecord(
             scenario=scenario,
             gateways=frozenset(gateways_of(network)),
@@ -163,7 +164,8 @@ class Simulation:
                 for n, node in nodes.items()
                 if not node.is_gateway and node.antenna.powered and not network.connected(n)
             },
-            able=frozenset(filter(self.is_able, nodes)),
+            able=able,
+            able_knowing=frozenset(filter(self.could_know_a_link, able)),
             informed=frozenset(
                 n for n, node in nodes.items() if node.is_gateway or node.component.places.gateway
             ),
@@ -207,6 +209,13 @@ class Simulation:
             return False
         reach_m = self.scenario.range_m - ABLE_WITHIN_M
         return any(believed.distance_m(network.location(g)) < reach_m for g in gateways_of(network))
+
+    def could_know_a_link(self, _node: int) -> bool:
+        """Whether an able drone could know of a node with a path and a working link to it.
+
+        The gateway is one.
+        """
+        return True
 
     def _take_sample(self) -> NetworkSample:
         sample = sample_of(self.network)

@@ -40,7 +40,14 @@ def record(places, *legs, kind=DECIDED, **end):
         events=[EventRecord(leg.path.start_s, leg.node, kind) for leg in legs],
         end_s=100.0,
         scenario=Scenario(),
-        **{"left_behind": {}, "able": set(), "informed": set(), "endless_packets": 0, **end},
+        **{
+            "left_behind": {},
+            "able": set(),
+            "able_knowing": set(),
+            "informed": set(),
+            "endless_packets": 0,
+            **end,
+        },
         grounded=frozenset(),
     )
 
@@ -139,6 +146,16 @@ def test_a_drone_that_knows_no_place_could_ask_those_to_whom_links_lead(informed
     run = record({}, graph=graph, left_behind={1: "knows no place to fly to"}, informed=informed)
     run.events.append(EventRecord(1.0, 1, MeshEventKind.CONNECTED.value))
     assert (harm(run), avoidable_harm(run)) == (True, is_avoidable)
+
+
+@pytest.mark.parametrize("knowing", [set(), {1}])
+def test_whose_only_link_leads_to_a_node_that_it_cannot_know_of_is_left_behind_without_fault(
+    knowing,
+):
+    run = record(
+        {}, left_behind={1: "is where it was connected last"}, able={1}, able_knowing=knowing
+    )
+    assert (harm(run), avoidable_harm(run)) == (True, bool(knowing))
 
 
 def test_harm_of_other_kinds_is_always_avoidable():

@@ -18,6 +18,7 @@ from drone_mesh.lab.metrics.harm import (
     outside_s,
     resting_close,
 )
+from drone_mesh.lab.network_sample import physical_graph
 from drone_mesh.lab.plan import Plan
 from drone_mesh.lab.scenario import Scenario, Streams
 from drone_mesh.lab.sequence import SequenceRun, run_sequence
@@ -76,8 +77,30 @@ def test_no_repair_is_expected_of_a_drone_whose_links_have_all_failed():
     for other in run.network.nodes.keys() - {lost, 0}:
         run.network.air.cut(lost, other)
     assert run.is_able(lost)
+    assert run.could_know_a_link(lost)
     run.network.air.cut(lost, 0)
     assert not run.is_able(lost)
+
+
+def test_a_drone_could_know_of_the_only_link_that_is_left_if_its_table_has_that_place():
+    sparse = {"sequence": {"drones": [14, 14], "density": [5.0, 6.5]}}
+    run = SequenceRun(Scenario.model_validate(sparse), Streams(0, 1))
+    network = run.network
+    network.run_for(60.0)
+    lost = min(filter(run.is_able, network.nodes.keys() - {0}))
+    routers = physical_graph(network).hops_from([0], {lost}).keys() - {0}
+    helper = max(
+        routers, key=lambda node: network.location(lost).distance_m(network.location(node))
+    )
+    for other in network.nodes.keys() - {lost, helper}:
+        network.air.cut(lost, other)
+    assert helper not in network.air.in_range(lost)
+    assert run.is_able(lost)
+    table = network.nodes[lost].component.control.neighbours
+    table.places.pop(helper, None)
+    assert not run.could_know_a_link(lost)
+    table.set_place(helper, network.location(helper), network.now_s())
+    assert run.could_know_a_link(lost)
 
 
 @pytest.mark.parametrize("number", range(8))

@@ -128,26 +128,28 @@ PROMPT_S = 120.0  # a node that is cut off should be connected again by then
     "and endless_packets is above 0",
 )
 def harm(run: RunRecord) -> float:
-    return close_ones(run)[0] > 0 or resting_close(run) + left_placeless(run) > 0 or _is_wrong(run)
+    counts = (resting_close, left_able, left_placeless)
+    return close_ones(run)[0] > 0 or any(count(run) > 0 for count in counts) or _is_wrong(run)
 
 
 @less(
     "0/1",
-    "harm that nodes could avoid: of the places in resting_close, flew_close and left_placeless, "
-    "only those that a live node knew whom the drone could ask: itself, or one to which links led",
+    "harm that nodes could avoid: in resting_close, flew_close, left_able and left_placeless only "
+    "places that a live node knew whom the drone could ask: itself, or one to which links led",
 )
 def avoidable_harm(run: RunRecord) -> float:
     warned = {frozenset((leg.node, other)) for leg in run.legs for other in leg.warned_of}
     close, resting = set(), set(_resting_close(run))
     if (warned or resting) and run.scenario.mobility.kind == "none":
         close = {frozenset(it[:2]) for it in approaches(run, TOO_CLOSE_M) if not it.in_the_air}
+    near = close & warned or resting - (close - warned)
     placeless = _placeless(run) & run.end.graph.hops_from(run.informed).keys()
-    return bool(close & warned or resting - (close - warned) or placeless) or _is_wrong(run)
+    return bool(near or placeless or run.left_behind.keys() & run.able_knowing) or _is_wrong(run)
 
 
 def _is_wrong(run: RunRecord) -> bool:
     """Whether there is harm of a kind that no knowledge of places excuses."""
-    counts = (flew_connected, flew_grounded, left_able, endless_packets)
+    counts = (flew_connected, flew_grounded, endless_packets)
     return any(count(run) > 0 for count in counts)
 
 
