@@ -20,6 +20,7 @@ from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.packet_types import MessageType
 
 _HEARTBEAT = int(MessageType.HEARTBEAT)
+_BID = int(MessageType.MOVEMENT_NEGOTIATION)
 CREATORS_TOLD = 8  # MISSING to one creator of users' data, per limits.LIMIT_PERIOD_S
 
 
@@ -114,13 +115,16 @@ class Forwarding:
         return NO_ROUTE if up == from_ else up
 
     def _own_came_back(self, payload: bytes, now_s: float) -> None:
-        """Drop a packet of this node that came back; one sent just now shows a loop."""
+        """Drop a packet of this node that came back; one sent just now shows a loop.
+
+        A bid may be one that a neighbour passes on in this node's name, perhaps through it.
+        """
         sent = self._delivery.own_passage(payload)
         if sent is not None:
             _from, went_to, sent_s, _hops = sent
             if now_s - sent_s < self._circulates_s:
                 self._drop_circulating(payload, went_to, now_s)
-        elif self._delivery.remembers_all():
+        elif self._delivery.remembers_all() and payload[messages.TYPE_AT] != _BID:
             reason = "a packet in this node's name that it did not send"
             self._complaints.dropped(reason, payload, now_s)
 

@@ -268,7 +268,9 @@ class OrderBook:
         number, goal = order.number, order.goal
         if order.state in _FAILURES:
             words = explanation(number, goal, order.state.in_words(order.reason))
-            reason = f"an order for drone {order.drone} failed"
+            is_unknown = order.state is OrderState.LOST_CONTACT  # it may have arrived
+            what = "has an unknown outcome" if is_unknown else "failed"
+            reason = f"an order for drone {order.drone} {what}"
             self._complaints.add(reason, words, self._deadlines.now_s)
         self._report_event(EVENT_OF[order.state], order.drone, order.reason, number, goal)
 

@@ -281,6 +281,16 @@ def test_its_own_packet_that_comes_back_after_seconds_is_no_forgery_nor_news_of_
     assert NOT_SENT not in rig.mesh.complaints.counts
 
 
+def test_its_own_bid_that_a_neighbour_passes_on_through_it_is_no_forgery():
+    rig = Rig()
+    rig.wait(61.0)
+    rig.hear("09 03 00 01 01")
+    rig.know_neighbour(2)
+    rig.hear("01 02 07 01 09 00 00 82 41")  # 2 takes this node for its way to its neighbour 9
+    assert rig.sent(7) == []
+    assert NOT_SENT not in rig.mesh.complaints.counts
+
+
 def test_what_comes_back_to_a_restarted_node_is_no_forgery():
     rig = Rig()
     rig.hear("09 03 00 01 01")

@@ -309,6 +309,7 @@ def test_an_order_without_a_reply_is_repeated_and_then_contact_is_lost():
         times += [round(rig.now_s)] * len(repeated)
     assert times == [2, 6, 14]
     assert state(rig) == (OrderState.LOST_CONTACT, "at 0 s: it did not reply")
+    assert "an order for drone 5 has an unknown outcome" in rig.mesh.complaints.counts
 
 
 def test_while_there_is_no_route_a_try_waits_four_times_as_its_drone_may_be_in_flight():
