@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections import defaultdict
 
+from drone_mesh.communication.interfaces import BROADCAST
+
 EPISODE_S = 1.0  # the same packet again after such a silence is another one
 
 
@@ -16,16 +18,14 @@ class AirWatch:
     """
 
     def __init__(self, network):
-        self._send = network.air.send
         self._clock = network.clock
         self._episodes = defaultdict(list)  # identity -> [last heard at, made, sent on]
         self._sent_on = defaultdict(list)  # type -> [(from, to)]
-        network.air.send = self.send
+        network.air.carries = self._look
 
-    def send(self, payload):
-        """As InProcessAir.send, with a look at what was taken."""
-        taken = self._send(payload)
-        if taken:
+    def _look(self, payload):
+        """Let every packet pass."""
+        if payload[4] != BROADCAST:
             hops_free = payload[:7] + payload[8:] if payload[2] == 4 else payload
             identity = hops_free[:1] + hops_free[2:3] + hops_free[4:]
             episodes = self._episodes[identity]
@@ -39,7 +39,7 @@ class AirWatch:
             else:
                 episode[2] += 1
                 self._sent_on[payload[2]].append((payload[1], payload[3]))
-        return taken
+        return True
 
     def sent_on(self, kind):
         """(from, to) of each time that another node forwarded a packet of this type."""
