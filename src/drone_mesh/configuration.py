@@ -6,13 +6,11 @@ import difflib
 import logging
 import random
 import reprlib
-from dataclasses import MISSING
+from dataclasses import MISSING, dataclass
 from pathlib import Path
-from typing import Any, Literal, Mapping, get_args
+from typing import Any, Literal, Mapping, get_args, get_type_hints
 
-from pydantic import ConfigDict, ValidationError, field_validator
-from pydantic.dataclasses import dataclass
-
+from drone_mesh.arguments import is_decimal
 from drone_mesh.communication.node.node_configuration import NodeConfiguration
 from drone_mesh.communication.repair.options import RANGE_M
 from drone_mesh.drone.fleet import (
@@ -31,6 +29,10 @@ MIN_REAL_TIME_FACTOR = 0.001  # one step of the world in 10 s
 MAX_REAL_TIME_FACTOR = 1000.0  # above it the steps of the clock are too large
 MAX_SEED = 2**32 - 1
 RANDOM_SEED = "random"  # requests a new seed although the file has a fixed one
+_SWITCHES = {
+    **dict.fromkeys(("true", "yes", "on", "t", "y", "1"), True),
+    **dict.fromkeys(("false", "no", "off", "f", "n", "0"), False),
+}
 
 # The world decides the range. How often a packet is tried is for experiments.
 _NOT_OF_A_SIMULATION = ("range_m", "send_attempts")
@@ -54,12 +56,13 @@ def _with_settings_of_a_node(cls: type) -> type:
     return cls
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid", str_strip_whitespace=True))
+@dataclass(frozen=True)
 @_with_settings_of_a_node
 class FactoryConfiguration:
     """Every setting of a simulation, with those of NodeConfiguration.
 
-    Values may have their own type or be text ("3", "true"), as launch arguments are.
+    Values may have their own type or be text ("3", "true"), as launch arguments are. Raises
+    ConfigurationError.
     """
 
     seed: int = setting(
@@ -232,20 +235,9 @@ class FactoryConfiguration:
         True, "true or false: whether each node publishes /Nodes/ID/debug once per simulated second"
     )
 
-    @field_validator("*", mode="before")
-    @classmethod
-    def _not_a_switch_for_a_number(cls, value: object, info: Any) -> object:
-        if isinstance(value, bool) and not isinstance(SETTINGS[info.field_name].default, bool):
-            raise ValueError("true and false are not numbers")
-        return value
-
-    @field_validator("*")
-    @classmethod
-    def _is_allowed(cls, value: object, info: Any) -> object:
-        declared = SETTINGS[info.field_name]
-        if not declared.allows(value) or (value == "" and declared.default):
-            raise ValueError("out of bounds")
-        return value
+    def __post_init__(self) -> None:
+        for name in SETTINGS:
+            object.__setattr__(self, name, _checked(name, getattr(self, name)))
 
     @property
     def node(self) -> NodeConfiguration:
@@ -259,6 +251,7 @@ SETTINGS: dict[str, Setting] = {
     **_NODE,
 }
 """By key, in the order of the file."""
+_KINDS = get_type_hints(FactoryConfiguration)
 
 
 def load_configuration(
@@ -284,19 +277,40 @@ def load_configuration(
     def where(name: object) -> str:
         return "argument" if name in given else file.where(name)
 
-    for name in values:
-        if name not in SETTINGS:
-            raise ConfigurationError(f"{where(name)}: unknown key {name}; {_hint(name)}")
-    try:
-        configuration = FactoryConfiguration(**values)
-    except ValidationError as error:
-        name = str(error.errors()[0]["loc"][0])
-        shown = "(empty)" if values[name] is None else reprlib.repr(values[name])
-        raise ConfigurationError(
-            f"{where(name)}: invalid {name} {shown}: expected {_allowed(name)}"
-        ) from None
+    for name, value in values.items():
+        try:
+            _checked(name, value)
+        except ConfigurationError as error:
+            raise ConfigurationError(f"{where(name)}: {error}") from None
+    configuration = FactoryConfiguration(**values)
     _log.info("random seed: to repeat this run, use seed:=%d", configuration.seed)
     return configuration
+
+
+def _checked(name: str, value: object) -> Any:
+    """The value in the type of its key. Raises ConfigurationError."""
+    if name not in SETTINGS:
+        raise ConfigurationError(f"unknown key {name}; {_hint(name)}")
+    declared, kind = SETTINGS[name], _KINDS[name]
+    found = _of_kind(kind, value)
+    if found is None or not declared.allows(found) or (found == "" and declared.default):
+        shown = "(empty)" if value is None else reprlib.repr(value)
+        raise ConfigurationError(f"invalid {name} {shown}: expected {_allowed(declared, kind)}")
+    return found
+
+
+def _of_kind(kind: Any, value: object) -> Any:
+    """None if the value is not of this kind."""
+    text = str(value).strip()
+    if kind is bool:
+        return _SWITCHES.get(text.lower())
+    if kind not in (int, float):
+        is_word = isinstance(value, str) and (kind is str or text in get_args(kind))
+        return text if is_word else None
+    if not is_decimal(text):
+        return None
+    number = float(text)
+    return number if kind is float else int(number) if number.is_integer() else None
 
 
 def _hint(name: object) -> str:
@@ -304,11 +318,9 @@ def _hint(name: object) -> str:
     return f"did you mean {close[0]}?" if close else f"known are {', '.join(sorted(SETTINGS))}"
 
 
-def _allowed(name: str) -> str:
+def _allowed(declared: Setting, kind: Any) -> str:
     """The allowed values of a key, as text."""
-    if isinstance(SETTINGS[name].default, bool):
+    if kind is bool:
         return "true or false"
-    words = get_args(vars(FactoryConfiguration)["__pydantic_fields__"][name].annotation)
-    if words:
-        return " or ".join(words)
-    return SETTINGS[name].expected + (f", or {RANDOM_SEED}" if name == "seed" else "")
+    words = " or ".join(get_args(kind)) or declared.expected
+    return words + (f", or {RANDOM_SEED}" if declared.name == "seed" else "")

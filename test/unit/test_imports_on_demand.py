@@ -13,7 +13,7 @@ import pytest
 pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).resolve().parents[2]
-WEB = {"fastapi", "fastapi_offline", "starlette", "uvicorn", "websockets"}
+WEB = {"fastapi", "fastapi_offline", "pydantic", "starlette", "uvicorn", "websockets"}
 REPORT = {"jinja2", "matplotlib"}
 SIMULATION = {"numpy", "pybullet", "rospy"}
 AUTOPILOT = {"pymap3d", "pymavlink"}

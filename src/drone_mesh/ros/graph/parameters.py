@@ -11,7 +11,6 @@ import rospkg
 import rospy
 from std_msgs.msg import String
 
-from drone_mesh.air.obstacle_file import read_obstacles
 from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.configuration import FactoryConfiguration, load_configuration
 from drone_mesh.drone.fence import Fence
@@ -51,9 +50,13 @@ def configured_obstacles(configuration: FactoryConfiguration) -> Obstacles | Non
     A fence in degrees needs the origin of the simulation. Raises ConfigurationError.
     """
     blocks = configuration.obstacle_radio == "block"
-    boxes = _read_named_file(
-        "obstacles", configuration.obstacles, lambda path: read_obstacles(path, blocks)
-    )
+
+    def read_boxes(path: Path) -> Obstacles:
+        from drone_mesh.air.obstacle_file import read_obstacles  # a library that nothing else needs
+
+        return read_obstacles(path, blocks)
+
+    boxes = _read_named_file("obstacles", configuration.obstacles, read_boxes)
     fence = fence_in(fence_areas(configuration))
     if not fence:
         return boxes
