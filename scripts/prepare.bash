@@ -195,6 +195,8 @@ compiler() { DRONE_MESH_COMPILE=yes PYTHONPATH="$root/build/compiled/mypyc" "$ve
 compile_core() {
   local builds=build/compiled folder
   prepare_compiler
+  exec 9>"$builds/.lock"  # beside installations and other builds, but not beside another of these
+  flock 9
   folder=$(DRONE_MESH_CORE=python PYTHONPATH=src "$venv/bin/python" -c 'from drone_mesh.compiled import build; print(build())') || exit
   say "compiling into ${folder#"$root/"}"
   rm -rf "$builds"/{new,old,temp}
