@@ -18,7 +18,7 @@ from drone_mesh.inprocess.drone import InProcessDrone
 from drone_mesh.inprocess.interfaces import IInProcessAir
 from drone_mesh.state.links import route_to_gateway
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
-from drone_mesh.state.observation import EventBatcher, describe_component, path_ahead
+from drone_mesh.state.observation import describe_component, path_ahead, peers_of, record_of
 
 
 class NoInternet(IInternetConnection):
@@ -98,12 +98,7 @@ def mesh_status(
 
 def event_records(events: Iterable[MeshEvent]) -> list[EventRecord]:
     """The content of /mesh/events for these events, oldest first."""
-    batcher = EventBatcher()
-    records: list[EventRecord] = []
-    for event in events:
-        batcher.observe(event)
-        records += batcher.drain()
-    return records
+    return [record_of(event, peers_of(event)) for event in events]
 
 
 def _node_status(node_id: int, node: InProcessNode, now_s: float) -> NodeStatus:

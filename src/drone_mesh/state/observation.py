@@ -59,25 +59,32 @@ class EventBatcher:
         latest_of: dict[int, tuple[MeshEvent, list[int]]] = {}
         for _ in range(len(self._waiting)):
             event = self._waiting.popleft()
-            peers = [] if event.peer == NO_ROUTE else [event.peer]
+            peers = peers_of(event)
             latest, known = latest_of.get(event.node, (None, []))
             if latest is not None and latest.kind is event.kind and event.kind in _SEVERAL_AT_ONCE:
                 known += [peer for peer in peers if peer not in known]
             else:
                 latest_of[event.node] = event, peers
                 batch.append((event, peers))
-        return [
-            EventRecord(
-                event.now_s,
-                event.node,
-                event.kind.value,
-                tuple(peers),
-                event.detail,
-                event.order,
-                event.place,
-            )
-            for event, peers in batch
-        ]
+        return [record_of(event, peers) for event, peers in batch]
+
+
+def peers_of(event: MeshEvent) -> list[int]:
+    """Its peer, if there is one."""
+    return [] if event.peer == NO_ROUTE else [event.peer]
+
+
+def record_of(event: MeshEvent, peers: Iterable[int]) -> EventRecord:
+    """This event, of several peers at once."""
+    return EventRecord(
+        event.now_s,
+        event.node,
+        event.kind.value,
+        tuple(peers),
+        event.detail,
+        event.order,
+        event.place,
+    )
 
 
 @dataclass(frozen=True)

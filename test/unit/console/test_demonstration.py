@@ -14,6 +14,7 @@ from drone_mesh.console.demonstration import Casting, RepairDemonstration
 from drone_mesh.console.relief_demonstration import ReliefDemonstration
 from drone_mesh.formations.layouts import Layouts
 from drone_mesh.inprocess import Network
+from drone_mesh.inprocess.node import event_records
 from drone_mesh.state.alarms import AlarmBook
 from drone_mesh.state.model import MeshStatus
 
@@ -73,9 +74,9 @@ class Fleet:
     def state(self) -> MeshStatus:
         """The mesh now; its alarms are noted."""
         mesh = replace(self.network.status(), real_time_factor=self.factor)
-        events = self.network.event_records()
-        self.alarms.on_events(events[self._told :])
-        self._told = len(events)
+        events = self.network.events[self._told :]
+        self.alarms.on_events(event_records(events))
+        self._told += len(events)
         self.alarms.update(mesh)
         return mesh
 

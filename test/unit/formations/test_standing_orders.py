@@ -18,6 +18,7 @@ from drone_mesh.formations.layouts import Layouts
 from drone_mesh.formations.standing_order import PartState
 from drone_mesh.formations.standing_orders import StandingOrders
 from drone_mesh.inprocess.network import Network
+from drone_mesh.inprocess.node import event_records
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
 
 HOME = Location(0.0, 0.0, 0.0)
@@ -250,10 +251,12 @@ def order_layout(network, orders, case):
 
 
 def follow(network, orders, seconds):
+    seen = 0
     for _ in range(int(seconds)):
         network.run_for(1.0)
-        for event in network.event_records():
+        for event in event_records(network.events[seen:]):
             orders.on_event(event)
+        seen = len(network.events)
         for node_id, goal in orders.update(network.status()):
             network.order(node_id, goal.longitude, goal.latitude, int(goal.height))
 

@@ -19,6 +19,7 @@ from drone_mesh.ground_station.requests import Desk
 from drone_mesh.ground_station.settings import GroundStationSettings
 from drone_mesh.ground_station.vehicles import PROOF_PERIODS, vehicles_of_gateway
 from drone_mesh.inprocess import Network
+from drone_mesh.inprocess.node import event_records
 from drone_mesh.web.access import Allowance
 
 REPORT_PERIOD_S = 30.0
@@ -57,12 +58,12 @@ class StationOfMesh:
             self.network.run_for(1.0)
             node, now_s = self.network.nodes[0], self.network.clock.now_s
             self.fleet.show(vehicles_of_gateway(node.component, node.drone, now_s), now_s)
-            records = self.network.event_records()
-            for event in records[self._seen :]:
+            events = self.network.events[self._seen :]
+            self._seen += len(events)
+            for event in event_records(events):
                 self.desk.event(event)
                 for told in self.fleet.event(event):
                     self._post(*told, None)
-            self._seen = len(records)
             for told in self.fleet.every_second(second):
                 self._post(*told, None)
 
