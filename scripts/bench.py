@@ -17,11 +17,11 @@ import time
 from typing import Any, Callable, Iterator, Sequence
 
 import psutil
+from growth import SPACING_M
 
 from drone_mesh.communication.seals.keys import MeshKey
 from drone_mesh.inprocess import Network
 
-SPACING_M = 6.0
 PHASE_S = 60.0  # simulated: six rounds of the default timing
 ON_WITHIN_S, CONNECTED_WITHIN_S = 180.0, 120.0  # wall
 SETTLE_S = 5.0  # wall: the start costs more than later seconds

@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import Mapping, Sequence
 
 import numpy as np
-from bench import SPACING_M, head, row, say
 
 from drone_mesh.inprocess import Network
 from drone_mesh.mobility import Area, Mobility, tracks_of
 
 PICTURE = Path(__file__).resolve().parents[1] / "docs" / "pictures" / "growth.svg"
+SPACING_M = 6.0
 SIZES = (10, 26, 50, 101, 160, 254)
 LARGE = 50  # exponents are of the meshes from this size on
 SETTLE_S, SLICE_S, SLICES = 20.0, 5.0, 3  # simulated; the table has the median slice
@@ -57,6 +57,8 @@ def cost(network: Network) -> float:
 
 def growth(sizes: Sequence[int]) -> None:
     """Measure all motions, radios, techniques and sizes; print the table and draw the picture."""
+    from bench import head, row, say  # which needs psutil, and scripts/pace does not
+
     head(
         f"µs of processor time per delivered packet, and k in n^k from {LARGE} nodes on",
         *("radio", "routing", "drones", *(f"{nodes} nodes" for nodes in sizes), "k"),
