@@ -22,6 +22,7 @@ from proofs.attacks import (
     highest_bid,
     invented_ids,
     plausible_bid,
+    swallowing_relay,
 )
 from proofs.claims import BY_BEACONS, FOR_PACKETS_DOWN
 from proofs.stranger import BESIDE, Stranger
@@ -29,6 +30,7 @@ from proofs.stranger import BESIDE, Stranger
 NODES, SHARED_NODES = 25, 9
 SPACING_M = 6.0
 PLACES = ((0.0, 0.0), (0.0, 0.5), (0.5, 0.0), (0.5, 0.5), (1.0, 1.0))  # of the sides of the mesh
+PLACED = (highest_bid, plausible_bid, swallowing_relay)  # in a line; on the routes of most
 STRANGER = 200
 LURED_M = 50.0  # farther than any repair flies here
 OFF_ORDER_M = 3.0  # tolerance for a drone that its owner ordered to a place
@@ -125,13 +127,12 @@ TABLE_HEAD = (
 
 
 def worst_place(name: str, threat: Threat) -> int:
-    """The one of the PLACES from where attacks by beacons or frames do most, with the first seed.
+    """The one of the PLACES from where an attack does most, with the first seed.
 
-    Other attacks are made beside the gateway, through which all packets go, and so are those
-    without a key on a mesh that has one.
+    Recordings are made beside the gateway, and so are attacks without a key on a mesh that has one.
     """
-    is_anywhere = ATTACKS[name] in (*BY_BEACONS, borrowed_names)
-    if not is_anywhere or threat in (Threat.NONE, Threat.WITH_KEY):
+    is_placed = ATTACKS[name] in (*RECORDING, *PLACED)
+    if is_placed or threat in (Threat.NONE, Threat.WITH_KEY):
         return 0
     harm = [trial(name, threat, 0, place) for place in range(len(PLACES))]
     return max(range(len(PLACES)), key=lambda place: (harm[place].cut_off, harm[place].lured))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 
 import pytest
+from proofs import damage
 from proofs.attacks import ATTACKS, RECORDING
 from proofs.command import main
 from proofs.damage import (
@@ -132,6 +133,23 @@ def test_the_table_has_a_cell_for_each_case():
     assert cells[0] == name
     assert all("later 0 %" in cell for cell in cells[1:4])
     assert cells[4] == ""
+
+
+@pytest.mark.parametrize(
+    ("name", "threat", "place"),
+    [
+        ("false gateway", Threat.WITHOUT_KEY, 3),
+        ("black hole", Threat.CAPTURED, 3),
+        ("false gateway", Threat.WITH_KEY, 0),
+        ("order replayed after 1 s", Threat.WITHOUT_KEY, 0),
+        ("bids of 1e9", Threat.CAPTURED, 0),
+    ],
+)
+def test_an_attack_is_made_where_it_does_most(name, threat, place, monkeypatch):
+    shares = (0.1, 0.4, 0.2, 0.7, 0.3)
+    trials = lambda _name, _threat, _seed, at: damage.Damage(shares[at], 0.0, 0, 0.0)  # noqa: E731
+    monkeypatch.setattr(damage, "trial", trials)
+    assert damage.worst_place(name, threat) == place
 
 
 def test_an_unknown_attack_is_an_error_in_one_line(capsys):
