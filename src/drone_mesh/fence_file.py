@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import itertools
 import json
@@ -44,7 +45,11 @@ def rows_of_file(path: str | Path, origin: Origin | None = None) -> list[Row]:
 
 def rows_of_text(text: str, path: str, origin: Origin | None, kind: str = "") -> list[Row]:
     """The same of the text of a file, by the end of its name or, without `kind`, by its content."""
-    kind = kind or (".plan" if '"fileType"' in text else ".json" if '"type"' in text else ".yaml")
+    if not kind:
+        with contextlib.suppress(ValueError, LookupError, TypeError, RecursionError):
+            if areas_json(areas_in(text)) == text.strip():  # YAML misreads its 1e-05 and names
+                return areas_in(text)
+        kind = ".plan" if '"fileType"' in text else ".json" if '"type"' in text else ".yaml"
     rows: list[Row]
     if kind not in IN_DEGREES:
         file = read_mapping_text(text, path)
@@ -92,13 +97,13 @@ def _named(rows: Sequence[Row], taken: Sequence[str]) -> list[Row]:
 
 
 def areas_json(rows: Sequence[Any]) -> str:
-    """These areas, from which a fence can be made, as `fence_in` takes them."""
-    return json.dumps(rows)
+    """These areas as the text of a file, as `fence_in` takes them and ROS tells them."""
+    return json.dumps({"areas": rows})
 
 
 def areas_in(areas: str) -> list[Row]:
     """The areas in this JSON."""
-    rows: list[Row] = json.loads(areas)
+    rows: list[Row] = json.loads(areas)["areas"]
     return rows
 
 

@@ -383,6 +383,7 @@ class EveryInterfaceTest(unittest.TestCase):
         self.ask(name, srv.SetFence, **{**change, "areas": near})
         given_up = self.wait_heard("/mesh/events", code=msg.MeshEvent.ORDER_GIVEN_UP)
         self.assertIn("outside fence near", given_up.detail)
+        published = self.heard["/DroneManager/fence"][-1].data
         names = [area.name for area in self.heard["/mesh/state"][-1].fence]
         self.assertEqual(names, ["near"])
         self.assertGreater(self.node(1).position[0], -4.5)
@@ -395,6 +396,10 @@ class EveryInterfaceTest(unittest.TestCase):
                 self.ask(name, srv.SetFence, **{**change, **wrong})
         self.assertEqual(self.ask(name, srv.SetFence, **change).message, "fence: none")
         self.mesh.wait("no fence", 30, lambda: not self.heard["/mesh/state"][-1].fence)
+        for told, words in (published, "fence: near"), ('{"areas": []}', "fence: none"):
+            again = self.ask(name, srv.SetFence, **{**change, "areas": told})
+            self.assertEqual(again.message, words)
+            self.wait_heard("/DroneManager/fence", data=told)
         self.mesh.wait("all connected after it", 60, self.mesh.connected)
         self.assertTrue(fly(*STARTS[1]).success)
         self.wait_at(1, *STARTS[1])

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import tempfile
 import unittest
+from pathlib import Path
 from typing import Iterator
 
 import psutil
@@ -19,6 +20,7 @@ from rostest_support import free_port, program, wait_for
 STARTED_WITHIN_S = 60.0
 FOUND_WITHIN_S = 30.0
 ONLY_2 = "near: [2]"
+OLD_FENCE = '{"areas": [{"name": "old", "center": [0, 0], "radius": 99}]}'  # of another world
 
 
 class MasterRestartTest(unittest.TestCase):
@@ -78,16 +80,23 @@ class MasterRestartTest(unittest.TestCase):
             "/mesh_markers", "/mesh/state", 1
         )
 
+    def manager_is_found(self) -> bool:
+        return "/DroneManager/setFence" in self.run_tool("rosservice", "list").stdout
+
     def master_answers(self) -> bool:
         return rosgraph.is_master_online(self.environment["ROS_MASTER_URI"])
 
     def test_topics_services_and_parameters_are_found_again(self) -> None:
         core = ("roscore", "-p", str(self.port))
-        fleet = ("roslaunch", "--wait", "drone_mesh", "factory.launch", "routers:=2")
+        yard = f"fence:={Path(__file__).parent / 'yard.yaml'}"
+        fleet = ("roslaunch", "--wait", "drone_mesh", "factory.launch", "routers:=2", yard)
         with contextlib.ExitStack() as stack:
             first = stack.enter_context(self.started(*core))
             wait_for("a master", STARTED_WITHIN_S, self.master_answers)
-            stack.enter_context(self.started(*fleet))
+            self.run_tool("rosparam", "set", "/DroneManager/fence", OLD_FENCE)
+            stack.enter_context(self.started(*program("drone_manager"), "__name:=DroneManager"))
+            wait_for("its manager", STARTED_WITHIN_S, self.manager_is_found)
+            stack.enter_context(self.started(*fleet, "manager:=false"))
             wait_for("all connected", STARTED_WITHIN_S, self.all_connected)
             stack.enter_context(self.started(*program("mesh_markers")))
             wait_for("the markers", STARTED_WITHIN_S, self.markers_are_found)
@@ -110,6 +119,8 @@ class MasterRestartTest(unittest.TestCase):
             wait_for("another table", FOUND_WITHIN_S, lambda: "connected" in tables.read())
             simulated = self.run_tool("rosparam", "get", "/use_sim_time")
             self.assertEqual(simulated.stdout.strip(), "true")
+            wait_for("the manager found again", FOUND_WITHIN_S, self.manager_is_found)
+            self.assertIn("yard", self.run_tool("rosparam", "get", "/DroneManager/fence").stdout)
             # Each process registers its services again at a moment of its own.
             order = ("/DroneManager/requestDroneMovement", "2", "3", "3", "0")
             wait_for("an order taken", FOUND_WITHIN_S, lambda: "status: 1" in self.called(*order))

@@ -9,7 +9,14 @@ import yaml
 
 from drone_mesh.drone.geodesy import EarthPlace, Origin
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.fence_file import changed_rows, fence_of, read_fence, rows_of_text
+from drone_mesh.fence_file import (
+    areas_in,
+    areas_json,
+    changed_rows,
+    fence_of,
+    read_fence,
+    rows_of_text,
+)
 
 ORIGIN = Origin(52.0907, 5.1214, 3.0)
 DATE_LINE = Origin(-17.0, 179.9999, 0.0)
@@ -191,6 +198,15 @@ def test_the_areas_of_a_geojson_collection_count_and_what_is_no_geometry_is_refu
 @pytest.mark.parametrize("text", [YARD, json.dumps(yaml.safe_load(YARD)), json.dumps(plan())])
 def test_a_text_without_a_name_is_read_as_what_it_looks_like(text):
     assert len(fence_of(rows_of_text(text, "text", ORIGIN)).zones) == 2
+
+
+def test_what_is_told_of_a_fence_can_be_given_back():
+    """Also what YAML reads otherwise: small numbers, names beyond 16 bits, the name of a key."""
+    corners = [[0.00001, 0], [9, 0], [0, 9]]
+    for name in ("type", "fileType", "\N{DUCK}", 'it\'s: a "pond"'):
+        told = areas_json([{"name": name, "polygon": corners, "inclusion": False}])
+        assert rows_of_text(f"{told}\n", "text", None) == areas_in(told)
+        assert fence_of(areas_in(told)).names == name
 
 
 def test_areas_change_by_their_names_and_those_of_one_name_stay_together():

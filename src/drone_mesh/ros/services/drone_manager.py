@@ -57,9 +57,7 @@ class DroneManager:
 
     # The handlers may run in parallel: the layouts never change, StandingLayouts has its own lock.
 
-    def __init__(
-        self, layouts: Layouts, on_other_run: Callable[[], None], watch: MasterWatch
-    ) -> None:
+    def __init__(self, layouts: Layouts, on_other_run: Callable[[], None]) -> None:
         """`on_other_run` is called, by a thread of rospy, when the world was replaced."""
         self._layouts = layouts
         self._gateways, self._sharing = (
@@ -74,7 +72,7 @@ class DroneManager:
             self._order_case,
             on_other_run,
         )
-        FenceService(watch)
+        FenceService()
         for name in (names.REQUEST_MOVEMENT_SERVICE, names.SHORT_REQUEST_MOVEMENT_SERVICE):
             rospy.Service(name, srv.RequestDroneFlight, self._request_movement)
         for name in (names.SET_TO_CASUS_SERVICE, names.SHORT_SET_TO_CASUS_SERVICE):
@@ -330,9 +328,8 @@ def main() -> None:
         start_node(DroneManager.__doc__, "DroneManager", disable_signals=True)
         show_library_logs_on_rosout()
         layouts = or_exit(lambda: manager_layouts("~casus"))
-        watch = MasterWatch()
-        DroneManager(layouts, stop.begin_anew, watch)
+        DroneManager(layouts, stop.begin_anew)
         file = rospy.get_param("~casus", "") or "config/casus.yaml of this package"
         _log.info("%d layouts: built-in ones, and those of %s", len(layouts.cases), file)
-        watch.start()
+        MasterWatch().start()
         stop.wait()

@@ -14,7 +14,6 @@ from drone_mesh.errors import ConfigurationError
 from drone_mesh.fence_file import Row, areas_in, areas_json, changed_rows, fence_in, rows_of_text
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.fleet_parameter import get_fleet_parameter
-from drone_mesh.ros.graph.master import MasterWatch
 from drone_mesh.ros.graph.parameters import earth_origin, fence_areas
 
 _log = logging.getLogger(__name__)
@@ -24,17 +23,13 @@ class FenceService:
     """Service: /DroneManager/setFence (SetFence).
 
     Publishes: /DroneManager/fence (String, latched): the areas as JSON, once they have changed
-    Parameter: /DroneManager/fence, the same, for what starts later; set by the world at its start
+    Parameter: /DroneManager/fence, the same, for what starts later; set by the world at its start,
+    which restores it after a restart of the master
     """
 
-    def __init__(self, watch: MasterWatch) -> None:
-        """`watch` restores the parameter after a restart of the master."""
-        self._watch = watch
+    def __init__(self) -> None:
         self._lock = threading.Lock()  # one change at a time
         self._publisher = rospy.Publisher(names.FENCE_TOPIC, String, queue_size=10, latch=True)
-        present = rospy.get_param(names.FENCE_PARAM, "")
-        if present:
-            watch.keep(names.FENCE_PARAM, present)
         rospy.Service(names.SET_FENCE_SERVICE, srv.SetFence, self._set)
 
     def _set(self, request: srv.SetFenceRequest) -> srv.SetFenceResponse:
@@ -47,7 +42,6 @@ class FenceService:
             except KeyError:
                 raise rospy.ServiceException("no simulation is running") from None
             rospy.set_param(names.FENCE_PARAM, areas)
-            self._watch.keep(names.FENCE_PARAM, areas)
             self._publisher.publish(areas)
         words = f"fence: {fence.names or 'none'}"
         _log.info("%s", words)
@@ -60,7 +54,7 @@ class FenceService:
             raise ConfigurationError("mobility does not go with a fence: its models know none")
         if len(request.areas) > MAX_PLAN_CHARACTERS:
             raise ConfigurationError(f"longer than {MAX_PLAN_CHARACTERS} characters")
-        is_empty = not request.areas.strip()
+        is_empty = request.areas.strip() in ("", areas_json([]))
         read = [] if is_empty else rows_of_text(request.areas, "areas", earth_origin(""))
         if not request.keep:
             if request.remove:  # instead of all areas

@@ -204,7 +204,7 @@ class RosSimulation:
             state = MeshStatePublisher(run, self._view_of(runner), self._happened)
             state.start()
             ends.callback(state.stop)
-            watch = MasterWatch(names.FLEET_PARAM, names.SIM_TIME_PARAM)
+            watch = MasterWatch(names.FLEET_PARAM, names.SIM_TIME_PARAM, names.FENCE_PARAM)
             needed = MQTT_SENDER if configuration.internet == "mqtt" else {}
             changes = FleetChanges(
                 self._factory, runner, state, engines, host, radios, watch, needed

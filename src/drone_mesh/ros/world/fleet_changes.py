@@ -56,7 +56,7 @@ class FleetChanges:
     ) -> None:
         """`engines` is None if other nodes fly the drones, `host` if others run all nodes.
 
-        `watch` restores the parameter after a restart of the master. `needed`: drones that cannot
+        `watch` restores its parameters after a restart of the master. `needed`: drones that cannot
         be removed, with the reason.
         """
         self._factory, self._runner, self._state = factory, runner, state
@@ -93,7 +93,7 @@ class FleetChanges:
             return srv.RemoveDroneResponse(success=False, message=str(error))
 
     def _fence_told(self, told: String) -> None:
-        self._worker.submit(self._keep_to, told_fence(told))
+        self._worker.submit(self._keep_to, told_fence(told), told.data)
 
     # The thread of the changes ---------------------------------------------------------------
 
@@ -141,9 +141,10 @@ class FleetChanges:
         _log.info("%s", message)
         return srv.RemoveDroneResponse(success=True, message=message)
 
-    def _keep_to(self, fence: Fence | None) -> None:
+    def _keep_to(self, fence: Fence | None, areas: str) -> None:
         if fence is None:
             return
+        self._watch.keep(names.FENCE_PARAM, areas)
         self._runner.between_steps(functools.partial(self._factory.keep_to, fence))
         if self._host is not None:
             self._host.keep_to(fence)
