@@ -20,7 +20,7 @@ from rostest_support import free_port, program, wait_for
 STARTED_WITHIN_S = 60.0
 FOUND_WITHIN_S = 30.0
 ONLY_2 = "near: [2]"
-OLD_FENCE = '{"areas": [{"name": "old", "center": [0, 0], "radius": 99}]}'  # of another world
+OLD_FENCE = "of a world that has ended"
 
 
 class MasterRestartTest(unittest.TestCase):
@@ -93,7 +93,7 @@ class MasterRestartTest(unittest.TestCase):
         with contextlib.ExitStack() as stack:
             first = stack.enter_context(self.started(*core))
             wait_for("a master", STARTED_WITHIN_S, self.master_answers)
-            self.run_tool("rosparam", "set", "/DroneManager/fence", OLD_FENCE)
+            self.run_tool("rosparam", "set", "/drone_mesh/fence", OLD_FENCE)
             stack.enter_context(self.started(*program("drone_manager"), "__name:=DroneManager"))
             wait_for("its manager", STARTED_WITHIN_S, self.manager_is_found)
             stack.enter_context(self.started(*fleet, "manager:=false"))
@@ -120,7 +120,7 @@ class MasterRestartTest(unittest.TestCase):
             simulated = self.run_tool("rosparam", "get", "/use_sim_time")
             self.assertEqual(simulated.stdout.strip(), "true")
             wait_for("the manager found again", FOUND_WITHIN_S, self.manager_is_found)
-            self.assertIn("yard", self.run_tool("rosparam", "get", "/DroneManager/fence").stdout)
+            self.assertIn("yard", self.run_tool("rosparam", "get", "/drone_mesh/fence").stdout)
             # Each process registers its services again at a moment of its own.
             order = ("/DroneManager/requestDroneMovement", "2", "3", "3", "0")
             wait_for("an order taken", FOUND_WITHIN_S, lambda: "status: 1" in self.called(*order))

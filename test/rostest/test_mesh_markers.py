@@ -102,7 +102,7 @@ class MeshMarkersTest(unittest.TestCase):
         fence = [m.text for (name, _), m in self.markers.items() if name == "fence names"]
         self.assertEqual(fence, ["yard", "tower"])
         # What starts later, or changes it, does not read the file again, which may be another now.
-        areas = json.loads(rospy.get_param("/DroneManager/fence"))["areas"]
+        areas = json.loads(rospy.get_param("/drone_mesh/fence"))["areas"]
         self.assertEqual([area["name"] for area in areas], fence)
         wait_for("a known link", WALL_LIMIT_S, lambda: self.points("links: known") == 2)
 

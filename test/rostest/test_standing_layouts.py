@@ -190,7 +190,7 @@ class StandingLayoutsTest(unittest.TestCase):
         return [drone for order in orders if order["number"] == number for drone in order["goals"]]
 
     def stored_orders(self) -> list[dict[str, Any]]:
-        stored = json.loads(rospy.get_param("/DroneManager/standing"))
+        stored = json.loads(rospy.get_param("/drone_mesh/standing"))
         orders: list[dict[str, Any]] = stored["orders"]["orders"]
         return orders
 

@@ -73,7 +73,8 @@ class MasterWatch(Periodic):
 
     A new master starts empty: existing connections between nodes survive, but topics, services and
     parameters cannot be looked up. The watch registers all topics and services of this process
-    again, and restores its private parameters and the public ones that it was given.
+    again. It restores the public parameters that it was given, and the private ones as they were at
+    its start: a parameter that changes must not be private.
     """
 
     def __init__(self, *parameters: str) -> None:

@@ -36,8 +36,8 @@ LAYOUT_ACTION = "DroneManager/layout"  # Layout
 LAYOUTS_TOPIC = "DroneManager/layouts"  # LayoutProgress, latched: DroneManager -> users
 SET_FENCE_SERVICE = "DroneManager/setFence"  # SetFence
 FENCE_TOPIC = "DroneManager/fence"  # String, latched: DroneManager -> world and hosts
-FENCE_PARAM = "DroneManager/fence"  # the same, from the start on; empty: there was none
-STANDING_PARAM = "DroneManager/standing"  # what is left to order, for a restarted DroneManager
+FENCE_PARAM = "drone_mesh/fence"  # the same, from the start on; empty: there was none
+STANDING_PARAM = "drone_mesh/standing"  # what is left to order, for a restarted DroneManager
 # The same services under their short names.
 SHORT_REQUEST_MOVEMENT_SERVICE = "requestDroneMovement"
 SHORT_SET_TO_CASUS_SERVICE = "SetToCasus"

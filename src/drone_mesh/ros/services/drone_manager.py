@@ -57,7 +57,9 @@ class DroneManager:
 
     # The handlers may run in parallel: the layouts never change, StandingLayouts has its own lock.
 
-    def __init__(self, layouts: Layouts, on_other_run: Callable[[], None]) -> None:
+    def __init__(
+        self, layouts: Layouts, on_other_run: Callable[[], None], watch: MasterWatch
+    ) -> None:
         """`on_other_run` is called, by a thread of rospy, when the world was replaced."""
         self._layouts = layouts
         self._gateways, self._sharing = (
@@ -71,6 +73,7 @@ class DroneManager:
             functools.partial(self._publish, allow_shared_place=True),
             self._order_case,
             on_other_run,
+            watch,
         )
         FenceService()
         for name in (names.REQUEST_MOVEMENT_SERVICE, names.SHORT_REQUEST_MOVEMENT_SERVICE):
@@ -328,8 +331,9 @@ def main() -> None:
         start_node(DroneManager.__doc__, "DroneManager", disable_signals=True)
         show_library_logs_on_rosout()
         layouts = or_exit(lambda: manager_layouts("~casus"))
-        DroneManager(layouts, stop.begin_anew)
+        watch = MasterWatch()
+        DroneManager(layouts, stop.begin_anew, watch)
         file = rospy.get_param("~casus", "") or "config/casus.yaml of this package"
         _log.info("%d layouts: built-in ones, and those of %s", len(layouts.cases), file)
-        MasterWatch().start()
+        watch.start()
         stop.wait()

@@ -23,7 +23,7 @@ class FenceService:
     """Service: /DroneManager/setFence (SetFence).
 
     Publishes: /DroneManager/fence (String, latched): the areas as JSON, once they have changed
-    Parameter: /DroneManager/fence, the same, for what starts later; set by the world at its start,
+    Parameter: /drone_mesh/fence, the same, for what starts later; set by the world at its start,
     which restores it after a restart of the master
     """
 

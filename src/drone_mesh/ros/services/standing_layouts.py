@@ -35,7 +35,7 @@ from drone_mesh.msg import (
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import event_record, mesh_status
 from drone_mesh.ros.graph.fleet_parameter import get_fleet_parameter
-from drone_mesh.ros.graph.master import NO_ANSWER
+from drone_mesh.ros.graph.master import NO_ANSWER, MasterWatch
 from drone_mesh.ros.graph.orderly_stop import FINISH_TIMEOUT_S
 from drone_mesh.ros.graph.parameters import configured_obstacles
 from drone_mesh.ros.graph.simulation import Run, run_of
@@ -79,7 +79,7 @@ class StandingLayouts:
     Subscribes: /mesh/state (MeshState), /mesh/events (MeshEvent)
     Publishes:  /DroneManager/layouts (LayoutProgress, latched)
     Action:     /DroneManager/layout (Layout)
-    Parameter:  /DroneManager/standing, what is left to order, for the next start
+    Parameter:  /drone_mesh/standing, what is left to order, for the next start
 
     `_lock` guards the orders and the actions; nothing is published, stored or planned while it is
     held. Who plans holds `_planning`; the relief belongs to the thread of the states.
@@ -92,16 +92,17 @@ class StandingLayouts:
         order: Callable[[Sequence[Order]], None],
         begin: Callable[[int, bool, actionlib.ServerGoalHandle], object],
         on_other_run: Callable[[], None],
+        watch: MasterWatch,
     ) -> None:
         """`order` publishes orders; `begin` orders a layout for the goal of an action.
 
         `on_other_run`: the world in which these were ordered is over. All are called in threads of
         rospy. `begin` calls `give`, or raises rospy.ServiceException with the reason if the layout
-        cannot be ordered.
+        cannot be ordered. `watch` restores the parameter after a restart of the master.
         """
         self._order = order
         self._begin = begin
-        self._on_other_run = on_other_run
+        self._on_other_run, self._watch = on_other_run, watch
         self._lock = threading.RLock()
         self._planning = threading.Lock()
         self._orders = StandingOrders(self._lock)
@@ -248,7 +249,14 @@ class StandingLayouts:
         left = json.dumps({"orders": self._orders.saved(), "relief": self._relief_left})
         if left != self._saved:
             self._saved = left
-            self._later(_store, left)
+            self._later(self._store, left)
+
+    def _store(self, left: str) -> None:
+        self._watch.keep(names.STANDING_PARAM, left)
+        try:
+            rospy.set_param(names.STANDING_PARAM, left)
+        except NO_ANSWER as error:
+            _log.debug("what is left to order is not stored: %s", error)
 
     def _later(self, work: Callable[..., None], *what: object) -> None:
         """Leave this work to the reporter's thread. The caller holds the lock."""
@@ -292,13 +300,6 @@ def _log_failure(report: Future[None]) -> None:
     error = report.exception()
     if error is not None and not rospy.is_shutdown():  # whose topics are closed
         _log.error("a report of a layout is lost", exc_info=error)
-
-
-def _store(left: str) -> None:
-    try:
-        rospy.set_param(names.STANDING_PARAM, left)
-    except NO_ANSWER as error:
-        _log.debug("what is left to order is not stored: %s", error)
 
 
 def _tell(handle: actionlib.ServerGoalHandle, progress: StandingProgress) -> None:
