@@ -20,6 +20,7 @@ from drone_mesh.errors import ConfigurationError
 from drone_mesh.yaml_file import MAX_FILE_BYTES, is_number, read_mapping_text, read_text
 
 MOST_AREAS = 100
+MOST_CORNERS = 10_000  # of all areas; a Pi reads them in seconds
 MOST_M = 100_000.0  # from x 0, y 0; farther away, the plane is not the earth
 KEYS = ("name", "inclusion", "polygon", "holes", "center", "radius", "min_height", "max_height")
 MAX_NAME = 40
@@ -119,12 +120,16 @@ def fence_of(rows: Sequence[Any]) -> Fence:
     Raises ConfigurationError, which names the area.
     """
     zones: dict[bool, list[Zone]] = {True: [], False: []}
+    corners = 0
     if len(rows) > MOST_AREAS:
         raise ConfigurationError(f"{len(rows)} areas: expected at most {MOST_AREAS}")
     for number, row in enumerate(rows, start=1):
         try:
             name, inside = _name_and_side(row, number)
             zones[inside].append(_zone(row, name, inside))
+            corners += len(zones[inside][-1].edges)
+            if corners > MOST_CORNERS:
+                raise ConfigurationError(f"more than {MOST_CORNERS} corners in all areas")
         except ConfigurationError as error:
             raise ConfigurationError(f"area {number}: {error}") from None
     return Fence.of(zones[True], zones[False])

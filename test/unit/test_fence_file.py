@@ -7,6 +7,7 @@ import json
 import pytest
 import yaml
 
+from drone_mesh.drone.fence import CIRCLE_CORNERS
 from drone_mesh.drone.geodesy import EarthPlace, Origin
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.fence_file import (
@@ -198,6 +199,14 @@ def test_the_areas_of_a_geojson_collection_count_and_what_is_no_geometry_is_refu
 @pytest.mark.parametrize("text", [YARD, json.dumps(yaml.safe_load(YARD)), json.dumps(plan())])
 def test_a_text_without_a_name_is_read_as_what_it_looks_like(text):
     assert len(fence_of(rows_of_text(text, "text", ORIGIN)).zones) == 2
+
+
+def test_areas_with_too_many_corners_together_are_refused(monkeypatch):
+    monkeypatch.setattr("drone_mesh.fence_file.MOST_CORNERS", 2 * CIRCLE_CORNERS)
+    ponds = [{"center": [9 * n, 0], "radius": 2, "inclusion": False} for n in range(3)]
+    assert len(fence_of(ponds[:2]).zones) == 2
+    with pytest.raises(ConfigurationError, match="area 3: more than 128 corners in all areas"):
+        fence_of(ponds)
 
 
 def test_what_is_told_of_a_fence_can_be_given_back():

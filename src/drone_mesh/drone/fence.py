@@ -28,8 +28,8 @@ _SHARPEST = 1.0 / 3.0  # at a sharper corner, ways round keep 3 * CLEAR_M from i
 
 _PART = 16  # edges that are looked at, or left out, together
 
-_Part = Tuple[Tuple[float, float, float, float], Sequence[Tuple[Point, Point]]]
-"""Edges that follow each other, and least and greatest x and y of them."""
+Box = Tuple[float, float, float, float]  # least and greatest x, least and greatest y
+_Part = Tuple[Box, Sequence[Tuple[Point, Point]]]  # edges that follow each other
 
 
 class Turn(NamedTuple):
@@ -37,6 +37,12 @@ class Turn(NamedTuple):
 
     at: Point
     corners: tuple[Point, Point, Point] | None = None  # its own between two; None: it may anyhow
+    in_bay: bool = False  # other turns of what it is at enclose it: of use only to who is in there
+
+    @property
+    def near(self) -> Point:
+        """The corner that it is beside."""
+        return self.at if self.corners is None else self.corners[1]
 
     def is_touched_from(self, other: Point) -> bool:
         """Whether a straight way from there passes both corners beside its own on one side.
@@ -52,10 +58,11 @@ class Turn(NamedTuple):
 
 def _passes(start: Point, end: Point, one: Point, other: Point) -> bool:
     """Whether both places are on one side of the line from start to end."""
-    (x, y), (dx, dy) = end, (end[0] - start[0], end[1] - start[1])
-    left, right = (dx * (v - y) - dy * (u - x) for u, v in (one, other))
+    x, y = end
+    dx, dy = x - start[0], y - start[1]
+    left, right = dx * (one[1] - y) - dy * (one[0] - x), dx * (other[1] - y) - dy * (other[0] - x)
     slack = _SHORT_M * (abs(dx) + abs(dy))
-    return max(left, right) <= slack or min(left, right) >= -slack
+    return (left <= slack and right <= slack) or (left >= -slack and right >= -slack)
 
 
 @dataclass(frozen=True)
@@ -71,6 +78,7 @@ class Zone:
     beside: tuple[Point, ...] = field(init=False, repr=False, compare=False)
     """Points at CLEAR_M from each corner, on either side: first where it is the tip."""
     _parts: tuple[_Part, ...] = field(init=False, repr=False, compare=False)
+    _box: Box = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Raise ConfigurationError, which does not name the zone, for what is no area."""
@@ -93,6 +101,7 @@ class Zone:
         object.__setattr__(self, "edges", tuple(edges))
         object.__setattr__(self, "beside", tuple(beside))
         object.__setattr__(self, "_parts", tuple(_parts(edges)))
+        object.__setattr__(self, "_box", box_around(start for start, _end in edges))
         object.__setattr__(self, "turns", self.turns or tuple(turns))
         for number, (start, end) in enumerate(edges):
             if any(True for _ in _meetings(start, end, edges[:number], inset=_ROUNDING)):
@@ -122,6 +131,8 @@ class Zone:
         """Whether this place is inside, seen from above."""
         x, y, _z = place
         inside = False
+        if not overlap(self._box, (x, x, y, y)):
+            return inside
         for (x1, y1), (x2, y2) in self._edges_within(x, math.inf, y, y):
             if (y1 > y) != (y2 > y) and x < x1 + (y - y1) * (x2 - x1) / (y2 - y1):
                 inside = not inside
@@ -148,6 +159,10 @@ class Zone:
             if x1 <= right and left <= x2 and y1 <= high and low <= y2:
                 yield from edges
 
+    def may_meet(self, box: Box) -> bool:
+        """Whether it may reach into this box; False: it does not."""
+        return overlap(self._box, box)
+
     def nearest(self, place: Vector) -> Iterator[Point]:
         """The points of its edges nearest to a place, moved by CLEAR_M to either side."""
         x, y, _z = place
@@ -166,16 +181,9 @@ class Rule:
 
     zones: tuple[Zone, ...]
     inside: bool
-    _turns: tuple[Turn, ...] = field(init=False, repr=False, compare=False)
-
-    def __post_init__(self) -> None:
-        turns = [turn for zone in self.zones for turn in zone.turns]
-        if self.inside:
-            if len(self.zones) > 1:  # a corner beside a turn may lie within another zone
-                turns = [Turn(turn.at) for turn in turns]
-            turns += map(Turn, self._passages())
-        possible = (turn for turn in turns if self._surrounds((*turn.at, 0.0)) is self.inside)
-        object.__setattr__(self, "_turns", tuple(possible))
+    _turns: dict[tuple[bool, ...], tuple[Turn, ...]] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )  # by the zones that count at a height
 
     @property
     def names(self) -> str:
@@ -193,35 +201,24 @@ class Rule:
 
     def meets(self, a: Vector, b: Vector) -> bool:
         """Whether the straight way from a to b breaks it anywhere."""
-        return any(not self.allows(middle) for _share, middle in _pieces(self.zones, a, b))
+        box = box_around((a[:2], b[:2]))
+        near = [zone for zone in self.zones if zone.may_meet(box)]
+
+        def breaks(place: Vector) -> bool:
+            return any(zone.contains(place) for zone in near) is not self.inside
+
+        if breaks(between(a, b, 0.5)) and math.dist(a, b) > _SHORT_M:
+            return True  # as most ways that do
+        return any(breaks(middle) for _share, middle in _pieces(near, a, b))
 
     def turns(self, height_m: float) -> Sequence[Turn]:
         """Where ways round it may turn, at this height."""
-        if len(self.zones) == 1:
-            return self._turns
-        return [turn for turn in self._turns if self.allows((*turn.at, height_m))]
-
-    def _surrounds(self, place: Vector) -> bool:
-        return any(zone.surrounds(place) for zone in self.zones)
-
-    def _passages(self) -> Iterator[Point]:
-        """Points around where two zones overlap or touch, through which ways lead."""
-        for zone in self.zones:
-            others = [other for other in self.zones if other is not zone]
-            for a, b in zone.edges:
-                met = (
-                    between((*a, 0.0), (*b, 0.0), s)
-                    for o in others
-                    for s in o.cuts((*a, 0.0), (*b, 0.0))
-                )
-                for x, y, _z in ((*a, 0.0), *met):
-                    around = [
-                        (x + dx, y + dy)
-                        for dx in (-CLEAR_M, 0.0, CLEAR_M)
-                        for dy in (-CLEAR_M, 0.0, CLEAR_M)
-                    ]
-                    if any(other.surrounds((*point, 0.0)) for other in others for point in around):
-                        yield from around
+        alone = len(self.zones) == 1
+        there = tuple(alone or z.lowest_m <= height_m <= z.highest_m for z in self.zones)
+        if there not in self._turns:
+            zones = [zone for zone, counts in zip(self.zones, there) if counts]
+            self._turns[there] = tuple(_turns_at(zones, self.inside))
+        return self._turns[there]
 
     def why_not(self, place: Vector) -> str:
         """Why a drone may not be there; empty if it may."""
@@ -328,6 +325,75 @@ def _pieces(zones: Iterable[Zone], a: Vector, b: Vector) -> Iterator[tuple[float
             yield end - start, between(a, b, (start + end) / 2.0)
 
 
+def _turns_at(zones: Sequence[Zone], inside: bool) -> Iterator[Turn]:
+    """Turns at the border of what these zones cover together, on this side of it."""
+    if len(zones) == 1:
+        turns = [t for t in zones[0].turns if zones[0].surrounds((*t.at, 0.0)) is inside]
+        outer = _hull([turn.at for turn in turns])
+        yield from (t._replace(in_bay=not (inside or t.at in outer)) for t in turns)
+        return
+    points = [turn.at for zone in zones for turn in zone.turns if _at_border(turn.near, zones)]
+    points = [p for p in points if any(zone.surrounds((*p, 0.0)) for zone in zones)]
+    yield from map(Turn, dict.fromkeys((*points, *_passages(zones))))
+
+
+def _hull(points: Iterable[Point]) -> set[Point]:
+    """The corners of the smallest convex area around these points, and points on its edges."""
+    found: set[Point] = set()
+    ordered = sorted(points)
+    for way in (ordered, ordered[::-1]):
+        side: list[Point] = []
+        for x, y in way:
+            while len(side) > 1:
+                (x1, y1), (x2, y2) = side[-2:]
+                if (x2 - x1) * (y - y1) - (y2 - y1) * (x - x1) >= -_SHORT_M:
+                    break
+                side.pop()
+            side.append((x, y))
+        found.update(side)
+    return found
+
+
+def _passages(zones: Sequence[Zone]) -> Iterator[Point]:
+    """Points around where two zones overlap or touch, through which ways lead."""
+    for zone in zones:
+        others = [other for other in zones if other is not zone]
+        for a, b in zone.edges:
+            met = (
+                between((*a, 0.0), (*b, 0.0), s)
+                for o in others
+                for s in o.cuts((*a, 0.0), (*b, 0.0))
+            )
+            for x, y, _z in ((*a, 0.0), *met):
+                if any(o.may_meet(_clear_of(x, y)) for o in others):
+                    yield from _at_border((x, y), zones)
+
+
+def _clear_of(x: float, y: float) -> Box:
+    return x - CLEAR_M, x + CLEAR_M, y - CLEAR_M, y + CLEAR_M
+
+
+def _at_border(place: Point, zones: Sequence[Zone]) -> list[Point]:
+    """Points around a place that are within these zones; none if all are: it is no border."""
+    x, y = place
+    near = [zone for zone in zones if zone.may_meet(_clear_of(x, y))]
+    steps = (-CLEAR_M, 0.0, CLEAR_M)
+    around = [(x + dx, y + dy) for dx in steps for dy in steps]
+    within = [p for p in around if any(zone.surrounds((*p, 0.0)) for zone in near)]
+    return within if len(within) < len(around) else []
+
+
+def box_around(points: Iterable[Point]) -> Box:
+    """The box around points, of which there are some."""
+    xs, ys = zip(*points)
+    return min(xs), max(xs), min(ys), max(ys)
+
+
+def overlap(one: Box, other: Box) -> bool:
+    """Whether two boxes have a point in common."""
+    return one[0] <= other[1] and other[0] <= one[1] and one[2] <= other[3] and other[2] <= one[3]
+
+
 def _closed(corners: Sequence[Point]) -> list[tuple[Point, Point]]:
     return list(zip(corners, (*corners[1:], corners[0])))
 
@@ -335,8 +401,7 @@ def _closed(corners: Sequence[Point]) -> list[tuple[Point, Point]]:
 def _parts(edges: Sequence[tuple[Point, Point]]) -> Iterator[_Part]:
     for start in range(0, len(edges), _PART):
         part = edges[start : start + _PART]
-        xs, ys = zip(*(corner for edge in part for corner in edge))
-        yield (min(xs), max(xs), min(ys), max(ys)), part
+        yield box_around(corner for edge in part for corner in edge), part
 
 
 def _meetings(

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import heapq
 import math
-from typing import Protocol, Sequence
+from typing import Iterator, Protocol, Sequence
 
-from drone_mesh.drone.fence import Fence, Turn
+from drone_mesh.drone.fence import Fence, Turn, box_around, overlap
 from drone_mesh.drone.flight_path import Point, Vector
 
 MOST_MET = 10  # on one path; the search time grows with the cube
+MOST_LEGS = 4_000  # that a search tries: a second of a Pi, whose autopilot hears nothing meanwhile
 
 
 class InTheWay(Protocol):
@@ -54,8 +55,9 @@ def way_round(
 ) -> tuple[Point, ...] | None:
     """The corners (x, y in metres) of the shortest path from start to goal at this height.
 
-    None: there is no path, or it passes more than MOST_MET obstacles. Only those that the path
-    meets count: each search adds what the previous path met.
+    None: there is no path, it passes more than MOST_MET obstacles, or a search would try more than
+    MOST_LEGS legs. Only those that the path meets count: each search adds what the previous path
+    met.
     """
     met: list[InTheWay] = []
     while len(met) <= MOST_MET:
@@ -80,14 +82,21 @@ def _shortest(
 
     That is asked only of legs that the shortest way may have: it takes most of the time.
     """
-    turns = [Turn(start), Turn(goal), *(c for one in obstacles for c in one.turns(height_m))]
+    left = MOST_LEGS
+    turns = [Turn(start), Turn(goal), *_of_use(obstacles, (start, goal), height_m)]
+    near = list(obstacles)
     came_from: dict[int, int] = {}
     waiting = [(0.0, 0.0, 0, 0)]  # least total length, length so far, point, previous point
-    while waiting:
+    while waiting and left:
         _least, metres, here, before = heapq.heappop(waiting)
         at = turns[here].at
         leg = turns[before].at, at
-        if here in came_from or any(_is_met(one, *leg, height_m) for one in obstacles if here):
+        if here in came_from:
+            continue
+        left -= 1
+        in_the_way = next((one for one in near if here and _is_met(one, *leg, height_m)), None)
+        if in_the_way is not None:
+            near.sort(key=lambda one: one is not in_the_way)  # it is in the way of the next, too
             continue
         came_from[here] = before
         if here == 1:
@@ -102,6 +111,19 @@ def _shortest(
                 until = metres + math.dist(at, turn.at)
                 heapq.heappush(waiting, (until + math.dist(turn.at, goal), until, other, here))
     return None
+
+
+def _of_use(
+    obstacles: Sequence[InTheWay], ends: tuple[Point, Point], height_m: float
+) -> Iterator[Turn]:
+    """Their turns; those in the bays of one only if an end or another one may be in there."""
+    turns = [one.turns(height_m) for one in obstacles]
+    reach = [box_around([turn.at for turn in some] or [(math.inf, math.inf)]) for some in turns]
+    reach += [box_around([end]) for end in ends]
+    for number, some in enumerate(turns):
+        others = (other for other in reach if other is not reach[number])
+        is_visited = any(overlap(reach[number], other) for other in others)
+        yield from (turn for turn in some if is_visited or not turn.in_bay)
 
 
 def _is_met(one: InTheWay, a: Point, b: Point, height_m: float) -> bool:

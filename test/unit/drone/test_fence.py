@@ -8,9 +8,9 @@ import random
 import pytest
 
 from drone_mesh.air.obstacles import Box, Obstacles
-from drone_mesh.drone.fence import CLEAR_M, Fence, Turn, Zone
+from drone_mesh.drone.fence import CLEAR_M, Fence, Rule, Turn, Zone
 from drone_mesh.drone.flight_path import FlightPath
-from drone_mesh.drone.way_round import way_round
+from drone_mesh.drone.way_round import MOST_LEGS, way_round
 from drone_mesh.errors import ConfigurationError
 
 SQUARE = ((0.0, 0.0), (20.0, 0.0), (20.0, 20.0), (0.0, 20.0))
@@ -157,6 +157,21 @@ def test_a_way_round_many_corners_asks_of_few_legs():
     way = way_round([Asked()], (-40.0, 0.0), (40.0, 0.0), 5.0)
     assert way is not None
     assert len(asked) < 1200  # of the 2145 between two of its corners
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_search_among_many_areas_ends(monkeypatch, seed):
+    """Also the one for a way that there is not: a Pi does nothing else meanwhile."""
+    rng = random.Random(seed)
+    corners = [(rng.uniform(0, 99), rng.uniform(0, 99)) for _ in range(40)]
+    areas = [Zone("", (((x, y), (x + 20, y), (x + 20, y + 20), (x, y + 20)),)) for x, y in corners]
+    island = Zone("", (((300, 0), (310, 0), (310, 10)),))
+    asked = []
+    meets = Rule.meets
+    monkeypatch.setattr(Rule, "meets", lambda rule, a, b: asked.append(a) or meets(rule, a, b))
+    fence = Fence.of([*areas, island], [])
+    assert way_round(fence.rules, corners[0], (309.0, 2.0), 0.0) is None
+    assert len(asked) <= MOST_LEGS + 1
 
 
 @pytest.mark.parametrize("beside_m", [None, 0.1])
