@@ -11,6 +11,8 @@ from drone_mesh.drone.flight_path import Point, Vector
 
 MOST_MET = 10  # on one path; the search time grows with the cube
 MOST_LEGS = 4_000  # that a search tries: a second of a Pi, whose autopilot hears nothing meanwhile
+MOST_ENTRIES = 4  # places inside that a drone outside is led to past others
+ALL_OUTSIDE = 1.0 - 1e-6  # the share of a leg that is, as rounded
 
 
 class InTheWay(Protocol):
@@ -29,25 +31,38 @@ def way_across(
     """The corners of a way from above `start` to above `goal`, at this height.
 
     None: there is no way, or the climb or the descent would break a rule. A drone that is outside
-    first flies straight to the nearest place inside that it can reach so, at this height; its climb
-    may begin outside.
+    first flies to a place inside, at this height, and breaks no rule that it does not break now:
+    straight to the nearest one that it can reach so, else round what is in the way to one of the
+    nearest. Its climb may begin outside.
     """
-    above, entry = (*start[:2], height_m), (*start[:2], height_m)
+    above = (*start[:2], height_m)
     kept = [rule for rule in fence.rules if rule.allows(start)]
     if any(rule.meets(start, above) for rule in kept) or any(
         rule.meets((*goal[:2], height_m), goal) for rule in fence.rules
     ):
         return None
-    begin: tuple[Point, ...] = ()
-    if fence.why_not(above):
-        shut = (*boxes, *kept)
-        places = fence.places_inside(above)
-        inside = next((p for p in places if not any(o.meets(above, p) for o in shut)), None)
-        if inside is None:
-            return None
-        entry, begin = inside, (inside[:2],)
-    corners = way_round([*boxes, *fence.rules], entry[:2], goal[:2], height_m)
+    begin = _way_inside(fence, (*boxes, *kept), above) if fence.why_not(above) else ()
+    if begin is None:
+        return None
+    entry = (start[:2], *begin)[-1]
+    corners = way_round([*boxes, *fence.rules], entry, goal[:2], height_m)
     return None if corners is None else (*begin, *corners)
+
+
+def _way_inside(fence: Fence, shut: Sequence[InTheWay], start: Vector) -> tuple[Point, ...] | None:
+    """The corners of a way from outside past what is `shut` for it, the last one inside."""
+    places = list(fence.places_inside(start))
+    for place in places:
+        if not any(one.meets(start, place) for one in shut):
+            return (place[:2],)
+    for place in places[:MOST_ENTRIES]:
+        way = way_round(shut, start[:2], place[:2], start[2])
+        corners = [(x, y, start[2]) for x, y in (start[:2], *(way or ()))]
+        if way and all(
+            fence.outside_share(*leg) > ALL_OUTSIDE for leg in zip(corners, corners[1:])
+        ):
+            return (*way, place[:2])
+    return None
 
 
 def way_round(

@@ -21,6 +21,10 @@ TOWER = Zone.circle("tower", (5.0, 8.0), 2.0, inside=False)
 SHED = Zone("shed", (((13, 13), (17, 13), (17, 17), (13, 17)),), highest_m=3.0)
 BRIDGE = Zone("bridge", (((9, -1), (11, -1), (11, 21), (9, 21)),), lowest_m=3.0)
 HEDGE = Zone("hedge", (((-2, 5), (-1, 5), (-1, 15), (-2, 15)),))
+PEN = Zone("pen", (((-9, 3), (-2, 3), (-2, 17), (-9, 17), (-9, 16), (-3, 16), (-3, 4), (-9, 4)),))
+CAGE = Zone(
+    "cage", (((-9, 3), (-2, 3), (-2, 17), (-9, 17)), ((-8, 4), (-3, 4), (-3, 16), (-8, 16)))
+)
 NEXT_YARD = Zone("next", (((20, 5), (40, 5), (40, 15), (20, 15)),))
 STAR = ((0, 0), (10, 10), (10, 0), (0, 10))
 
@@ -81,6 +85,8 @@ def test_what_encloses_no_clear_area_is_refused(make, words):
         ([YARD, NEXT_YARD], [], (19, 1, 0), (30, 6, 0), 1, 6.0),  # from one to the other
         ([YARD], [TOWER], (-3, 8, 0), (10, 8, 0), 3, 6.5),  # from outside first to the border
         ([YARD], [HEDGE], (-5, 10, 0), (10, 10, 0), 1, 7.5),  # from outside, not through another
+        ([YARD], [PEN], (-5, 10, 0), (10, 10, 0), 4, 7.5),  # out of the pen, and round it
+        ([YARD], [CAGE], (-5, 10, 0), (10, 10, 0), None, 0),
         ([YARD], [], (10, 10, 12), (10, 11, 0), 0, 12),  # down from above it
         ([], [TOWER], (5, 8, 0), (0, 8, 0), 1, 2.5),  # out of the area to keep out of
         ([YARD], [BRIDGE], (5, 10, 3.5), (15, 10, 3.5), None, 0),  # on both sides to the border
