@@ -95,12 +95,12 @@ class MeshMarkersTest(unittest.TestCase):
         # 0 and 1 are 1 m apart, 0 and 2 are 7 m, 1 and 2 are 6 m: three links, two of them routes.
         wait_for("routes", WALL_LIMIT_S, lambda: self.points("links: route") == 4)
         self.assertEqual(self.points("fence: stay in"), 2 * 4 * 2)  # an outline, and no height
-        # Three corners at two heights, and a post at each.
-        self.assertEqual(self.points("fence: stay out"), 2 * 3 * 3)
+        # Three corners at two heights, and a post at each; of a circle, posts at some.
+        self.assertEqual(self.points("fence: stay out"), 2 * (3 * 3 + 64 * 2 + 16))
         heights = {point.z for point in self.markers["fence: stay out", 0].points}
         self.assertEqual(sorted(heights), [2.05, 20.05])
         fence = [m.text for (name, _), m in self.markers.items() if name == "fence names"]
-        self.assertEqual(fence, ["yard", "tower"])
+        self.assertEqual(fence, ["yard", "tower", "mast"])
         # What starts later, or changes it, does not read the file again, which may be another now.
         areas = json.loads(rospy.get_param("/drone_mesh/fence"))["areas"]
         self.assertEqual([area["name"] for area in areas], fence)

@@ -59,9 +59,10 @@ def legend_rows(positions: Iterable[Vector]) -> list[PlacedLegendRow]:
 
 
 def _nodes() -> list[tuple[str, Colour, float]]:
-    gateway = ("gateway", DARK.of_node(Role.GATEWAY, Condition.CONNECTED), 0.8)
-    return [gateway] + [
-        (condition.value, DARK.of_node(Role.ROUTER, condition), 0.8) for condition in Condition
+    return [
+        ("gateway", DARK.of_node(Role.GATEWAY, Condition.CONNECTED), 0.8),
+        *((one.value, DARK.of_node(Role.ROUTER, one), 0.8) for one in Condition),
+        ("obstacle", DARK.obstacle, 0.8),
     ]
 
 
@@ -72,7 +73,6 @@ def _lines() -> list[tuple[str, Colour, float]]:
         ("link that will soon break", DARK.flying, 0.25),
         ("flight path", DARK.path, 0.25),
         ("heading", DARK.muted, 0.25),
-        ("obstacle", DARK.obstacle, 0.8),
         ("stay inside", DARK.accent, 0.25),
         ("stay out", DARK.disconnected, 0.25),
     ]

@@ -52,6 +52,7 @@ LINK_WIDTH_M = {LinkUse.ROUTE: 0.08, LinkUse.KNOWN: 0.03, LinkUse.LOST: 0.05}
 LINK_OPACITY = {LinkUse.ROUTE: 1.0, LinkUse.KNOWN: 0.6, LinkUse.LOST: 1.0}
 PATH_WIDTH_M = 0.06
 FENCE_WIDTH_M = 0.1
+MOST_POSTS = 16  # of a ring: the 64 corners of a circle would hide what is behind them
 OBSTACLE_OPACITY = 0.85
 
 _Place = Sequence[float]
@@ -254,7 +255,8 @@ def _area_lines(area: AreaStatus) -> list[_Line]:
     for ring in rings_of(area):
         for start, end in zip(ring, (*ring[1:], ring[0])):
             lines += [((*start, z), (*end, z)) for z in heights_m]
-            lines.append(((*start, heights_m[0]), (*start, heights_m[-1])))
+        posts = ring[:: (len(ring) - 1) // MOST_POSTS + 1]
+        lines += [((*corner, heights_m[0]), (*corner, heights_m[-1])) for corner in posts]
     return lines
 
 
