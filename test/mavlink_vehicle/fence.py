@@ -20,7 +20,7 @@ class FenceStore:
         self.items: list[tuple[int, float, float, float]] = []
         self.result: int | None = mavlink.MAV_MISSION_ACCEPTED  # else: it refuses; None: silent
         self.is_busy = False  # a transfer was begun and not ended
-        self._next, self._to = 0, (0, 0)  # its next item, and to whom
+        self.next, self._to = 0, (0, 0)  # its next item, and to whom
 
     def take(self, message: Message) -> None:
         """A request for the list, for its next item or for the last one again; or an ack."""
@@ -30,10 +30,10 @@ class FenceStore:
         if kind == "MISSION_ACK":
             self.is_busy = False
         elif kind == "MISSION_REQUEST_LIST" and not result:
-            self.is_busy, self._next, self._to = True, 0, to
+            self.is_busy, self.next, self._to = True, 0, to
             self._send(mavlink.MAVLink_mission_count_message(*to, len(self.items), FENCE))
-        elif self.is_busy and message.seq in (self._next - 1, self._next):
-            self._next = message.seq + 1
+        elif self.is_busy and message.seq in (self.next - 1, self.next):
+            self.next = message.seq + 1
             command, size, *degrees = self.items[message.seq]
             head = (*to, message.seq, mavlink.MAV_FRAME_GLOBAL, command, 0, 1, size, 0.0, 0.0, 0.0)
             place = (*(round(one * 1e7) for one in degrees), 0.0)

@@ -78,6 +78,41 @@ def test_it_is_read_over_a_line_that_loses_and_delays(seed):
     assert rig.pilot.fences() == good.ready().pilot.fences()
 
 
+@pytest.mark.parametrize("autopilot", [ARDUPILOT, PX4])
+def test_one_that_changes_while_it_is_read_is_never_a_mixture(autopilot):
+    def names(items):
+        other = Rig(autopilot)
+        other.vehicle.fence.items = items
+        return other.ready().pilot.fences()
+
+    new = at(CORNER_IN, 5, (-20, -60), (90, -60), (99, 0), (90, 60), (-20, 60)) + POND
+    rig = Rig(autopilot)
+    store = rig.vehicle.fence
+    store.items = HERE + POND
+    rig.run_until("two items are told", lambda: store.next == 2)
+    store.items = new
+    seen = [rig.pilot.fences()]
+
+    def is_new():
+        seen.append(rig.pilot.fences())
+        return seen[-1] == names(new)
+
+    rig.run_until("the new one", is_new, within_s=LOOK_AGAIN_S + 2.0)
+    assert all(fence in (seen[0], names(HERE + POND), names(new)) for fence in seen)
+
+
+def test_one_whose_reading_was_interrupted_by_a_restart_of_the_autopilot_is_read():
+    rig = Rig(PX4)
+    store = rig.vehicle.fence
+    store.items = HERE
+    rig.run_until("two items are told", lambda: store.next == 2)
+    store.result = None
+    rig.run(3.0)
+    store.result, store.is_busy = mavlink.MAV_MISSION_ACCEPTED, False
+    rig.run_until("it is read", lambda: bool(rig.pilot.fences()), within_s=4.0)
+    assert rig.pilot.fences().names == f"{ITSELF}, area 1"
+
+
 PX4_OF_2023 = (  # a count with an opaque id behind its type, and an item without its type
     "fd0900000001012c00000100ffbf01dec0175a9b0b",
     "fd25000000010149000000004842000000000000000000000000f8680c1fb0760d030000000000008b13ffbf000001"

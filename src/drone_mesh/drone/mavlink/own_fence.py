@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 import math
-from typing import Callable, Iterator, Tuple
+from typing import Callable, Iterator, Sequence, Tuple
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -57,6 +57,7 @@ class OwnFence:
         self._open: set[str] = set()  # questions without an answer yet
         self._count: int | None = None  # of the items that are being read
         self._items: list[_Item] = []
+        self._unclear: tuple[_Item, ...] = ()  # read once, and not whole
         self._tries = 0
         self._due_s = -math.inf
 
@@ -127,7 +128,11 @@ class OwnFence:
         self._items.append((message.command, message.param1, message.x, message.y))
         self._tries, self._due_s = 0, now_s
         if len(self._items) == self._count:
-            self._finish(tuple(self._items), now_s)
+            read = tuple(self._items)
+            if _is_whole(read) or read == self._unclear:
+                self._finish(read, now_s)
+            else:  # it has changed while it was read, unless it is read the same again
+                self._unclear, self._count, self._items = read, None, []
 
     def _finish(self, areas: tuple[_Item, ...] | None, now_s: float) -> None:
         """End the transfer, or PX4 would be busy for 5 s and then tell ground stations so."""
@@ -204,3 +209,15 @@ class OwnFence:
                 yield zone, inside
             except ConfigurationError as error:
                 _log.warning("%s, is left out: %s", name, error)
+
+
+def _is_whole(items: Sequence[_Item]) -> bool:
+    """Whether each area has the corners that each of them says it has."""
+    at = 0
+    while at < len(items):
+        command, size = items[at][:2]
+        corners = max(1, int(size)) if _ITEMS[command][0] else 1
+        if [one[:2] for one in items[at : at + corners]] != [(command, size)] * corners:
+            return False
+        at += corners
+    return True
