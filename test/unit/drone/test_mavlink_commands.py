@@ -51,6 +51,19 @@ def test_once_it_is_accepted_only_its_effect_is_waited_for(result: int) -> None:
     assert command.refusal(20.0) == "the autopilot accepted it, nothing happened for 20 s"
 
 
+@pytest.mark.parametrize(
+    ("result", "name"), [(mavlink.MAV_RESULT_FAILED, "failed"), (6, "result 6")]
+)
+def test_what_fails_while_it_is_carried_out_is_refused_at_once(result: int, name: str) -> None:
+    command = PendingCommand(ARM, (1.0,), 0.0, within_s=20.0, once=False)
+    assert sent(command, 0.0, 0.5) == [0.0]
+    for told in (mavlink.MAV_RESULT_IN_PROGRESS, mavlink.MAV_RESULT_TEMPORARILY_REJECTED, result):
+        command.acknowledged(told, 0.5)
+    assert command.refusal(2.0) == f"the autopilot refused: {name}"
+    command.acknowledged(mavlink.MAV_RESULT_ACCEPTED, 3.0)
+    assert command.refusal(3.0) == f"the autopilot refused: {name}"
+
+
 @pytest.mark.parametrize("once", [False, True])
 def test_a_command_that_is_put_off_is_sent_again_a_second_later(once: bool) -> None:
     command = PendingCommand(ARM, (1.0,), 0.0, within_s=20.0, once=once)

@@ -33,6 +33,7 @@ REFUSED_AFTER_S = 1.5  # the words, or the effect of a try before, may come late
 MOST_WORDS = 50  # of a STATUSTEXT
 
 TAKEN = (mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_IN_PROGRESS)
+FAILED = (mavlink.MAV_RESULT_FAILED, 6)  # MAV_RESULT_CANCELLED; ArduPilot's dialect lacks it
 LATER = mavlink.MAV_RESULT_TEMPORARILY_REJECTED
 
 
@@ -75,7 +76,8 @@ class PendingCommand:
 
     def acknowledged(self, result: int, now_s: float) -> None:
         """COMMAND_ACK with this MAV_RESULT."""
-        if self.result in TAKEN:
+        ends = result in (mavlink.MAV_RESULT_ACCEPTED, *FAILED)
+        if self.result in TAKEN and not (ends and self.result == mavlink.MAV_RESULT_IN_PROGRESS):
             return  # a repetition may be refused because the first try is being carried out
         self.result = result
         if result not in TAKEN and result != LATER and self.refused_s == math.inf:
