@@ -17,6 +17,9 @@ from drone_mesh.errors import ConfigurationError
 
 MAX_PLAN_CHARACTERS = 1_500_000  # 1000 waypoints of a survey, as QGroundControl indents them
 _VALUES = 7  # of an item: four numbers, latitude, longitude, height
+_SEA, _HOME, _TERRAIN = (0, 5), (3, 6), (10, 11)  # MAV_FRAME of heights above these
+_FRAMES = (*_SEA, *_HOME, *_TERRAIN)
+_MODES = {1: _HOME, 2: _SEA, 3: _SEA, 4: _TERRAIN}  # by AltitudeMode of QGroundControl
 _COLUMNS = 12  # of a line: index, current, frame, command, the values, autocontinue
 # MissionController of QGroundControl: in 110 the first item is the planned home, 120 has none.
 _HEADING = re.compile(r"QGC\s+WPL\s+(110|120)")
@@ -112,6 +115,10 @@ def _simple(part: Any, where: str) -> PlanItem:
         )
     if type(command) is not int or type(frame) is not int:
         raise ConfigurationError(f"{where}: needs a command and a frame, whole numbers")
+    mode = row.get("AltitudeMode")
+    if any(mode == of and frame in _FRAMES and frame not in its for of, its in _MODES.items()):
+        # Which one the height is of is not told (qgroundcontrol#8910: above sea level in frame 3).
+        raise ConfigurationError(f"{where}: frame {frame} does not go with AltitudeMode {mode}")
     return PlanItem(where, command, frame, [math.nan if v is None else float(v) for v in values])
 
 

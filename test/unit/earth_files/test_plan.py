@@ -113,6 +113,8 @@ def simple(**changes: Any) -> str:
         (simple(params=[*[0] * 6, 1e300]), r"item 1: params \[.* are not 7 numbers"),
         (simple(command=True), "item 1: needs a command and a frame"),
         (simple(frame=None), "item 1: needs a command and a frame"),
+        (simple(AltitudeMode=3), "item 1: frame 3 does not go with AltitudeMode 3"),
+        (simple(AltitudeMode=1, frame=0), "item 1: frame 0 does not go with AltitudeMode 1"),
     ],
 )
 def test_a_bad_plan_is_refused_in_one_line(text, why):
