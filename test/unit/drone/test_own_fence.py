@@ -109,8 +109,7 @@ def test_one_whose_reading_was_interrupted_by_a_restart_of_the_autopilot_is_read
     store.result = None
     rig.run(3.0)
     store.result, store.is_busy = mavlink.MAV_MISSION_ACCEPTED, False
-    rig.run_until("it is read", lambda: bool(rig.pilot.fences()), within_s=4.0)
-    assert rig.pilot.fences().names == f"{ITSELF}, area 1"
+    rig.run_until("it is read", lambda: "area 1" in rig.pilot.fences().names, within_s=4.0)
 
 
 PX4_OF_2023 = (  # a count with an opaque id behind its type, and an item without its type
