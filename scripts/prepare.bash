@@ -79,17 +79,18 @@ make_venv() {
 
 # pip_install [OPTION...] FILE...: installs requirement files whose content has changed.
 pip_install() {
-  local options=() file stamp
+  local options=() file changed=()
   while [[ $1 == --* ]]; do options+=("$1"); shift; done
   for file in "$@"; do
-    stamp="$venv/.installed-$(basename "$file")"
-    cmp -s "$root/$file" "$stamp" && continue
-    say "installing Python packages into ${venv##*/}: $file"
-    "$venv/bin/python" -m pip install --disable-pip-version-check --no-input --prefer-binary \
-      --progress-bar off "${pip_options[@]}" "${options[@]}" -r "$root/$file" </dev/null ||
-      fail "pip could not install $file"
-    cp "$root/$file" "$stamp"
+    cmp -s "$root/$file" "$venv/.installed-$(basename "$file")" || changed+=("$file")
   done
+  [ ${#changed[@]} -eq 0 ] && return
+  say "installing Python packages into ${venv##*/}: ${changed[*]}"
+  # All at once: each start of pip looks at all that is installed.
+  (cd "$root" && "$venv/bin/python" -m pip install --disable-pip-version-check --no-input \
+    --prefer-binary --progress-bar off "${pip_options[@]}" "${options[@]}" "${changed[@]/#/-r}" </dev/null) ||
+    fail "pip could not install ${changed[*]}"
+  for file in "${changed[@]}"; do cp "$root/$file" "$venv/.installed-$(basename "$file")"; done
 }
 
 # can_check_javascript: eslint needs Node.js 18; Ubuntu 20.04 has 10.
