@@ -19,6 +19,7 @@ class FenceStore:
         self._send = send
         self.items: list[tuple[int, float, float, float]] = []
         self.result: int | None = mavlink.MAV_MISSION_ACCEPTED  # else: it refuses; None: silent
+        self.unreadable = -1  # the number of an item that it cannot read
         self.is_busy = False  # a transfer was begun and not ended
         self.next, self._to = 0, (0, 0)  # its next item, and to whom
 
@@ -32,7 +33,11 @@ class FenceStore:
         elif kind == "MISSION_REQUEST_LIST" and not result:
             self.is_busy, self.next, self._to = True, 0, to
             self._send(mavlink.MAVLink_mission_count_message(*to, len(self.items), FENCE))
-        elif self.is_busy and message.seq in (self.next - 1, self.next):
+        elif (
+            self.is_busy
+            and message.seq in (self.next - 1, self.next)
+            and message.seq != self.unreadable
+        ):
             self.next = message.seq + 1
             command, size, *degrees = self.items[message.seq]
             head = (*to, message.seq, mavlink.MAV_FRAME_GLOBAL, command, 0, 1, size, 0.0, 0.0, 0.0)

@@ -165,6 +165,17 @@ def test_one_that_is_not_told_is_waited_for_and_named_once_and_kept_when_it_come
     assert rig.status().ended == f"outside {ITSELF}, area 1"
 
 
+def test_one_whose_item_cannot_be_read_holds_no_drone_down_for_ever(caplog):
+    """As with a broken memory card of the autopilot, which still knows how many there are."""
+    rig = Rig()
+    rig.vehicle.fence.items, rig.vehicle.fence.unreadable = [*HERE, *POND], 4
+    rig.run(3.0)
+    assert rig.status().why_not_fly == f"{ITSELF} is not read yet"
+    rig.run(5.0)
+    rig.goal(*GOAL)
+    assert caplog.text.count("does not tell its fence") == 1
+
+
 def test_a_switch_at_the_pilots_transmitter_and_a_parameter_count_at_once():
     rig = Rig()
     rig.vehicle.parameters["FENCE_ENABLE"] = 0.0

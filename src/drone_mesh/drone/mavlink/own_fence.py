@@ -20,7 +20,7 @@ from drone_mesh.errors import ConfigurationError
 
 FENCE = mavlink.MAV_MISSION_TYPE_FENCE
 ASK_AGAIN_S = 1.0  # what got lost; a telemetry port needs 0.1 s for an item and its request
-TRIES = 5  # without any answer
+TRIES = 5  # without any answer, or that ended in an error
 LOOK_AGAIN_S = 10.0  # after the last answer
 MOST_ITEMS = 500
 FAR_M = 20_000.0  # the circle of a fence that only has a ceiling; no goal is so far from home
@@ -58,7 +58,7 @@ class OwnFence:
         self._count: int | None = None  # of the items that are being read
         self._items: list[_Item] = []
         self._unclear: tuple[_Item, ...] = ()  # read once, and not whole
-        self._tries = 0
+        self._tries = self._errors = 0
         self._due_s = -math.inf
 
     def tick(self, now_s: float) -> None:
@@ -70,7 +70,7 @@ class OwnFence:
         if now_s < self._due_s:
             return
         if not self._open:
-            self._open, self._tries = {_LIST, *autopilot.fence_parameters}, 0
+            self._open, self._tries, self._errors = {_LIST, *autopilot.fence_parameters}, 0, 0
         elif self._tries == TRIES:
             self._open = {_LIST}
             self._finish(None, now_s)
@@ -112,9 +112,10 @@ class OwnFence:
                 self._count, self._tries, self._due_s = message.count, 0, now_s
                 if not 0 < message.count <= MOST_ITEMS:
                     self._finish(None if message.count else (), now_s)
-        elif is_ours and message.type == mavlink.MAV_MISSION_UNSUPPORTED:
+        elif is_ours and (message.type == mavlink.MAV_MISSION_UNSUPPORTED or self._errors == TRIES):
             self._finish(None, now_s)
         else:  # somebody else is changing it, or has just done so: begin anew
+            self._errors += is_ours
             self._count, self._items, self._due_s = None, [], now_s + ASK_AGAIN_S
 
     def _take_item(self, message: Message, now_s: float) -> None:
