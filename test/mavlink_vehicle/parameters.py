@@ -21,6 +21,7 @@ _ARDUPILOT = {
     "FENCE_TYPE": 4.0,  # areas, of which there are none at first
     "FS_EKF_ACTION": 1.0,
     "FS_GCS_ENABLE": 5.0,  # land
+    "FS_OPTIONS": 16.0,  # the default: its node may be lost while its pilot flies
     "FS_THR_ENABLE": 1.0,
     "SYSID_MYGCS": float(OUR_SYSTEM_ID),
 }

@@ -52,6 +52,7 @@ class MavlinkVehicle:
         self.fence = FenceStore(self._send)
         self.mode = Mode.HOLD
         self.in_failsafe = False
+        self._failed: set[str] = set()  # the causes of failsafes that have acted
         self.now_s = 0.0
         self._transmit = send
         self._target: Location | None = None
@@ -72,7 +73,6 @@ class MavlinkVehicle:
 
     def choose_mode(self, mode: Mode) -> None:
         """The pilot selects a mode."""
-        self.in_failsafe = False
         self._enter(mode)
 
     def arm(self) -> None:
@@ -149,30 +149,52 @@ class MavlinkVehicle:
     # Failsafes -------------------------------------------------------------------------------
 
     def _watch_for_failsafes(self) -> None:
-        if not self.body.armed or self.body.on_ground:
-            return
-        if self.body.battery_percent < LOW_BATTERY_PERCENT or not self.faults.estimate_good:
-            self._fail_to(Mode.LAND)
-        elif self.faults.fence_breached:
-            self._fail_to(Mode.RETURN)
-        elif self.mode is Mode.FOLLOW:
-            self._watch_link()
+        """Each acts once, as its cause comes: whoever chooses another mode then, has it.
 
-    def _watch_link(self) -> None:
+        A breached fence is no failsafe in ArduPilot's heartbeat, and a low battery stays one.
+        """
+        causes = self._causes()
+        if self.body.armed and not self.body.on_ground:
+            for cause, mode in causes.items():
+                if cause not in self._failed:
+                    self._failed.add(cause)
+                    at_fence = cause == "fence" and self.autopilot is not PX4
+                    if at_fence:  # before any heartbeat that shows the mode
+                        self._send(mavlink.MAVLink_fence_status_message(1, 1, 3, 0))
+                    self._fail_to(mode, is_shown=not at_fence)
+        over = {cause for cause in self._failed - {"battery"} if cause not in causes}
+        self._failed -= over
+        if over and not self._failed - {"fence"}:
+            self.in_failsafe = False
+
+    def _causes(self) -> dict[str, Mode]:
+        """And the mode that each leads to."""
+        causes, parameters, faults = {}, self.parameters, self.faults
+        if self.body.battery_percent < LOW_BATTERY_PERCENT:
+            returns = parameters.get("BATT_FS_LOW_ACT") == 2.0
+            causes["battery"] = Mode.RETURN if returns else Mode.LAND
+        if not faults.estimate_good:
+            causes["estimate"] = Mode.LAND
+        if faults.fence_breached:
+            causes["fence"] = Mode.RETURN
         if self.autopilot is PX4:
-            if self.now_s - self._target_s > self.parameters["COM_OF_LOSS_T"]:
+            silent_s = self.now_s - self._target_s
+            if self.mode is Mode.FOLLOW and silent_s > parameters["COM_OF_LOSS_T"]:
                 actions = {3: Mode.RETURN, 4: Mode.LAND, 5: Mode.HOLD}
-                action = actions.get(int(self.parameters["COM_OBL_RC_ACT"]), Mode.PILOT)
-                self._fail_to(action)
+                causes["targets"] = actions.get(int(parameters["COM_OBL_RC_ACT"]), Mode.PILOT)
         elif self.now_s - self._ground_station_s > GROUND_STATION_LOST_S:
-            actions = {0: Mode.FOLLOW, 1: Mode.RETURN, 5: Mode.LAND}
-            self._fail_to(actions.get(int(self.parameters["FS_GCS_ENABLE"]), Mode.LAND))
+            action = int(parameters["FS_GCS_ENABLE"])
+            if action:
+                causes["node"] = Mode.RETURN if action == 1 else Mode.LAND
+            if action and self.mode in (Mode.PILOT, Mode.HOLD):
+                causes["node"] = self.mode  # FS_OPTIONS 16, the default
+        return causes
 
-    def _fail_to(self, mode: Mode) -> None:
-        if self.mode in (Mode.LAND, Mode.RETURN) or mode is self.mode:
-            return
-        self._enter(mode)
-        self.in_failsafe = mode is not Mode.HOLD
+    def _fail_to(self, mode: Mode, is_shown: bool = True) -> None:
+        lands_on = self.mode is Mode.LAND and int(self.parameters.get("FS_OPTIONS", 8.0)) & 8
+        if not lands_on and mode is not self.mode:
+            self._enter(mode)
+        self.in_failsafe = self.in_failsafe or is_shown and mode is not Mode.HOLD
         self._say(mavlink.MAV_SEVERITY_CRITICAL, f"failsafe: {mode.value}")
 
     def _say(self, severity: int, text: str) -> None:

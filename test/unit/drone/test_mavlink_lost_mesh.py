@@ -101,3 +101,22 @@ def test_the_pilot_and_the_autopilot_win_over_the_way_home(
         battery_at_15(rig)
         rig.run(1.0)
         assert rig.vehicle.mode is Mode.LAND
+
+
+@pytest.mark.parametrize(("options", "mode"), [(16.0, Mode.RETURN), (24.0, Mode.LAND)])
+def test_a_low_battery_ends_a_landing_unless_the_autopilot_is_told_to_land_on(
+    options: float, mode: Mode
+) -> None:
+    rig = on_its_way_home(ARDUPILOT)
+    rig.vehicle.parameters.update(BATT_FS_LOW_ACT=2.0, FS_OPTIONS=options)
+    rig.run_until("it lands", lambda: rig.vehicle.mode is Mode.LAND)
+    before = len(rig.commands())
+    battery_at_15(rig)
+    rig.run(2.0)
+    assert rig.vehicle.mode is mode
+    assert rig.status().ended == "the autopilot reports a failsafe"
+    rig.run_until("it is down", lambda: not rig.vehicle.body.armed)
+    rig.vehicle.choose_mode(Mode.FOLLOW)
+    rig.run(10.0)
+    assert len(rig.commands()) == before
+    assert rig.status().why_not_fly == "the autopilot reports a failsafe"  # until it starts anew
