@@ -487,6 +487,8 @@ class BeaconRoutes(IRoutes):
 
     def get_direction_to_node(self, node: int) -> int:
         """The best next hop for a packet of this node, or NO_ROUTE."""
+        if node == NO_ROUTE:  # as the gateway is, of who has chosen none
+            return NO_ROUTE
         way = next(self.next_hops(node, NO_ROUTE), None)
         return NO_ROUTE if way is None else way.neighbour
 

@@ -61,6 +61,13 @@ def test_the_present_parent_stays_while_no_other_is_nearer(routes):
     assert routes.parent == 2
 
 
+def test_there_is_no_way_to_the_next_hop_of_who_never_had_one(routes):
+    """Whoever had heard a gateway and not chosen it yet asked node 255 for its place."""
+    routes.heard(1, beacon())
+    assert routes.get_direction_to_node(255) == 255
+    assert routes.get_direction_to_node(1) == 1
+
+
 @pytest.mark.parametrize("generation", range(4))
 def test_a_neighbour_that_stands_on_this_node_is_no_parent(routes, generation):
     line = [4, 5, 6, 0]
