@@ -39,6 +39,7 @@ class SeenMotion:
         self._step_m = STEP * range_m
         self.within_s = REPORTS * asked_s
         self._tracks: dict[int, _Track] = {}
+        self._moved_s = -math.inf  # no node was seen to move later
         self._flew_s: dict[int, float] = {}  # for a repair
 
     def reported(self, node: int, place: Location, now_s: float) -> None:
@@ -52,7 +53,9 @@ class SeenMotion:
             return
         is_third = track.before is not None and math.dist(place, track.before) > step_m
         moves = is_third and now_s - track.stepped_s <= self.within_s
-        moves_s = now_s if moves else track.moves_s
+        moves_s = track.moves_s
+        if moves:
+            moves_s = self._moved_s = now_s
         self._tracks[node] = _Track(place, track.place, now_s, moves_s)
 
     def flies_for_repair(self, node: int, now_s: float) -> None:
@@ -65,6 +68,8 @@ class SeenMotion:
 
     def moved_since(self, since_s: float) -> bool:
         """Whether any node was seen to move by itself since then."""
+        if self._moved_s < since_s:  # mostly, while drones stand
+            return False
         return any(track.moves_s >= since_s for track in self._tracks.values())
 
 
