@@ -154,19 +154,30 @@ class PilotSide:
     def upload(self, way: Sequence[EarthPlace], within_s: float = 20.0) -> None:
         """A mission along these places, for AUTO. Raises PilotSideError."""
         items = [way[0], *way]  # the first is home and not flown to
+        waypoint = mavlink.MAV_CMD_NAV_WAYPOINT
+        self._upload([(waypoint, 0.0, place) for place in items], 0, within_s)
+
+    def upload_fence(
+        self, items: Sequence[tuple[int, float, EarthPlace]], within_s: float = 20.0
+    ) -> None:
+        """MAV_CMD_NAV_FENCE_..., corners or radius in m, and where. Raises PilotSideError."""
+        self._upload(items, mavlink.MAV_MISSION_TYPE_FENCE, within_s)
+
+    def _upload(
+        self, items: Sequence[tuple[int, float, EarthPlace]], kind: int, within_s: float
+    ) -> None:
+        to = self._system_id, 1
         self._latest.pop("MISSION_ACK", None)
         self._mission = [
             mavlink.MAVLink_mission_item_int_message(
-                *(self._system_id, 1, number, mavlink.MAV_FRAME_GLOBAL_INT),
-                *(mavlink.MAV_CMD_NAV_WAYPOINT, 0, 1, 0.0, 0.0, 0.0, 0.0),
+                *(*to, number, mavlink.MAV_FRAME_GLOBAL_INT, command, 0, 1, size, 0.0, 0.0, 0.0),
                 *(round(place.latitude_deg * 1e7), round(place.longitude_deg * 1e7)),
-                place.altitude_m,
+                *(place.altitude_m, kind),
             )
-            for number, place in enumerate(items)
+            for number, (command, size, place) in enumerate(items)
         ]
-        count = mavlink.MAVLink_mission_count_message(self._system_id, 1, len(items))
-        self._send(count)
-        self.until("taking the mission", lambda: "MISSION_ACK" in self._latest, within_s)
+        self._send(mavlink.MAVLink_mission_count_message(*to, len(items), kind))
+        self.until("taking the upload", lambda: "MISSION_ACK" in self._latest, within_s)
 
     def close(self) -> None:
         """Close the connection."""

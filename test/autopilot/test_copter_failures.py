@@ -34,7 +34,7 @@ class Failure:
     """How it comes about, and what the flight does then."""
 
     what: str
-    happens: Mapping[str, float]  # simulator's parameters
+    happens: Mapping[str, float]  # simulator's parameters, as they are called since ArduPilot 4.7
     mode: str  # that the copter chooses; empty: it stays in GUIDED
     ends: bool = True  # the flight
     gone: Mapping[str, float] = field(default_factory=dict)  # ends it again
@@ -43,12 +43,12 @@ class Failure:
 
 
 FAILURES = (
-    Failure("GPS lost", {"SIM_GPS_DISABLE": 1}, "LAND", gone={"SIM_GPS_DISABLE": 0}),
+    Failure("GPS lost", {"SIM_GPS1_ENABLE": 0}, "LAND", gone={"SIM_GPS1_ENABLE": 1}),
     Failure(
         "GPS glitch of 1.1 km",
-        {"SIM_GPS_GLITCH_X": 0.01},
+        {"SIM_GPS1_GLTCH_X": 0.01},
         "LAND",
-        gone={"SIM_GPS_GLITCH_X": 0},
+        gone={"SIM_GPS1_GLTCH_X": 0},
         order="",  # the emulated antenna is where the GPS says
     ),
     Failure(
@@ -68,7 +68,7 @@ FAILURES = (
         order="arrived",
     ),
     Failure("fence breached", {"FENCE_RADIUS": 12}, "RTL"),
-    Failure("one of four motors stops", {"SIM_ENGINE_MUL": 0}, ""),
+    Failure("one of four motors stops", {"SIM_ENGINE_MUL": 0, "SIM_ENGINE_FAIL": 1}, ""),
     Failure("a hill in its way", {}, "", hill=True),
 )
 
@@ -144,6 +144,25 @@ def test_when_the_node_is_killed_the_copter_goes_home_and_the_next_node_leaves_i
         nobody_flies_it(rig)
         assert rig.pilot.mode == "RTL"
         row(Failure("the node is killed", {}, "RTL"), rig, "RTL", "", asked)
+
+
+@pytest.mark.parametrize(("options", "mode"), [(16.0, "RTL"), (24.0, "LAND")])
+def test_a_low_battery_makes_a_return_of_a_landing_unless_it_is_told_to_land_on(
+    program: tuple[Path, Path], tmp_path: Path, options: float, mode: str
+) -> None:
+    own = {"FS_OPTIONS": options, "BATT_LOW_TIMER": 2.0}  # seconds
+    with CopterRig(program, tmp_path, speedup=1.0, parameters=own) as rig:
+        rig.set_out(40.0, 0.0, 7.0)
+        rig.engine.land_at(0.0, 0.0, 0.0)  # as for a lost mesh
+        rig.pilot.until("landing", lambda: rig.pilot.mode == "LAND", 150.0)
+        rig.pilot.set("SIM_BATT_VOLTAGE", 10.0)
+        rig.pilot.until("ended", lambda: not rig.engine.is_flying(), 60.0)
+        print(f"FS_OPTIONS {options:g}: {rig.pilot.mode} at {rig.pilot.height_m:.1f} m")
+        assert rig.pilot.mode == mode
+        assert rig.engine.why_ended() == "the autopilot reports a failsafe"
+        rig.pilot.until("down", lambda: not rig.pilot.armed, 150.0)
+        rig.pilot.choose("GUIDED")
+        assert nobody_flies_it(rig) == "the autopilot reports a failsafe"
 
 
 @pytest.mark.parametrize("failure", [f for f in FAILURES if f.order], ids=lambda f: f.what)
