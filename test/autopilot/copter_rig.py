@@ -103,6 +103,8 @@ class CopterRig:
         parameters: Mapping[str, float] | None = None,
         ready: bool = True,
         limits: FlightLimits = LIMITS,
+        home: Location = Location(0.0, 0.0, 0.0),  # noqa: B008 (immutable)
+        node: int = 1,
     ) -> None:
         # The copter's clock runs faster than the node's: what it waits for lasts longer there.
         faster = max(1.0, speedup)
@@ -111,14 +113,15 @@ class CopterRig:
             "DISARM_DELAY": min(127.0, DISARM_DELAY_S * faster),
         }
         wanted = {**SAFE, **waits, **(parameters or {})}
-        self.copter = ArduCopter(program, folder, instance, ORIGIN, speedup, wanted)
+        stands = Origin(*ORIGIN.to_earth(home))
+        self.copter = ArduCopter(program, folder, instance, stands, speedup, wanted)
         self.line: LossyLine | None = None
         address = self.copter.address
         if losing:
             self.line = LossyLine(int(address.rpartition(":")[2]), losing, seed=instance)
             address = self.line.address
         self.pilot = PilotSide(self.copter.pilot_address, self.copter.system_id)
-        self._node = (1, address, ORIGIN, limits, permissions)
+        self._node = (node, address, ORIGIN, limits, permissions)
         self.start_engine()
         if ready:
             self.pilot.make_ready()
