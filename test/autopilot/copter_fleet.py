@@ -219,7 +219,7 @@ class Fleet:
 
     @contextlib.contextmanager
     def page(self) -> Iterator[Page]:
-        """The console's page of this mesh in a browser; needs chromium."""
+        """The console's page of this mesh in a browser; needs chromium, as test/console does."""
         from playwright.sync_api import sync_playwright
 
         port = free_port()
@@ -228,8 +228,10 @@ class Fleet:
         console = self._start("console", "console.gateway_command:main", *options)
         self.watch_for(5.0 * self._pace)
         with sync_playwright() as playwright:
+            installed = shutil.which("chromium-headless-shell") or shutil.which("chromium")
             browser = playwright.chromium.launch(
-                executable_path=shutil.which("chromium"), args=["--headless", "--no-sandbox"]
+                executable_path=os.environ.get("CHROMIUM") or installed,
+                args=["--headless", "--no-sandbox"],
             )
             page = browser.new_page(viewport={"width": 1400, "height": 900})
             page.set_default_timeout(120e3)  # ms: the machine may be busy
