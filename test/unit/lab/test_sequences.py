@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -23,6 +24,7 @@ from drone_mesh.lab.plan import Plan
 from drone_mesh.lab.scenario import Scenario, Streams
 from drone_mesh.lab.sequence import SequenceRun, run_sequence
 from drone_mesh.lab.worker import execute
+from drone_mesh.state.model import EventRecord
 
 SEQUENCES, AT_ONCE = 100, 10
 LARGEST = 14  # drones: a second for ten sequences; the suite runs meshes of up to 60
@@ -109,6 +111,13 @@ def test_drones_that_know_where_the_gateway_moved_are_not_left_behind(number):
     assert {item.action for item in record.happened} == {"gateway_moved"}
     assert left_able(record) == 0
     assert left_placeless(record) == 0
+
+
+@pytest.mark.parametrize(("restarted", "flights"), [(False, 1), (True, 0)])
+def test_a_drone_that_was_restarted_is_not_connected_any_more_when_it_flies(restarted, flights):
+    kinds = ["connected", *(["started"] if restarted else []), "flight decided"]
+    events = [EventRecord(float(at_s), 6, kind) for at_s, kind in enumerate(kinds)]
+    assert flew_connected(SimpleNamespace(events=events)) == flights
 
 
 def test_the_same_seed_gives_the_same_run_in_an_experiment():

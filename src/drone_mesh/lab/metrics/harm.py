@@ -198,7 +198,7 @@ def flew_connected(run: RunRecord) -> float:
     for event in run.events:
         if event.kind == MeshEventKind.CONNECTED.value:
             connected.add(event.node)
-        elif event.kind == MeshEventKind.DISCONNECTED.value:
+        elif event.kind in (MeshEventKind.DISCONNECTED.value, MeshEventKind.STARTED.value):
             connected.discard(event.node)
         elif event.kind == MeshEventKind.FLIGHT_DECIDED.value:
             flights += event.node in connected
