@@ -20,7 +20,7 @@ from drone_mesh.errors import ConfigurationError
 from drone_mesh.yaml_file import MAX_FILE_BYTES, is_number, read_mapping_text, read_text
 
 MOST_AREAS = 100
-MOST_CORNERS = 10_000  # of all areas; a Pi reads them in seconds
+MOST_CORNERS = 10_000  # of all areas
 MOST_M = 100_000.0  # from x 0, y 0; farther away, the plane is not the earth
 KEYS = ("name", "inclusion", "polygon", "holes", "center", "radius", "min_height", "max_height")
 MAX_NAME = 40

@@ -44,7 +44,7 @@ HOMES = {1: Location(0, 0, 0), 2: Location(0, 6, 0), 3: Location(0, 12, 0)}
 POSTS = {1: Location(12, 0, 6), 2: Location(12, 12, 6)}
 
 
-class Crew:
+class Trio:
     """Three copters, their engines, and the rules that send them."""
 
     def __init__(self, rigs: dict[int, CopterRig]) -> None:
@@ -118,15 +118,14 @@ class Crew:
         """Until it holds, within so many seconds of all clocks."""
         end_s = time.monotonic() + within_s
         while not holds():
-            states = {node: self._status(node) for node in HOMES}
-            assert time.monotonic() < end_s, f"not {what}: {states}"
+            assert time.monotonic() < end_s, f"not {what}: {[*map(self._status, HOMES)]}"
             self.look()
 
 
 @pytest.fixture
-def crew(
+def trio(
     program: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> Iterator[Crew]:
+) -> Iterator[Trio]:
     real = time.monotonic
     monkeypatch.setattr(time, "monotonic", lambda: SPEEDUP * real())  # the engines' as well
     with contextlib.ExitStack() as stack:
@@ -141,24 +140,24 @@ def crew(
                     home=home, node=node,
                 )
             )  # fmt: skip
-        yield Crew(rigs)
+        yield Trio(rigs)
 
 
-def test_a_full_copter_takes_over_before_another_one_must_land(crew: Crew) -> None:
-    crew.orders.give("posts", POSTS, crew.now_s())
-    crew.until("at their posts", crew.are_at_posts, 400.0)
-    crew.nearest_m = math.inf
-    crew.until("relieved", lambda: crew.relief.reliefs == 1, 2.0 * HOVER_S)
-    crew.look()
-    old = next(node for node in POSTS if crew.goals[node] == HOMES[node])
-    crew.until("home", lambda: crew.is_down(old) and not crew.rigs[old].pilot.armed, 300.0)
-    away_m = crew.place(old).distance_m(HOMES[old])
+def test_a_full_copter_takes_over_before_another_one_must_land(trio: Trio) -> None:
+    trio.orders.give("posts", POSTS, trio.now_s())
+    trio.until("at their posts", trio.are_at_posts, 400.0)
+    trio.nearest_m = math.inf
+    trio.until("relieved", lambda: trio.relief.reliefs == 1, 2.0 * HOVER_S)
+    trio.look()
+    old = next(node for node in POSTS if trio.goals[node] == HOMES[node])
+    trio.until("home", lambda: trio.is_down(old) and not trio.rigs[old].pilot.armed, 300.0)
+    away_m = trio.place(old).distance_m(HOMES[old])
     print(
-        f"{old} is home, {away_m:.1f} m off, with {crew.percent(old):.0f} %; longest gap "
-        f"{crew.longest_gap_s:.0f} s, nearest {crew.nearest_m:.2f} m"
+        f"{old} is home, {away_m:.1f} m off, with {trio.percent(old):.0f} %; longest gap "
+        f"{trio.longest_gap_s:.0f} s, nearest {trio.nearest_m:.2f} m"
     )
     assert away_m < 2.0
-    assert crew.percent(old) > 20.0
-    assert crew.longest_gap_s <= 10.0
-    assert crew.nearest_m >= 1.0
-    assert all(rig.pilot.mode == "GUIDED" for node, rig in crew.rigs.items() if node != old)
+    assert trio.percent(old) > 20.0
+    assert trio.longest_gap_s <= 10.0
+    assert trio.nearest_m >= 1.0
+    assert all(rig.pilot.mode == "GUIDED" for node, rig in trio.rigs.items() if node != old)

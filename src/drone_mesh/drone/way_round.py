@@ -10,7 +10,7 @@ from drone_mesh.drone.fence import Fence, Turn, box_around, overlap
 from drone_mesh.drone.flight_path import Point, Vector
 
 MOST_MET = 10  # on one path; the search time grows with the cube
-MOST_LEGS = 4_000  # that a search tries: a second of a Pi, whose autopilot hears nothing meanwhile
+MOST_LEGS = 4_000  # that a search tries: an autopilot hears nothing meanwhile
 MOST_ENTRIES = 4  # places inside that a drone outside is led to past others
 ALL_OUTSIDE = 1.0 - 1e-6  # the share of a leg that is, as rounded
 

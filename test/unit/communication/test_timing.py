@@ -104,7 +104,7 @@ def test_memory_is_bounded_by_the_number_of_ids(gateway):
         for creator in set(range(254)) - {1}:
             for forward in (1, 254):  # a fragment, of which each sender has its own memory
                 rig.mesh.on_msg(bytes((creator, 0, 129, 1, forward)).ljust(32, b"\0"), rig.now_s)
-        storm(6_000)
+        storm(12_000)
         before, _ = tracemalloc.get_traced_memory()
         storm(1500)
         grown = tracemalloc.get_traced_memory()[0] - before

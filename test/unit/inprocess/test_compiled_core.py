@@ -23,13 +23,13 @@ print(core())
 for radio, routing in itertools.product(("disc", "shared"), ("beacon", "child_table_tree")):
     network = Network(seed=7, radio=radio, routing=routing)
     network.add_fleet(1, 24, 5, 6.0)
-    network.run_for(10.0)
+    network.run_for(20.0)
     places = {node: network.location(node).to_vector() for node in network.nodes}
     mobility = Mobility("random_waypoint", speed_m_s=(1.0, 3.0))
     network.fly(tracks_of(mobility, places, {0}, Area(0.0, 0.0, 40.0, 40.0), seed=7))
-    network.run_for(10.0)
+    network.run_for(20.0)
     network.power(7, False)
-    network.run_for(30.0)
+    network.run_for(40.0)
     paths = [network.path_to_gateway(node) for node in network.nodes]
     seen = (network.events, network.air.delivered, paths, network.status())
     print(radio, routing, hashlib.sha256(repr(seen).encode()).hexdigest())

@@ -130,7 +130,9 @@ def test_26_nodes_on_one_channel_connect_and_stay_connected():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("speed_m_s", "fading"), [(0.3, "rician"), (0.0, "rayleigh")])
+@pytest.mark.parametrize(
+    ("speed_m_s", "fading"), [(0.0, "none"), (0.3, "rician"), (0.0, "rayleigh")]
+)
 def test_the_fast_model_agrees_with_the_chips_also_where_drones_move_and_links_fade(
     speed_m_s, fading
 ):

@@ -21,7 +21,7 @@ PERIODS_S = 30.0  # three check periods
 NEIGHBOUR = {1: 0, 3: 2, 4: 2}  # from which each router hears orders and claims
 LATER_S = (0.0, 0.15, 0.45, 2.0)  # after the beginning of a state
 # With each of these an answer is awaited and the relay returns, or not: for each pair of the three
-# there is a case. The moments take turns: half of these each, a quarter with other strategies.
+# there is a case.
 WAYS = [
     (later_s, awaits, awaits != bool(number % 2))
     for number, later_s in enumerate(LATER_S)
@@ -163,9 +163,8 @@ def test_a_router_with_a_path_is_connected_again_within_three_check_periods(
     strategy, event, lasts_s
 ):
     failed = []
-    shares = 2 if strategy == "thesis" else 4
-    for number, moment in enumerate(moments(strategy)):
-        for later_s, awaits, relay_returns in WAYS[number % shares :: shares]:
+    for moment in moments(strategy):
+        for later_s, awaits, relay_returns in WAYS:
             network = mesh(strategy)
             network.run_for(moment.at_s + later_s)
             if awaits:

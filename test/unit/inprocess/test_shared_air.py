@@ -213,29 +213,30 @@ def share_connected(network, seconds):
 def test_a_mesh_on_one_channel_connects_and_stays_connected(nodes, rate, spacing, within_s, share):
     network = grid(nodes, rate, spacing)
     assert network.run_until(network.all_connected, within_s)
-    assert share_connected(network, 60.0) >= share
+    assert share_connected(network, 120.0) >= share
 
 
 def test_a_mesh_whose_power_falls_with_distance_connects():
     links = LogDistance.with_edge_at(9.0, random.Random("links"))
     network = grid(50, links=links)
     assert network.run_until(network.all_connected, 30.0)
-    assert share_connected(network, 60.0) >= 0.99
+    assert share_connected(network, 120.0) >= 0.99
 
 
 def test_a_mesh_lives_with_the_loss_of_every_tenth_frame():
     rng = random.Random("loss")
     network = grid(50, links=ScriptedLoss(IdealDisc(9.0), lambda hop: rng.random() < 0.1))
     assert network.run_until(network.all_connected, 60.0)
-    assert share_connected(network, 60.0) >= 0.98
+    assert share_connected(network, 120.0) >= 0.98
 
 
 @pytest.mark.slow
-def test_of_101_nodes_30_die_and_all_that_have_a_path_are_back_within_40_s():
-    network = grid(101, "1M")
+@pytest.mark.parametrize("seed", range(3))
+def test_of_101_nodes_30_die_and_all_that_have_a_path_are_back_within_40_s(seed):
+    network = grid(101, "1M", seed=seed)
     assert network.run_until(network.all_connected, 60.0)
     network.run_for(20.0)
-    for node in random.Random("dead").sample(range(1, 101), 30):
+    for node in random.Random(f"dead {seed}").sample(range(1, 101), 30):
         network.power(node, False)
     died_s = network.clock.now_s
     reachable = [node for node in network.shortest_hops() if node]

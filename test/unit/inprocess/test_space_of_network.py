@@ -74,7 +74,7 @@ def test_fading_changes_what_arrives_and_the_same_seed_gives_the_same_fading(rad
     def run(fading):
         network = Network(3, radio=radio, fading=fading)
         network.add_fleet(gateways=1, routers=9, gridsize=3, spacing=6.0)
-        network.run_for(10.0)
+        network.run_for(30.0)
         network.stop()
         return network.air.frames, network.air.collisions, network.air.airtime_s
 
