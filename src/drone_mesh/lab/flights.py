@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass, field
-from typing import Callable, Iterator, Mapping
+from typing import Callable, Iterable, Iterator
 
 from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.communication.repair.options import CLEARANCE_M
 from drone_mesh.drone.flight_path import CLIMB_ENDS_AT, DESCENT_STARTS_AT, FlightPath
 from drone_mesh.drone.location import Location
 from drone_mesh.inprocess import Network
-from drone_mesh.inprocess.node import InProcessNode
 from drone_mesh.lab.network_sample import gateways_of, physical_graph
 
 EVENTS_BACK = 20  # when a flight starts, its event is among this many latest ones
@@ -99,7 +98,13 @@ class Flights:
             and leg.path.passes_m(place.to_vector(), now_s) < CLEARANCE_M
         }
         if on_way:
-            leg.warned_of |= could_know(self._network, leg.node, on_way)
+            path = leg.path
+            leg.warned_of |= could_know(
+                self._network,
+                leg.node,
+                on_way,
+                lambda _node, told: path.passes_m(told.to_vector(), now_s) < CLEARANCE_M,
+            )
 
     def _resting_places(self) -> Iterator[tuple[int, Location]]:
         """Where each drone is, or will be at the end of its flight."""
@@ -135,25 +140,29 @@ class Flights:
         return False
 
 
-def could_know(network: Network, asker: int, places: Mapping[int, Location]) -> set[int]:
-    """Which of these drones `asker` could know to be within the clearance of these places.
+def could_know(
+    network: Network, asker: int, nodes: Iterable[int], would_help: Callable[[int, Location], bool]
+) -> set[int]:
+    """Of which of these drones `asker` could know a place that would help it.
 
-    From its own table, or from a live node to which links lead now: that is there itself, or has
-    the place in its table.
+    From its own table, or from a live node to which links lead now: that is the drone itself, or
+    has a place of it in its table for which `would_help(drone, place)`.
     """
     in_reach = {asker, *physical_graph(network).hops_from([asker])}
     return {
         node
-        for node, place in places.items()
-        if node in in_reach or any(_knows(network.nodes[one], node, place) for one in in_reach)
+        for node in nodes
+        if node in in_reach
+        or any(would_help(node, told) for one in in_reach for told in _told(network, one, node))
     }
 
 
-def _knows(node: InProcessNode, other: int, place: Location) -> bool:
-    """Whether the tables of `node` have the drone `other` within the clearance of `place`."""
-    component = node.component
+def _told(network: Network, knower: int, node: int) -> Iterator[Location]:
+    """The places of `node` in the tables of `knower`."""
+    component = network.nodes[knower].component
     control, gateway = component.control, component.places.gateway
-    told = [heard.place for known, heard in control.neighbours.taken() if known == other]
-    if gateway is not None and control.gateway == other:
-        told.append(gateway)
-    return any(place.distance_m(known) < CLEARANCE_M for known in told)
+    for known, heard in control.neighbours.taken():
+        if known == node:
+            yield heard.place
+    if gateway is not None and control.gateway == node:
+        yield gateway

@@ -7,7 +7,8 @@ import random
 from typing import Iterator
 
 from drone_mesh.communication.events.observer import MeshEventKind
-from drone_mesh.communication.repair.options import DEFAULT_REPAIR
+from drone_mesh.communication.repair.options import CLEARANCE_M, DEFAULT_REPAIR
+from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.inprocess.radio import InProcessAir
 from drone_mesh.lab.flights import could_know
@@ -80,8 +81,14 @@ class SequenceRun(Simulation):
         return super().is_able(node) and bool(self._helpers(node))
 
     def could_know_a_link(self, node: int) -> bool:  # noqa: D102
-        helpers = {helper: self.network.location(helper) for helper in self._helpers(node)}
-        return GATEWAY in helpers or bool(could_know(self.network, node, helpers))
+        network, helpers = self.network, self._helpers(node)
+        if GATEWAY in helpers:
+            return True
+
+        def is_there(helper: int, told: Location) -> bool:
+            return told.distance_m(network.location(helper)) < CLEARANCE_M
+
+        return bool(could_know(network, node, helpers, is_there))
 
     def _helpers(self, node: int) -> list[int]:
         """The nodes with a path to the gateway whose link to this one is not cut."""

@@ -206,7 +206,7 @@ def test_a_flight_is_warned_of_the_live_ones_to_which_links_lead():
         {"knower": 3},
         {"knower": 2, "dead": True},
         {"knower": 2, "cut": True},
-        {"knower": 2, "told": (14.0, 1.1, 0.0)},
+        {"knower": 2, "told": (14.0, 0.98, 0.0)},  # near where it is, and clear of the flight
     ],
 )
 def test_nobody_warns_who_has_no_link_or_is_dead_or_was_told_another_place(case):

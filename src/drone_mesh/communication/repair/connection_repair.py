@@ -315,15 +315,20 @@ class ConnectionRepair(RepairActions):
             self._end_work()
 
     def on_arrived(self) -> bool:
-        """The drone is at its goal. Returns whether the flight is over."""
-        if self._flight is None:
+        """The drone is at the end of a leg. Returns whether the flight is over.
+
+        With the antenna off it is, unless it is the last one: nobody would hear where another leg
+        ends.
+        """
+        flight = self._flight
+        if flight is None or not (flight.lands or self._antenna.on()):
             return True
-        is_there, lands = self._flight.arrived(), self._flight.lands
-        if self._flight.paused:
+        is_there = flight.arrived()
+        if flight.paused:
             self._look_again()
-        elif is_there and not lands:
+        elif is_there and not flight.lands:
             self._await_answers()
-        return is_there and lands
+        return is_there and flight.lands
 
     def on_landed(self) -> None:
         flight, self._flight = self._flight, None

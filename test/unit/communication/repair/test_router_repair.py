@@ -1580,6 +1580,20 @@ def test_to_the_gateway_it_flies_in_legs_and_presents_itself():
     assert rig.engine.goals[-1] == Location(6.2, 0.0, 0.0)
 
 
+def test_one_whose_antenna_goes_off_in_flight_ends_it_where_it_told_the_others_last():
+    """Nobody would hear where the next leg ends, so another one could fly to the same place."""
+    rig = connected_rig(12.0)
+    rig.hear("00 02 01 01 01 00 00 80 40")
+    rig.antenna.dead = {2}
+    rig.wait_until(EMERGENCY_S + 0.1)
+    fly(rig, Location(9.0, 0.0, 3.0))
+    switch_off(rig)
+    fly(rig, Location(6.0, 0.0, 0.0))
+    rig.wait(20.0)
+    assert rig.engine.goals == [A_LEG_FROM_12]
+    assert rig.kinds()[-1] == "LANDED"
+
+
 def test_no_leg_ends_on_a_drone_whose_place_is_known_or_told_on_the_way():
     rig = lone_rig()
     rig.hear(UNDERGROUND)  # the place of 2 is nowhere to fly
