@@ -112,6 +112,24 @@ def test_between_a_hundred_nodes_on_a_shared_channel_one_in_a_hundred_is_later(t
     assert sum(delays.get(pair, math.inf) <= 5.0 for pair in pairs) >= 99
 
 
+@pytest.mark.slow
+def test_a_burst_of_messages_on_a_shared_channel_is_not_followed_by_questions_that_fill_it():
+    """Two a second at random times: if senders ask after a second, 1 in 5 is late from then on."""
+    network = scenarios.fleet(99, 10, 1, radio="shared")
+    network.run_for(80.0)
+    rng, sent_s = random.Random(1), {}
+    start_s = network.now_s()
+    for at_s in sorted(rng.uniform(0.0, 60.0) for _ in range(120)):
+        network.run_for(max(0.0, start_s + at_s - network.now_s()))
+        payload = len(sent_s).to_bytes(2, "big")
+        sent_s[payload] = network.now_s()
+        network.send(*rng.sample(sorted(network.nodes), 2), payload, PORT)
+    network.run_for(5.0)
+    received = (message for messages in network.received.values() for message in messages)
+    delays_s = [m.received_s - sent_s[m.payload] for m in received if m.port == PORT]
+    assert sum(delay_s <= 5.0 for delay_s in delays_s) >= 119
+
+
 @pytest.mark.parametrize("technique", ROUTING_TECHNIQUES)
 def test_a_gateway_searches_for_a_node_that_uses_another_gateway(technique):
     within_s = 3.0 if technique == "beacon" else 1.0  # it searches every 0.6 s while a packet waits

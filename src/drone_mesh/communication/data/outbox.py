@@ -25,7 +25,13 @@ from drone_mesh.communication.data.outgoing import (
     TicketState,
     destination_in_words,
 )
-from drone_mesh.communication.data.pacing import CongestionWindow, RoundTrip, Train
+from drone_mesh.communication.data.pacing import (
+    FIRST_RELAYED_S,
+    FIRST_TIMEOUT_S,
+    CongestionWindow,
+    RoundTrip,
+    Train,
+)
 from drone_mesh.communication.data.packets import COMPLETE, NO_ANSWER, Ack, Poll
 from drone_mesh.communication.interfaces import NO_ROUTE
 
@@ -68,6 +74,7 @@ class Outbox:
 
     def set_relayed(self, relayed: bool) -> None:
         """Set whether there are relays on the same channel on the way to the destination."""
+        self._round_trip.first_s = FIRST_RELAYED_S if relayed else FIRST_TIMEOUT_S
         if not relayed:
             self._train = None
         elif self._train is None:

@@ -11,6 +11,9 @@ FIRST_SIZE = 32  # less than a message of 1,024 bytes
 LEAST_SIZE = 4
 MOST_SIZE = 256  # six messages of 1,024 bytes
 FIRST_TIMEOUT_S = 1.0  # RFC 6298, 2.1
+# Over relays on a shared channel, as in CoAP (RFC 7252, 4.8: 2 to 3 s). After a burst of messages
+# an answer takes longer than a second; if each asked then, the questions would fill the channel.
+FIRST_RELAYED_S = 3.0
 LEAST_TIMEOUT_S = 0.3  # above the half second of circulation after one doubling
 MOST_TIMEOUT_S = 30.0  # three check periods; with less, POLLs alone fill a channel
 
@@ -44,6 +47,7 @@ class RoundTrip:
     """The timeout for one destination, estimated from its answers."""
 
     def __init__(self) -> None:
+        self.first_s = FIRST_TIMEOUT_S  # before the first answer
         self.mean_s: float | None = None  # of the answers so far
         self._deviation_s = 0.0
 
@@ -57,7 +61,7 @@ class RoundTrip:
 
     def timeout_s(self, unanswered: int) -> float:
         """How long to wait for an answer, given the number of unanswered questions."""
-        timeout_s = FIRST_TIMEOUT_S
+        timeout_s = self.first_s
         if self.mean_s is not None:
             timeout_s = max(LEAST_TIMEOUT_S, self.mean_s + 4 * self._deviation_s)
         return min(MOST_TIMEOUT_S, timeout_s * 2.0 ** min(unanswered, 8))
