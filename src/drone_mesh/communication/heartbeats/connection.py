@@ -306,7 +306,7 @@ class GatewayConnection:
         if shows_way_back:
             self.send_heartbeat()
         to, answered_s = self.next_hop(), self._answered_itself_s
-        asked = self._relay_check.run(self.gateway, to, self.hops, answered_s)
+        asked = self._relay_check.run(self.gateway, to, self.hops, answered_s, patience)
         if shows_way_back or self.proven(patience):
             return
         fresh_periods = self._medium.place_periods

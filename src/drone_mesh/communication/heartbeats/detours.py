@@ -84,13 +84,17 @@ class Swallowing:
             self._through = next_hop
             self.another_next_hop(hops)
 
-    def must_ask(self, now_s: float) -> bool:
+    def must_ask(self, now_s: float, patience: float) -> bool:
         """Whether to ask the gateway in this check: sooner after a question without answer.
 
         Checks follow each other faster while the surroundings change.
         """
-        wait_s = self._wait_s if self._unanswered else self._ask_period_s
+        wait_s = self._answered_within_s(patience) if self._unanswered else self._ask_period_s
         return now_s - self._asked_s >= wait_s
+
+    def _answered_within_s(self, patience: float) -> float:
+        """On a busy channel heartbeats overtake questions, which wait in the queues of relays."""
+        return self._wait_s * (1.0 + patience)
 
     def wants_heartbeat(self, hops: int) -> bool:
         """Whether to show the gateway the way back before the next question.
@@ -99,12 +103,13 @@ class Swallowing:
         """
         return self._unanswered > 0 and not self.noticed(hops)
 
-    def is_over(self, now_s: float, heartbeat_s: float) -> bool:
+    def is_over(self, now_s: float, heartbeat_s: float, patience: float) -> bool:
         """Whether the time for an answer is over and it has answered this node's heartbeat since.
 
         Its answers to nodes behind this one may come another way.
         """
-        return now_s - self._asked_s >= self._wait_s and heartbeat_s >= self._asked_s
+        waited_s = now_s - self._asked_s
+        return waited_s >= self._answered_within_s(patience) and heartbeat_s >= self._asked_s
 
     def asked(self, now_s: float) -> None:
         """The gateway was asked for its place."""
@@ -159,17 +164,19 @@ class RelayCheck:
         self.swallowing = Swallowing(self._check_period_s)
         self._detour = NO_ROUTE
 
-    def run(self, gateway: int, next_hop: int, hops: int, heartbeat_s: float) -> bool:
+    def run(
+        self, gateway: int, next_hop: int, hops: int, heartbeat_s: float, patience: float
+    ) -> bool:
         """Check the route to `gateway`; returns whether the gateway was asked for its place.
 
         `heartbeat_s`: when it last answered a heartbeat of this node. If it answers only those,
-        later ones go through another neighbour.
+        later ones go through another neighbour. `patience`: of the antenna, in check periods.
         """
         now_s = self._deadlines.now_s
         if not self._is_needed or next_hop in (gateway, NO_ROUTE):
             return False
         self.swallowing.through(next_hop, hops)
-        if self.swallowing.noticed(hops) and self.swallowing.is_over(now_s, heartbeat_s):
+        if self.swallowing.noticed(hops) and self.swallowing.is_over(now_s, heartbeat_s, patience):
             self._detours.avoid(next_hop, now_s + SWALLOWER_AVOIDED_S)
             _log.warning(
                 "node %d: gateway %d answers heartbeats through node %d, but no other packets",
@@ -185,7 +192,7 @@ class RelayCheck:
             else:
                 self.swallowing.another_next_hop(hops)
             return False
-        if not self.swallowing.must_ask(now_s):
+        if not self.swallowing.must_ask(now_s, patience):
             return False
         self.swallowing.asked(now_s)
         if not self._requests.ask(gateway):

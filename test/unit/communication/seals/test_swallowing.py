@@ -94,19 +94,29 @@ def check_of_node_8(now_s=100.0):
 
 
 @pytest.mark.parametrize(
-    ("now_s", "heartbeat_s"),
-    [(100.0, 89.0), (93.0, 91.0)],
-    ids=["heartbeats are not answered either", "the answer may be on its way"],
+    ("now_s", "heartbeat_s", "patience"),
+    [(100.0, 89.0, 0.0), (93.0, 91.0, 0.0), (121.0, 91.0, 2.5)],
+    ids=[
+        "heartbeats are not answered either",
+        "the answer may be on its way",
+        "on a busy channel, the question may wait in the queue of a relay",
+    ],
 )
-def test_a_relay_is_not_suspected_while(now_s, heartbeat_s):
+def test_a_relay_is_not_suspected_while(now_s, heartbeat_s, patience):
     check, _detours = check_of_node_8(now_s)
-    check.run(gateway=0, next_hop=1, hops=2, heartbeat_s=heartbeat_s)
+    check.run(0, next_hop=1, hops=2, heartbeat_s=heartbeat_s, patience=patience)
     assert check.take_detour() == NO_ROUTE
+
+
+def test_on_a_busy_channel_too_a_relay_is_suspected_in_the_end():
+    check, _detours = check_of_node_8(now_s=122.0)
+    check.run(0, next_hop=1, hops=2, heartbeat_s=91.0, patience=2.5)
+    assert check.take_detour() == 2
 
 
 def test_a_relay_is_not_suspected_for_questions_that_went_through_another_one(caplog):
     check, _detours = check_of_node_8()
-    check.run(gateway=0, next_hop=2, hops=2, heartbeat_s=91.0)
+    check.run(0, next_hop=2, hops=2, heartbeat_s=91.0, patience=0.0)
     assert (check.take_detour(), caplog.messages) == (NO_ROUTE, [])
 
 
@@ -144,7 +154,7 @@ def test_a_question_that_several_neighbours_did_not_take_is_left_out_once():
 
 def test_a_relay_that_swallowed_is_tried_again_after_ten_minutes():
     check, detours = check_of_node_8()
-    check.run(gateway=0, next_hop=1, hops=2, heartbeat_s=91.0)
+    check.run(0, next_hop=1, hops=2, heartbeat_s=91.0, patience=0.0)
     assert check.take_detour() == 2
     assert detours.avoids(1, 699.0)
     assert not detours.avoids(1, 701.0)
@@ -171,12 +181,12 @@ def test_nodes_farther_from_the_gateway_wait_longer():
 
 def test_a_gateway_that_answers_is_asked_three_times_less_often():
     swallowing = Swallowing(check_period_s=10.0)
-    assert swallowing.must_ask(0.0)
+    assert swallowing.must_ask(0.0, patience=0.0)
     swallowing.asked(0.0)
-    assert swallowing.must_ask(10.0)
+    assert swallowing.must_ask(10.0, patience=0.0)
     swallowing.answered()
-    assert not swallowing.must_ask(20.0)
-    assert swallowing.must_ask(30.0)
+    assert not swallowing.must_ask(20.0, patience=0.0)
+    assert swallowing.must_ask(30.0, patience=0.0)
 
 
 def test_an_order_goes_where_the_drones_proof_came_from_not_where_claims_in_its_name_come_from():
