@@ -15,7 +15,7 @@ import time
 import urllib.request
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Callable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any, Callable, Iterator, Mapping, Sequence
 
 from arducopter import SAFE, ArduCopter
 from copter_rig import ORIGIN, WORKER
@@ -57,6 +57,7 @@ class Fleet:
         pace: float,
         speed_m_s: float = 5.0,
         hovers_on: int | None = None,
+        flight_options: Sequence[str] = (),
     ) -> None:
         """Copters on the ground at `homes`; `hovers_on`: of this one no failsafe acts.
 
@@ -64,7 +65,7 @@ class Fleet:
         """
         self._homes = homes
         self._pace = pace
-        self._flight_options = (*FLIGHT_OPTIONS, "--speed", f"{speed_m_s:g}")
+        self._flight_options = (*FLIGHT_OPTIONS, "--speed", f"{speed_m_s:g}", *flight_options)
         self._stack = contextlib.ExitStack()
         self._folder = folder
         self._air, self._http = free_port(), free_port()
@@ -73,6 +74,7 @@ class Fleet:
         self.copters: dict[int, ArduCopter] = {}
         self.pilots: dict[int, PilotSide] = {}
         self.routers: dict[int, subprocess.Popen[bytes]] = {}
+        self.gateway: subprocess.Popen[bytes] | None = None
         self._log = (folder / "positions.csv").open("w")
         for node, home in homes.items():
             own = folder / f"copter{node}"
@@ -86,9 +88,10 @@ class Fleet:
             self.pilots[node] = PilotSide(copter.pilot_address, copter.system_id)
         for pilot in self.pilots.values():
             pilot.make_ready(READY_S / pace)
-        serving = ("--emulated-air-serve", str(self._air), "--port", str(self._http))
-        self._start("gateway", "raspberry.program:gateway", *serving, *NODE_OPTIONS)
-        self.until("the gateway answers", lambda: bool(self.ask("ready")))
+        far_away = ("--id", "250", "--latitude", "4000", "--longitude", "4000")
+        serving = ("--emulated-air-serve", str(self._air), "--port", str(free_port()))
+        self._start("air", "raspberry.program:gateway", *serving, *far_away, *NODE_OPTIONS)
+        self.start_gateway()
         for node in homes:
             self.start_router(node)
 
@@ -111,6 +114,23 @@ class Fleet:
     def now_s(self) -> float:
         """The clock of the copters and of the nodes' programs."""
         return time.monotonic() * self._pace
+
+    def start_gateway(self) -> None:
+        """The air is that of another program, so it may end and start again."""
+        joining = ("--emulated-air", str(self._air), "--port", str(self._http))
+
+        def answers() -> bool:
+            if self.gateway is None or self.gateway.poll() is not None:  # the air was not there yet
+                program = "raspberry.program:gateway"
+                self.gateway = self._start("gateway", program, *joining, *NODE_OPTIONS)
+            return bool(self.ask("ready"))
+
+        self.until("the gateway answers", answers)
+
+    def kill_gateway(self) -> None:
+        assert self.gateway is not None
+        self.gateway.kill()
+        self.gateway.wait()
 
     def start_router(self, node: int) -> None:
         self.routers[node] = self._start(
