@@ -242,11 +242,15 @@ class Neighbours:
     def passes(self, node: int, place: Location, heard_s: float) -> None:
         """Note that `node` was at `place`; while it flies, its announced goal counts, too.
 
-        It may have ended its flight there, and fallen silent.
+        It may have ended its flight there, and fallen silent. What others heard shortly before this
+        node saw it may be the goal of that flight, which they do not pass on as such.
         """
-        if heard_s - self._goals_s.get(node, -math.inf) > FLIGHT_S:
+        told_s, known = self._goals_s.get(node), self.places.get(node)
+        if told_s is None and known is not None and 0.0 < known.heard_s - heard_s < FLIGHT_S:
+            self._seen[node] = HeardPlace(place, heard_s)
+        elif told_s is None or heard_s - told_s > FLIGHT_S:
             self.set_place(node, place, heard_s)
-        elif node in self._goals_s and heard_s > self._goals_s[node]:
+        elif heard_s > told_s:
             self._seen[node] = HeardPlace(place, heard_s)
 
     def at_rest(self, node: int, place: Location, flies: bool) -> Location:

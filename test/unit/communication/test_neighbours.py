@@ -82,6 +82,21 @@ def test_what_it_says_itself_at_rest_counts_at_once(neighbours):
     assert neighbours.place_of(2).place == GOAL
 
 
+def test_what_others_heard_before_it_was_seen_counts_beside_that_as_it_may_be_its_goal(neighbours):
+    """They tell the place of a silent drone, and not whether that was where it flew to."""
+    neighbours.passes(2, ON_THE_WAY, 101.7)
+    neighbours.passes(2, GOAL, 100.9)
+    assert [heard.place for _node, heard in neighbours.taken()] == [ON_THE_WAY, GOAL]
+    neighbours.passes(2, ON_THE_WAY, 103.0)
+    assert [heard.place for _node, heard in neighbours.taken()] == [ON_THE_WAY]
+
+
+def test_what_others_heard_long_before_it_was_seen_elsewhere_does_not_count(neighbours):
+    neighbours.passes(2, ON_THE_WAY, 111.0)
+    neighbours.passes(2, GOAL, 100.9)
+    assert [heard.place for _node, heard in neighbours.taken()] == [ON_THE_WAY]
+
+
 @pytest.fixture
 def motion():
     return SeenMotion(range_m=9.0, asked_s=10.0)
