@@ -76,6 +76,7 @@ class GatewayConnection:
             self._node_id,
             is_needed,
             self._check_period_s,
+            self._medium.policy.one_loss_counts,
             self._deadlines,
             self._requests,
             self._detours,

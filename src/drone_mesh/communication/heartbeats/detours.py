@@ -62,6 +62,7 @@ class Detours:
 ASK_PERIODS = 3.0  # in check periods: one packet and its answer in half a minute
 WAIT_PERIODS = 0.9  # in check periods: a question that is younger may be answered yet
 LEAST_UNANSWERED = 2  # for a next hop chosen because another one swallowed packets
+LEAST_OF_QUEUED = 3  # where a loss says little: packets collide, and wait in queues of relays
 
 _log = logging.getLogger(__name__)
 
@@ -69,7 +70,9 @@ _log = logging.getLogger(__name__)
 class Swallowing:
     """Counts unanswered questions to one gateway."""
 
-    def __init__(self, check_period_s: float) -> None:
+    def __init__(self, check_period_s: float, one_loss_counts: bool = True) -> None:
+        """`one_loss_counts`: see Policy."""
+        self._least = LEAST_UNANSWERED if one_loss_counts else LEAST_OF_QUEUED
         self._ask_period_s = ASK_PERIODS * check_period_s
         self._wait_s = WAIT_PERIODS * check_period_s
         self._answers = False  # whether this gateway knows its place and answers at all
@@ -137,11 +140,11 @@ class Swallowing:
         Nodes with fewer hops come to this conclusion sooner. So the node next to the relay is the
         first to change its next hop, and the nodes behind it need not change theirs.
         """
-        return self._answers and self._unanswered >= max(LEAST_UNANSWERED, hops)
+        return self._answers and self._unanswered >= max(self._least, hops)
 
     def another_next_hop(self, hops: int) -> None:
         """The next hop has changed: suspect it after fewer unanswered requests than usual."""
-        self._unanswered = min(self._unanswered, max(0, hops - LEAST_UNANSWERED))
+        self._unanswered = min(self._unanswered, max(0, hops - self._least))
 
     def give_up(self) -> None:
         """Stop suspecting: there is another gateway, or it is silent through every next hop."""
@@ -156,12 +159,13 @@ class RelayCheck:
     _node_id: int
     _is_needed: bool  # the mesh has a key, and its technique takes shortcuts
     _check_period_s: float
+    _one_loss_counts: bool
     _deadlines: Deadlines
     _requests: PlaceRequests
     _detours: Detours
 
     def __post_init__(self) -> None:
-        self.swallowing = Swallowing(self._check_period_s)
+        self.swallowing = Swallowing(self._check_period_s, self._one_loss_counts)
         self._detour = NO_ROUTE
 
     def run(

@@ -85,7 +85,7 @@ def check_of_node_8(now_s=100.0):
     clock = Deadlines()
     clock.now_s = now_s
     requests = SimpleNamespace(ask=lambda _gateway: True)
-    check = RelayCheck(8, True, MeshTiming().check_period_s, clock, requests, detours)
+    check = RelayCheck(8, True, MeshTiming().check_period_s, True, clock, requests, detours)
     check.swallowing.answered()
     check.swallowing.through(1, hops=2)
     for at_s in (80.0, 90.0):
@@ -177,6 +177,14 @@ def test_nodes_farther_from_the_gateway_wait_longer():
     assert not far.noticed(hops=3)
     far.asked(30.0)
     assert far.noticed(hops=3)
+
+
+def test_where_a_loss_says_little_three_questions_are_asked_before_a_relay_is_suspected():
+    swallowing = Swallowing(10.0, one_loss_counts=False)
+    swallowing.answered()
+    for at_s, is_noticed in ((10.0, False), (20.0, False), (30.0, True)):
+        swallowing.asked(at_s)
+        assert swallowing.noticed(hops=2) is is_noticed
 
 
 def test_a_gateway_that_answers_is_asked_three_times_less_often():
