@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from proofs import attacks, claims, damage
 
+from drone_mesh.channel.access_rules import AccessRules
 from drone_mesh.communication.beacon.connection import AGAIN_S, PERIOD_S
 from drone_mesh.communication.beacon.disputes import REMEMBERED_S
 from drone_mesh.communication.beacon.routes import STALE
@@ -57,7 +58,10 @@ SENTENCES = [
     f"(one of the {WORDS[end_to_end.EXPIRED]} before the last {WORDS[end_to_end.NONCES]})",
     f"in the {message_seal.ACK_TAG_BYTES} bytes that are left",
     f"every {WORDS[int(detours.ASK_PERIODS)]} check periods",
-    f"(at least {WORDS[detours.LEAST_UNANSWERED]}) bring no answer",
+    f"(at least {WORDS[detours.LEAST_UNANSWERED]}, on a shared channel "
+    f"{WORDS[detours.LEAST_OF_QUEUED]}) bring no answer",
+    f"the last {WORDS[detours.LEAST_UNANSWERED]} ({WORDS[detours.LEAST_OF_QUEUED]}) by this relay",
+    f"On a busy channel it waits up to {1 + AccessRules.for_cycle(0.0).most_patience:g} times as long",
     f"that next hop for {'ten' if detours.SWALLOWER_AVOIDED_S == 600 else '?'} minutes",
     f"brings no answer for {'a minute' if detours.AVOIDED_S == 60 else '?'}",
     f"one stranger next to the gateway of {damage.NODES} nodes, {damage.SPACING_M:g} m apart",
