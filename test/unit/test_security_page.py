@@ -61,7 +61,7 @@ SENTENCES = [
     f"(at least {WORDS[detours.LEAST_UNANSWERED]}, on a shared channel "
     f"{WORDS[detours.LEAST_OF_QUEUED]}) bring no answer",
     f"the last {WORDS[detours.LEAST_UNANSWERED]} ({WORDS[detours.LEAST_OF_QUEUED]}) by this relay",
-    f"On a busy channel it waits up to {1 + AccessRules.for_cycle(0.0).most_patience:g} times as long",
+    f"it waits up to {1 + AccessRules.for_cycle(0.0).most_patience:g} times as long",
     f"that next hop for {'ten' if detours.SWALLOWER_AVOIDED_S == 600 else '?'} minutes",
     f"brings no answer for {'a minute' if detours.AVOIDED_S == 60 else '?'}",
     f"one stranger next to the gateway of {damage.NODES} nodes, {damage.SPACING_M:g} m apart",
