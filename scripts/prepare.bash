@@ -173,20 +173,25 @@ prepare_physics() {
 
 can_compile() { "$venv/bin/python" -c 'import sys; exit(sys.version_info < (3, 10))'; }
 
-# prepare_compiler: mypyc, in a folder of its own, because the checks need an older mypy.
-prepare_compiler() {
+# prepare_mypyc: a mypy that compiles, in a folder of its own, because .venv has one for Python 3.8.
+prepare_mypyc() {
   local at="$root/build/compiled/mypyc"
+  cmp -s "$root/requirements/compile.txt" "$at/.installed" && return
+  say "installing mypyc into build/compiled"
+  "$venv/bin/python" -m pip install --disable-pip-version-check --no-input --progress-bar off --upgrade \
+    "${pip_options[@]}" --target "$at" -r "$root/requirements/compile.txt" </dev/null || fail "pip could not install mypyc"
+  cp "$root/requirements/compile.txt" "$at/.installed"
+}
+
+# prepare_compiler: what compiles the core.
+prepare_compiler() {
   make_venv
   pip_install requirements/base.txt
   can_compile || fail "mypyc needs Python 3.10"
   local headers
   headers=$("$venv/bin/python" -c 'import sysconfig; print(sysconfig.get_paths()["include"])') || exit
   if [ ! -e "$headers/Python.h" ] || ! command -v cc >/dev/null; then apt_install g++ python3-dev; fi
-  cmp -s "$root/requirements/compile.txt" "$at/.installed" && return
-  say "installing mypyc into build/compiled"
-  "$venv/bin/python" -m pip install --disable-pip-version-check --no-input --progress-bar off --upgrade \
-    "${pip_options[@]}" --target "$at" -r "$root/requirements/compile.txt" </dev/null || fail "pip could not install mypyc"
-  cp "$root/requirements/compile.txt" "$at/.installed"
+  prepare_mypyc
 }
 
 # compiler ARGUMENTS...: Python with mypyc, so that setup.py compiles.
@@ -233,6 +238,7 @@ prepare_checks() {
   prepare_unit_tests
   "$venv/bin/python" "$root/scripts/message_stubs"
   pip_install requirements/checks.txt
+  ! can_compile || prepare_mypyc
   npm_install
 }
 

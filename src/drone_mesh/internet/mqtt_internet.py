@@ -243,7 +243,7 @@ class MqttInternet(IInternetConnection):
             self._say(node, {"state": "refused", "reason": reason})
             self._acknowledge(message)
             return
-        sending = self._users.send(destination.to, message.payload, destination.port)
+        sending = self._users.send(destination.to, bytes(message.payload), destination.port)
 
         def ended(over: Future[Ticket]) -> None:
             try:
@@ -340,7 +340,7 @@ def _offline(node: int) -> str:
     return json.dumps({"online": False, "node": node, "gateway": True})
 
 
-def _is_online(state: bytes, by: int) -> bool:
+def _is_online(state: bytes | bytearray, by: int) -> bool:
     """Whether a state that this gateway may have published says that a router is online."""
     try:
         said = json.loads(state)

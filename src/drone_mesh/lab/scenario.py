@@ -151,7 +151,7 @@ class MotionSettings(PartOfKind):
     @field_validator("speed_m_s", mode="before")
     @classmethod
     def _is_one_speed_or_two(cls, value: object) -> object:
-        speeds = value if isinstance(value, list) and len(value) == 2 else [value]
+        speeds: List[Any] = value if isinstance(value, list) and len(value) == 2 else [value]
         if not all(is_number(speed) and 0 < speed <= 1e6 for speed in speeds):
             raise ValueError("give one speed above 0, or two in a list, the lower first, in m/s")
         return value

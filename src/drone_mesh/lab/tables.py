@@ -184,7 +184,7 @@ def paired_table(results: Results) -> Table | None:
     if compare is None:
         return None
     found = []
-    spread: dict[tuple[int, str], float] = {}  # of the control, by its cell and metric
+    spread: dict[tuple[int | None, str], float] = {}  # of the control, by its cell and metric
     baseline = as_text(compare.baseline)
     cells = [cell.texts for cell in results.loaded.cells]
     for index, texts in enumerate(cells):
