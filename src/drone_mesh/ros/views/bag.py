@@ -11,9 +11,8 @@ import itertools
 import math
 import sys
 from pathlib import Path
-from typing import Any, Callable, Iterable, Iterator, Sequence, TypeVar
+from typing import TYPE_CHECKING, Any, Callable, Iterable, Iterator, Sequence, TypeVar
 
-import rosbag
 import rospy
 
 from drone_mesh.console.dots import RecordedDots, make_dots
@@ -30,6 +29,9 @@ from drone_mesh.ros.graph.conversions import (
     state_msg,
 )
 from drone_mesh.state.model import EventRecord, MeshStatus
+
+if TYPE_CHECKING:
+    import rosbag  # otherwise only for who reads one: it loads ciphers and compression
 
 RECORDER = "'roslaunch drone_mesh record.launch'"
 EARLIEST_S = 1e-3  # a bag refuses a message with time 0
@@ -173,6 +175,8 @@ class RecordedMesh:
 
 def write_bag(path: Path, states: Iterable[MeshStatus], events: Iterable[EventRecord]) -> None:
     """Write a bag like record.launch's; states and events in any order. Raises BagUnusable."""
+    import rosbag
+
     try:
         with rosbag.Bag(str(path), "w") as bag:
             for status in states:
@@ -202,6 +206,8 @@ def _dots(message: Any, at_s: float) -> RecordedDots:
 
 def _open_bag(path: Path) -> rosbag.Bag:
     """The bag, with the indexes of the chunks whose index can be read. Raises BagUnusable."""
+    import rosbag
+
     try:
         try:
             return rosbag.Bag(str(path))
