@@ -13,6 +13,7 @@ from drone_mesh.drone.location import Location
 from drone_mesh.inprocess import Network
 from drone_mesh.lab.network_sample import gateways_of, physical_graph
 
+_FLIGHTS = (MeshEventKind.FLIGHT_DECIDED, MeshEventKind.FLIGHT_ORDERED)
 EVENTS_BACK = 20  # when a flight starts, its event is among this many latest ones
 
 
@@ -47,6 +48,8 @@ class Flights:
         self.legs: list[Leg] = []
         self._network = network
         self._current: dict[int, Leg] = {}
+        self._ordered: dict[int, bool] = {}  # whether a drone's latest flight is by order
+        self._events_read = 0
         self._may_fly_m: dict[int, float] = {}
         self._on_empty: Callable[[int], None] = lambda node: None
         for node_id, node in network.nodes.items():
@@ -83,9 +86,15 @@ class Flights:
         self._plan_end_of_battery(leg)
 
     def look(self) -> None:
-        """Note what those in the air could know by now of the drones on their way."""
+        """Note what those on a repair flight could know by now of the drones on their way."""
+        events = self._network.events
+        for event in events[self._events_read :]:
+            if event.kind in _FLIGHTS:
+                self._ordered[event.node] = event.kind is MeshEventKind.FLIGHT_ORDERED
+        self._events_read = len(events)
         for node in self.in_the_air:
-            self._note_known(self._current[node])
+            if not self._ordered.get(node):
+                self._note_known(self._current[node])
 
     def _note_known(self, leg: Leg) -> None:
         """Note who is nearer to the rest of its way than the clearance, and could be known."""

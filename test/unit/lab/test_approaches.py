@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import pytest
 
 from drone_mesh.air.graph import Graph
-from drone_mesh.communication.events.observer import MeshEventKind
+from drone_mesh.communication.events.observer import MeshEvent, MeshEventKind
 from drone_mesh.drone.flight_path import FlightPath
 from drone_mesh.drone.location import Location
 from drone_mesh.inprocess import Network
@@ -133,6 +133,14 @@ def test_harm_to_a_drone_is_avoidable_if_it_was_known(goal, is_known):
     assert (harm(run), avoidable_harm(run)) == (True, is_known)
 
 
+def test_only_who_was_known_on_a_flight_of_a_repair_could_have_been_avoided():
+    ordered, repair = flight(1, (0, 0, 5), (10, 0, 0)), flight(1, (10, 0, 0), (20, 0, 0), 60.0)
+    ordered.warned_of.add(2)
+    run = record({1: (0, 0, 5), 2: (20, 0.9, 0)}, ordered, repair)
+    run.events[0] = EventRecord(0.0, 1, ORDERED)
+    assert (harm(run), avoidable_harm(run)) == (True, False)
+
+
 def test_drones_that_no_flight_brought_together_are_harm_that_somebody_could_avoid():
     run = record({1: (0, 0, 0), 2: (0.5, 0, 0)})
     assert harm(run)
@@ -213,10 +221,13 @@ def test_nobody_warns_who_has_no_link_or_is_dead_or_was_told_another_place(case)
     assert 4 not in leg_of_1(**case)[1].legs[-1].warned_of
 
 
-def test_a_flight_is_warned_when_it_comes_into_reach_of_one_that_knows():
+@pytest.mark.parametrize("kind", [MeshEventKind.FLIGHT_DECIDED, MeshEventKind.FLIGHT_ORDERED])
+def test_a_repair_flight_is_warned_when_it_comes_into_reach_of_one_that_knows(kind):
     network, flights = leg_of_1(3)
+    network.events.append(MeshEvent(kind, 1, network.now_s()))
     network.nodes[3].drone.speed_m_s = 100.0
     network.nodes[3].drone.fly_to(Location.from_vector((15.0, 6.0, 0.0)))
     network.run_for(1.0)
     flights.look()
-    assert 4 in flights.legs[0].warned_of
+    is_repair = kind is MeshEventKind.FLIGHT_DECIDED
+    assert (4 in flights.legs[0].warned_of) == is_repair

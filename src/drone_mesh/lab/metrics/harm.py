@@ -138,7 +138,12 @@ def harm(run: RunRecord) -> float:
     "places that a live node knew whom the drone could ask: itself, or one to which links led",
 )
 def avoidable_harm(run: RunRecord) -> float:
-    warned = {frozenset((leg.node, other)) for leg in run.legs for other in leg.warned_of}
+    warned = {
+        frozenset((leg.node, other))
+        for leg in run.legs
+        if leg.warned_of and _is_repair(run, leg)
+        for other in leg.warned_of
+    }
     close, resting = set(), set(_resting_close(run))
     if (warned or resting) and run.scenario.mobility.kind == "none":
         close = {frozenset(it[:2]) for it in approaches(run, TOO_CLOSE_M) if not it.in_the_air}
