@@ -231,15 +231,16 @@ class BeaconPlane(IControlPlane):
     def _plan(self) -> None:
         """Schedule the next call of `on_due`."""
         routes = self._routes
-        due_s = [self._trickle.due_s, routes.first_end_s() + 1e-3, self._proofs.next_s]
+        due_s = min(self._trickle.due_s, self._proofs.next_s)
+        due_s = min(due_s, routes.first_end_s() + 1e-3)
         parent = routes.neighbours.get(routes.parent)
         if parent is not None:
-            due_s.append(self._watch.due_s(parent))
+            due_s = min(due_s, self._watch.due_s(parent))
         if self._courier.holds:
-            due_s.append(self._verdicts.retry_s)
+            due_s = min(due_s, self._verdicts.retry_s)
         if self._connection is not None:
-            due_s.append(self._connection.due_s)
-        self._deadlines.set(Due.ROUTING, max(min(due_s), routes.now_s))
+            due_s = min(due_s, self._connection.due_s)
+        self._deadlines.set(Due.ROUTING, max(due_s, routes.now_s))
 
     # Beacons ---------------------------------------------------------------------------------
 

@@ -28,10 +28,6 @@ from drone_mesh.communication.neighbours import HeardPlace
 from drone_mesh.communication.timing import Deadlines
 from drone_mesh.drone.location import Location
 
-_WAY_UP = itemgetter(
-    *map(Beacon._fields.index, ("gateway", "hops", "parent", "ancestors", "offline"))
-)
-
 DUE: Final = 1.2  # intervals, with their jitter: until then a neighbour's next beacon is not late
 BACK: Final = 2  # sequence numbers: a new neighbour further behind the others may lead nowhere
 PROVEN_S: Final = 12.0  # a router is connected for so long after its parent has heard it
@@ -173,7 +169,11 @@ class BeaconRoutes(IRoutes):
             return True
         before = neighbour.beacon
         return (
-            _WAY_UP(beacon) != _WAY_UP(before)
+            beacon.gateway != before.gateway
+            or beacon.hops != before.hops
+            or beacon.parent != before.parent
+            or beacon.ancestors != before.ancestors
+            or beacon.offline != before.offline
             or beacon.interval_s < before.interval_s
             or (beacon.parent == self._node_id and bool(beacon.below.new))
         )
