@@ -26,7 +26,8 @@ class Disputes:
     def compare(self, one: Neighbour, other: Neighbour, settles_s: float, now_s: float) -> None:
         """Note what both children list; a move is known everywhere after `settles_s`."""
         for node in one.announced_s.keys() & other.announced_s.keys():
-            had, has = sorted((one, other), key=lambda child: child.announced_s[node])
+            is_first = one.announced_s[node] <= other.announced_s[node]
+            had, has = (one, other) if is_first else (other, one)
             began_s = self._began_s.get((has.node, node), -math.inf)
             if began_s < had.announced_s[node]:
                 self._began_s[has.node, node] = now_s

@@ -231,7 +231,8 @@ class OwnBeacons:
         room, turn = beacon.room_below(self.room), self._sent % 2 == 0
         if room < 0 or (is_sealed and turn and room < len(below.ids())):
             beacon = beacon._replace(motion=None)
-        announced = below.to_announce(beacon.room_below(self.room))
+            room = beacon.room_below(self.room)
+        announced = below.to_announce(room)
         near = below.to_show(beacon.room_near(self.room, announced))
         beacon = beacon._replace(below=announced, near=near)
         if beacon.motion is not None:

@@ -281,8 +281,9 @@ def _place(units: list[int], here: Location) -> Location:
 
 
 def _nearest(unit: int, near_m: float) -> float:
-    off = (unit - round(near_m / _PLACE_M) + _WRAP // 2) % _WRAP - _WRAP // 2
-    return (round(near_m / _PLACE_M) + off) * _PLACE_M
+    near = round(near_m / _PLACE_M)
+    off = (unit - near + _WRAP // 2) % _WRAP - _WRAP // 2
+    return (near + off) * _PLACE_M
 
 
 def _speed_code(speed_m_s: float) -> int:
