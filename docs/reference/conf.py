@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import builtins
 import re
+import sys
 from pathlib import Path
 from xml.etree import ElementTree
+
+from sphinx.addnodes import pending_xref
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -77,5 +81,15 @@ def lines_kept(paragraph: str) -> str:
     return "\n".join(f"| {line}" for line in lines)
 
 
+def without_names_of_others(app: object, doctree: object) -> None:
+    """`int` and the like are no links: Sphinx would look for each of ten thousand in all names."""
+    others = {*dir(builtins), *sys.modules} - {"drone_mesh"}
+    for reference in list(doctree.findall(pending_xref)):  # type: ignore[attr-defined]
+        first = reference["reftarget"].partition(".")[0]
+        if reference.get("refdomain") == "py" and first in others:
+            reference.replace_self(reference.children)
+
+
 def setup(app: object) -> None:
     app.connect("autodoc-process-docstring", plain_text)  # type: ignore[attr-defined]
+    app.connect("doctree-read", without_names_of_others)  # type: ignore[attr-defined]
