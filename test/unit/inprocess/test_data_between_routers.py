@@ -179,3 +179,42 @@ def test_a_router_that_its_neighbours_think_elsewhere_is_reached_all_the_same():
     ticket = network.send(20, 24, b"hello")
     network.run_for(5.0)
     assert str(ticket) == "message 1 to node 24: delivered"
+
+
+def arrives(network, from_, to):
+    """Whether a message arrives that is sent once."""
+    network.send(from_, to, b"once", PORT, reliable=False)
+    network.run_for(4.0)
+    return [message.payload for message in network.received.get(to, [])] == [b"once"]
+
+
+@pytest.mark.parametrize("radio", ["disc", "shared"])
+def test_what_a_relay_cannot_pass_down_goes_back_to_the_gateway_which_searches_for_its_node(radio):
+    network = scenarios.line(4, seed=1, radio=radio)
+    network.run_for(60.0)
+    for relay, child in ((1, 2), (2, 3)):
+        routes = network.nodes[relay].component.control.routes
+        routes.other_cant_communicate_with_node(child, 4)
+    assert arrives(network, 0, 4)
+    assert network.nodes[0].component.get_direction_to(4) == 1
+
+
+@pytest.mark.parametrize("radio", ["disc", "shared"])
+def test_what_would_circulate_takes_another_way_and_each_node_of_the_loop_learns(radio):
+    places = [(0.0, 0.0), (6.0, 0.0), (12.0, 0.0), (12.0, 6.0), (6.0, 6.0), (-6.0, 0.0)]
+    network = placed(places, seed=1, radio=radio)
+    network.run_for(60.0)
+    loop = {2: 3, 3: 4, 4: 2}
+    for node, next_hop in loop.items():
+        routes = network.nodes[node].component.control.routes
+        for child in routes.get_set_of_children():
+            routes.other_cant_communicate_with_node(child, 5)
+        routes.other_can_communicate_with_node(next_hop, 5)
+    assert arrives(network, 2, 5)
+    assert any(network.nodes[a].component.get_direction_to(5) != b for a, b in loop.items())
+
+
+@pytest.mark.parametrize("radio", ["disc", "shared"])
+def test_a_gateway_keeps_what_is_sent_once_until_its_search_has_found_the_node(radio):
+    network = between_two_gateways(radio=radio)
+    assert arrives(network, 2, 6)

@@ -135,12 +135,12 @@ def ring():
 def test_a_packet_that_would_circulate_is_stopped_where_it_comes_round():
     network = ring()
     watch = AirWatch(network)
-    network.inject(1, bytes((4, 4, 0x80, 1, 9)).ljust(32, b"\0"))
+    network.inject(1, bytes((4, 4, 0x41, 1, 9)).ljust(32, b"\0"))
     network.run_for(0.5)
-    assert watch.sent_on(0x80) == [(1, 2), (2, 3), (3, 1)]
-    network.inject(1, bytes((4, 4, 0x80, 1, 9)).ljust(32, b"\0"))
+    assert watch.sent_on(0x41) == [(1, 2), (2, 3), (3, 1)]
+    network.inject(1, bytes((4, 4, 0x41, 1, 9)).ljust(32, b"\0"))
     network.run_for(0.5)
-    assert len(watch.sent_on(0x80)) == 3  # 1 has forgotten the entry
+    assert len(watch.sent_on(0x41)) == 3  # 1 has forgotten the entry
 
 
 def test_a_packet_that_comes_back_to_its_creator_is_stopped_there():

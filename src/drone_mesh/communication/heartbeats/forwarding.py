@@ -11,6 +11,7 @@ from drone_mesh.communication.heartbeats.delivery import (
     CirculationGuard,
     Delivery,
     IWayFinder,
+    Passage,
     came_round,
 )
 from drone_mesh.communication.interfaces import NO_ROUTE
@@ -22,6 +23,9 @@ from drone_mesh.communication.wire.packet_types import MessageType
 _HEARTBEAT = int(MessageType.HEARTBEAT)
 _BID = int(MessageType.MOVEMENT_NEGOTIATION)
 CREATORS_TOLD = 8  # MISSING to one creator of users' data, per limits.LIMIT_PERIOD_S
+MOST_TURNS = 3  # of one packet of users' data in one node, on which it comes back
+MOST_HELD = 64  # packets that wait in a gateway for the end of a search
+HELD_S = 4.0  # a search passes through 100 nodes within half a second; its answer may get lost
 
 
 @dataclass(eq=False)
@@ -41,6 +45,8 @@ class Forwarding:
         self._told = RateLimit(CREATORS_TOLD)
         self._circulates_s = self._medium.stretched(CIRCULATION_S)
         self._circulation = CirculationGuard(self._circulates_s)
+        self._held: list[tuple[float, bytes]] = []  # until when, packet: the oldest first
+        self._held_s = self._medium.stretched(HELD_S)
 
     def forward(
         self, payload: bytes, creator: int, from_: int, kind: int, forward: int, now_s: float
@@ -56,7 +62,7 @@ class Forwarding:
             self._flood(payload, routing.directions(forward, from_, creator), now_s)
             return
         if creator == self._node_id:
-            self._own_came_back(payload, now_s)
+            self._own_came_back(payload, from_, now_s)
             return
         identity: Hashable
         hops: int | None
@@ -69,7 +75,8 @@ class Forwarding:
         if first is not None:
             went_to = came_round(first, creator, from_, hops)
             if went_to is not None:
-                self._drop_circulating(payload, went_to, now_s)
+                if not self._another_way(payload, first, from_, now_s):
+                    self._drop_circulating(payload, went_to, now_s)
                 return
         lost = NO_ROUTE
         for _attempt in (1, 2):
@@ -79,9 +86,10 @@ class Forwarding:
                 hop = self._hop_of_data(forward, from_, creator, is_listed=to == from_)
                 if hop != NO_ROUTE:
                     to = hop
-                elif self._ways.seek(forward):
-                    if self._told.count(creator, now_s):
-                        self._send_missing(creator, forward)
+                elif self._seeks(payload, now_s):
+                    return
+                elif first is None:  # who took this node for the way learns that it is none
+                    self._pass_on(payload, from_, from_, now_s)
                     return
             if to in (NO_ROUTE, from_):
                 self.stranded(payload, now_s)
@@ -114,14 +122,71 @@ class Forwarding:
         up = self._ways.way_up(NO_ROUTE)
         return NO_ROUTE if up == from_ else up
 
-    def _own_came_back(self, payload: bytes, now_s: float) -> None:
-        """Drop a packet of this node that came back; one sent just now shows a loop.
+    def _another_way(self, payload: bytes, first: Passage | None, from_: int, now_s: float) -> bool:
+        """Users' data has come back from `from_`: the way that it took is wrong.
+
+        It takes another one. Without one it goes back to the neighbour that took this node for the
+        way, and then to the one that it first came from. So each node on a wrong way learns that,
+        as in a depth-first search. False: it ends here.
+        """
+        if first is None or not messages.is_data(payload) or first[3] >= MOST_TURNS:
+            return False
+        creator, _from, _kind, _to, forward = messages.header(payload)
+        came_from, went_to, _at_s, turns = first
+        self._routing.circulated(forward, went_to)
+        directions = self._routing.directions(forward, came_from, creator)
+        to = directions[0] if directions else NO_ROUTE
+        if to in (NO_ROUTE, came_from, from_, went_to):
+            to = self._hop_of_data(forward, came_from, creator, is_listed=to == came_from)
+        if to in (NO_ROUTE, came_from, from_, went_to):
+            if self._seeks(payload, now_s):
+                return True
+            to = from_ if turns == 0 and from_ != went_to else came_from
+        return to != self._node_id and self._pass_on(payload, came_from, to, now_s, turns + 1)
+
+    def _pass_on(
+        self, payload: bytes, came_from: int, to: int, now_s: float, turns: int = 0
+    ) -> bool:
+        """Send users' data to a neighbour. False: it did not take it."""
+        forwarded = messages.next_hop(payload, self._node_id, to)
+        if forwarded is None or not self._delivery.send(forwarded, to, 0, came_from):
+            return False
+        self._circulation.passed(messages.identity(payload), came_from, to, now_s, turns)
+        return True
+
+    def _seeks(self, payload: bytes, now_s: float) -> bool:
+        """A gateway searches for the addressee of users' data; the packet waits for the answer."""
+        creator, _from, _kind, _to, forward = messages.header(payload)
+        if not self._ways.seek(forward):
+            return False
+        self._held = [held for held in self._held if held[0] > now_s][1 - MOST_HELD :]
+        self._held.append((now_s + self._held_s, payload))
+        if self._told.count(creator, now_s):
+            self._send_missing(creator, forward)
+        return True
+
+    def found(self, node: int, now_s: float) -> None:
+        """There is a route to a node: send on what waits for it."""
+        if not self._held:
+            return
+        waiting = [held for held in self._held if messages.addressee(held[1]) == node]
+        self._held = [held for held in self._held if held not in waiting]
+        for until_s, payload in waiting:
+            to = self._routing.get_direction_to_node(node)
+            if now_s < until_s and to != NO_ROUTE:
+                self._pass_on(payload, messages.sender(payload), to, now_s)
+
+    def _own_came_back(self, payload: bytes, from_: int, now_s: float) -> None:
+        """A packet of this node came back: users' data takes another way; if sent just now, a loop.
 
         A bid may be one that a neighbour passes on in this node's name, perhaps through it.
         """
         sent = self._delivery.own_passage(payload)
         if sent is not None:
             _from, went_to, sent_s, _hops = sent
+            own = self._circulation.first_passage(messages.identity(payload), now_s)
+            if self._another_way(payload, own or (self._node_id, went_to, sent_s, 0), from_, now_s):
+                return
             if now_s - sent_s < self._circulates_s:
                 self._drop_circulating(payload, went_to, now_s)
         elif self._delivery.remembers_all() and payload[messages.TYPE_AT] != _BID:
@@ -141,6 +206,12 @@ class Forwarding:
         self._complaints.counts["dropped a packet that circulates"] += 1
         self._routing.circulated(forward, used)
         self.stranded(payload, now_s)
+
+    def not_taken(self, payload: bytes, now_s: float) -> None:
+        """The next hop did not take a queued packet, and there is no detour."""
+        first = self._circulation.first_passage(messages.identity(payload), now_s)
+        if not self._another_way(payload, first, messages.receiver(payload), now_s):
+            self.stranded(payload, now_s)
 
     def stranded(self, payload: bytes, now_s: float) -> None:
         """A packet has no next hop. Report an order, also to the gateway that sent it."""

@@ -57,6 +57,7 @@ class GatewayHeartbeats(HeartbeatPlane):
         _know_gateway, preferred_gateway, hops = messages.heartbeat_body(payload)
         self._host.on_node_heard(creator, hops + 1)
         self._search.found(creator)
+        self._forwarding.found(creator, self._deadlines.now_s)
         if self._connection is not self._own and preferred_gateway != self._node_id:
             super().on_heartbeat(payload, creator, from_)
         elif creator != preferred_gateway:  # gateways do not answer each other

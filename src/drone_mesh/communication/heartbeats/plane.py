@@ -277,7 +277,7 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         if (creator, forward) == (self._node_id, self.gateway) and messages.asks_for_place(payload):
             self._connection.swallowing.not_taken()
         if not self._delivery.undelivered(payload, tries):
-            self._forwarding.stranded(payload, self._deadlines.now_s)
+            self._forwarding.not_taken(payload, self._deadlines.now_s)
 
     def search(self, node: int) -> bool:
         return self._search.search(node)

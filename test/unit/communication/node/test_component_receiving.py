@@ -303,19 +303,19 @@ def test_what_comes_back_to_a_restarted_node_is_no_forgery():
 def test_a_direct_neighbour_is_never_forgotten_for_a_packet_that_goes_round():
     rig = Rig()
     rig.know_neighbour(9)
-    rig.hear("01 02 80 01 09")
-    rig.hear("05 02 80 01 09", "05 03 80 01 09")
-    assert rig.sent() == [packet("05 01 80 09 09")]
+    rig.hear("01 02 41 01 09")
+    rig.hear("05 02 41 01 09", "05 03 41 01 09")
+    assert rig.sent() == [packet("05 01 41 09 09")]
     assert rig.routing.get_direction_to_node(9) == 9
 
 
 def test_the_same_packet_from_another_neighbour_is_dropped_and_its_entry_forgotten():
     rig = Rig()
     rig.hear("09 03 00 01 01")
-    rig.hear("05 02 80 01 09 2a")
+    rig.hear("05 02 41 01 09 2a")
     rig.wait(0.4)
-    rig.hear("05 04 80 01 09 2a")
-    assert rig.sent() == [packet("05 01 80 03 09 2a")]
+    rig.hear("05 04 41 01 09 2a")
+    assert rig.sent() == [packet("05 01 41 03 09 2a")]
     assert rig.routing.get_direction_to_node(9) == NO_ROUTE
     assert rig.routing.get_set_of_children() == {2, 3, 4}
 
@@ -366,8 +366,8 @@ def test_the_entry_that_is_forgotten_is_the_one_that_was_used_in_the_end():
     for child in (4, 6):
         rig.routing.other_can_communicate_with_node(child, 9)
     rig.antenna.dead = {3}
-    rig.hear("05 02 80 01 09", "05 07 80 01 09")
-    assert rig.sent(0x80) == [packet("05 01 80 04 09")]
+    rig.hear("05 02 41 01 09", "05 07 41 01 09")
+    assert rig.sent(0x41) == [packet("05 01 41 04 09")]
     assert rig.routing.get_direction_to_node(9) == 6
 
 
@@ -428,10 +428,13 @@ def test_data_for_an_unknown_node_goes_to_the_next_hop_to_the_gateway_and_nothin
     assert rig.sent(1) == []
 
 
-def test_data_that_comes_down_from_there_ends_here_and_the_next_hop_is_told():
+def test_data_that_comes_down_from_there_goes_back_once_so_that_the_next_hop_learns():
     rig = below_the_gateway()
     rig.hear("05 02 80 01 09 00 ab cd")
-    assert packet("01 01 05 02 02 09") in rig.sent()
+    assert rig.sent() == [packet("05 01 80 02 09 00 ab cd")]
+    rig.forget()
+    rig.hear("05 02 80 01 09 00 ab cd")
+    assert rig.sent(0x80) == []
 
 
 def test_a_neighbour_that_sends_data_for_a_node_behind_it_does_not_lead_there():
@@ -442,12 +445,14 @@ def test_a_neighbour_that_sends_data_for_a_node_behind_it_does_not_lead_there():
     assert rig.routing.get_direction_to_node(9) == NO_ROUTE
 
 
-def test_data_that_comes_round_ends_here():
+def test_data_that_comes_round_goes_back_on_its_way_to_where_it_came_from_first_and_ends():
     rig = below_the_gateway()
-    rig.hear(DATA_FOR_9)
-    rig.forget()
-    rig.hear("05 04 80 01 09 00 ab cd")
-    assert rig.sent(0x80) == []
+    came_from, back_to = [3, 4, 2, 2, 2], []
+    for neighbour in came_from:
+        rig.forget()
+        rig.hear(f"05 {neighbour:02x} 80 01 09 00 ab cd")
+        back_to.append([sent[3] for sent in rig.sent(0x80)])
+    assert back_to == [[2], [4], [3], [3], []]
 
 
 def test_if_the_hop_down_does_not_take_it_the_gateway_gets_it():
