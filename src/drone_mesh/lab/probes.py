@@ -68,6 +68,7 @@ class ProbeSender:
     def _send(self, what: tuple[str, list[float]]) -> None:
         kind, (*draw_sender, draw) = what
         network, graph = self._network, physical_graph(self._network)
+        reliable = self._probes.reliable
         senders = gateways_of(network)
         if draw_sender:
             nodes = sorted(graph.near)
@@ -82,13 +83,13 @@ class ProbeSender:
         self.sent.append(probe)
         with contextlib.suppress(MeshError):  # its queue is full, for example: the probe is lost
             if kind == "up":
-                network.send(node, TO_GATEWAY, payload, PORT, reliable=False)
+                network.send(node, TO_GATEWAY, payload, PORT, reliable)
                 return
             sender = next(one for one in senders if graph.hops_from([one]).get(node) == hops[node])
             if kind == "echo":
                 network.echo(sender, node, lambda answer: self._answered(probe, answer))
             else:
-                network.send(sender, node, payload, PORT, reliable=False)
+                network.send(sender, node, payload, PORT, reliable)
 
     def _answered(self, probe: ProbeFate, answer: EchoAnswer) -> None:
         probe.hops = answer.hops

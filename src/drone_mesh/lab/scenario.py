@@ -192,6 +192,7 @@ class Probes(Part):
     per_s: AtLeast0 = 0.0  # at random times; with a gateway so many of each kind: up, down, echo
     from_s: AtLeast0 = 20.0
     within_s: Above0 = 2.0  # later ones count as lost
+    reliable: bool = False  # messages that are sent again until they arrive
 
 
 class Positions(Part):

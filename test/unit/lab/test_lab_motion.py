@@ -82,6 +82,23 @@ def test_probes_between_any_two_nodes_arrive_at_rest_and_others_are_not_sent() -
     assert len({probe.node for probe in record.probes}) > 6
 
 
+def test_reliable_probes_are_sent_again_until_they_arrive() -> None:
+    """Radio 1 hears nothing for six seconds."""
+    shares = [
+        measure_all(
+            run(
+                layout={"kind": "line", "drones": 3, "spacing_m": 6},
+                mobility={"kind": "none"},
+                faults=[{"at_s": 20, "deaf": {"ids": [1], "for_s": 6}}],
+                probes={"per_s": 2, "from_s": 19, "within_s": 20, "reliable": reliable},
+                duration_s=60,
+            )
+        )["pdr_down"]
+        for reliable in (False, True)
+    ]
+    assert shares[0] < shares[1] == 1.0
+
+
 def test_probes_of_cut_off_drones_do_not_count() -> None:
     """Drones 2 to 4 lose their only relay; the others still get every message."""
     layout = {"kind": "line", "drones": 5, "spacing_m": 6}
