@@ -129,10 +129,9 @@ TABLE_HEAD = (
 def worst_place(name: str, threat: Threat) -> int:
     """The one of the PLACES from where an attack does most, with the first seed.
 
-    Recordings are made beside the gateway, and so are attacks without a key on a mesh that has one.
+    Recordings are made beside the gateway.
     """
-    is_placed = ATTACKS[name] in (*RECORDING, *PLACED)
-    if is_placed or threat in (Threat.NONE, Threat.WITH_KEY):
+    if threat is Threat.NONE or ATTACKS[name] in (*RECORDING, *PLACED):
         return 0
     harm = [trial(name, threat, 0, place) for place in range(len(PLACES))]
     return max(range(len(PLACES)), key=lambda place: (harm[place].cut_off, harm[place].lured))

@@ -140,7 +140,8 @@ def test_the_table_has_a_cell_for_each_case():
     [
         ("false gateway", Threat.WITHOUT_KEY, 3),
         ("black hole", Threat.CAPTURED, 3),
-        ("false gateway", Threat.WITH_KEY, 0),
+        ("false gateway", Threat.WITH_KEY, 3),
+        ("false gateway", Threat.NONE, 0),
         ("order replayed after 1 s", Threat.WITHOUT_KEY, 0),
         ("bids of 1e9", Threat.CAPTURED, 0),
     ],
