@@ -141,8 +141,8 @@ it costs only 2 bytes per message more
 
 figures of 2026-11-24 (the attacks by beacons but that of far places, and frames in
 neighbours' names: seeds 0 and 1, figures of 2026-11-26, those that list or hear all drones, false
-gateways, heartbeats of invented ids and packets in receivers' own names of 2026-11-27, forged orders, a
-counter far ahead and nonces of 2026-11-28)
+gateways, heartbeats of invented ids and packets in receivers' own names of 2026-11-27, forged
+orders, a counter far ahead and nonces of 2026-11-28)
 
 Of the 100 drones of the grid, all ordered at once on a channel of 250 kbit/s, some get no order
 
