@@ -41,8 +41,12 @@ class IInProcessAntenna(IWirelessCommunication):
         return self.powered
 
 
-class IInProcessAir(abc.ABC):
-    """A medium with its clock; pass one to Network as its radio."""
+class IInProcessAir:
+    """A medium with its clock; pass one to Network as its radio.
+
+    Experiments ask which one it is. It is no `abc.ABC`, as mypyc gives a hierarchy of those one
+    cache of such answers: what was asked first would hold for all.
+    """
 
     clock: Clock
     max_distance_m: float  # the range, for pictures and path searches

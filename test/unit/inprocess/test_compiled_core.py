@@ -35,6 +35,18 @@ for radio, routing in itertools.product(("disc", "shared"), ("beacon", "child_ta
     print(radio, routing, hashlib.sha256(repr(seen).encode()).hexdigest())
 """
 
+METRICS = """
+from drone_mesh.lab.metrics import measure_all
+from drone_mesh.lab.scenario import Scenario, Streams
+from drone_mesh.lab.simulation import Simulation
+
+for kind in ("disc", "shared"):
+    scenario = {"layout": {"drones": 6}, "radio": {"kind": kind}, "duration_s": 30.0}
+    scenario["probes"] = {"per_s": 1.0, "from_s": 10.0}
+    run = Simulation(Scenario.model_validate(scenario), Streams(0, 0)).run()
+    print(sorted(measure_all(run).items()))
+"""
+
 
 def start(core: str, package: Path, *command: str) -> subprocess.CompletedProcess[str]:
     environment = {**os.environ, compiled.WISH: core, "PYTHONPATH": str(package)}
@@ -51,6 +63,15 @@ def test_seeded_meshes_do_the_same_in_both_cores() -> None:
     assert python[0].startswith("Python")
     assert built == ["compiled", *python[1:]]
     assert len(built) == 5
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not compiled.build().is_dir(), reason="scripts/compile has not built it")
+def test_experiments_measure_the_same_in_both_cores() -> None:
+    cores = ("python", "compiled")
+    python, built = (start(core, ROOT / "src", "-c", METRICS) for core in cores)
+    assert built.stdout.splitlines() == python.stdout.splitlines(), built.stderr
+    assert python.stdout.count("'frame_rate'") == 2, python.stderr
 
 
 @pytest.mark.slow

@@ -143,6 +143,17 @@ def test_a_packet_that_would_circulate_is_stopped_where_it_comes_round():
     assert len(watch.sent_on(0x41)) == 3  # 1 has forgotten the entry
 
 
+def test_users_data_that_would_circulate_goes_round_and_back_once_and_ends_where_it_came_from():
+    network = ring()
+    watch = AirWatch(network)
+    network.inject(1, bytes((4, 4, 0x80, 1, 9)).ljust(32, b"\0"))
+    network.run_for(30.0)
+    assert watch.sent_on(0x80) == [(1, 2), (2, 3), (3, 1), (1, 3), (3, 2), (2, 1), (1, 4)]
+    network.inject(1, bytes((4, 4, 0x80, 1, 9)).ljust(32, b"\0"))
+    network.run_for(30.0)
+    assert watch.sent_on(0x80)[7:] == [(1, 4)]  # nobody believes in a way any longer
+
+
 def test_a_packet_that_comes_back_to_its_creator_is_stopped_there():
     network = ring()
     watch = AirWatch(network)

@@ -476,6 +476,19 @@ def test_a_gateway_that_knows_no_such_node_tells_the_creator_and_searches_for_it
     assert rig.mesh.complaints.counts["no route to node 9"] > 0
 
 
+@pytest.mark.parametrize(("found_after_s", "sent_on"), [(3.9, 64), (4.1, 0)])
+def test_a_gateway_keeps_the_last_64_packets_for_4_s_while_it_searches(found_after_s, sent_on):
+    rig = Rig(gateway=True)
+    rig.know_neighbour(3)
+    for number in range(70):
+        rig.hear(f"05 03 80 01 09 00 {number:02x} cd")
+    rig.wait(found_after_s)
+    rig.hear("09 03 04 01 01 00 ff 01")
+    sent = rig.sent(0x80)
+    assert [one[6] for one in sent] == list(range(70))[70 - sent_on :]
+    assert all(one.startswith(bytes.fromhex("05 01 80 03 09")) for one in sent)
+
+
 def test_a_gateway_that_has_lost_its_internet_sends_it_on_to_another_gateway():
     rig = Rig(gateway=True)
     rig.mesh.set_internet(False, rig.now_s)
