@@ -13,7 +13,9 @@ from rosgraph_msgs.msg import Clock
 from rostest_support import LogWatch, MeshWatch, call, wait_for
 
 from drone_mesh.msg import DroneInfo, Location
+from drone_mesh.ros.graph.resting_clock import RestingClock
 from drone_mesh.srv import SetSpeed
+from drone_mesh.state.orders import CLOCKS_DIFFER_S
 
 
 class FactoryTest(unittest.TestCase):
@@ -39,6 +41,17 @@ class FactoryTest(unittest.TestCase):
         # rospy keeps only the newest of several ticks that arrive at once; slow ones do so rarely.
         self.assertEqual({step % 10_000_000 for step in steps}, {0})
         self.assertGreater(steps.count(10_000_000), 100)
+
+    def test_a_node_that_begins_nothing_with_a_tick_reads_several_at_once(self) -> None:
+        read_s: list[float] = []
+        clock = rospy.Subscriber("/clock", Clock, lambda tick: read_s.append(tick.clock.to_sec()))
+        resting = RestingClock()
+        self.mesh.wait("two seconds", 10, lambda: read_s and read_s[-1] > read_s[0] + 2.0)
+        resting.stop()
+        clock.unregister()
+        steps_s = sorted(after - before for before, after in zip(read_s, read_s[1:]))
+        typical_s = steps_s[len(steps_s) // 2]
+        self.assertTrue(0.02 < typical_s < CLOCKS_DIFFER_S, typical_s)
 
     def test_a_speed_out_of_bounds_is_refused_with_the_bounds(self) -> None:
         for factor in (math.nan, math.inf, -1.0, 1e-300, 1e-5, 100_000.0):

@@ -24,6 +24,7 @@ from drone_mesh.ros.graph.master import (
     master_answers,
 )
 from drone_mesh.ros.graph.orderly_stop import end_without_dead_master
+from drone_mesh.ros.graph.resting_clock import RestingClock
 from drone_mesh.stopping import ends_as
 
 SPEAKER_VARIABLE = "DRONE_MESH_SPEAKER"  # the node of a launch file that says why it cannot start
@@ -98,10 +99,13 @@ def _shut_down_beside(number: int, _frame: object) -> None:
     ).start()
 
 
-def start_node(about: str | None, name: str, *, disable_signals: bool = False) -> None:
+def start_node(
+    about: str | None, name: str, *, disable_signals: bool = False, every_tick: bool = False
+) -> None:
     """Register as a node. With --help, print `about` and exit instead.
 
-    SIGINT and SIGTERM end it, unless `disable_signals`.
+    SIGINT and SIGTERM end it, unless `disable_signals`. `every_tick`: it follows each tick of the
+    simulated clock, which others read in bunches.
     Exits with one line on unknown arguments, without a master, and if a node of this name runs.
     """
     program = Path(sys.argv[0]).name
@@ -126,6 +130,8 @@ def start_node(about: str | None, name: str, *, disable_signals: bool = False) -
     except rospy.ROSException as error:  # it is told to end while it registers
         print(f"{program}: {error}", file=sys.stderr)
         sys.exit(FAILED)
+    if not every_tick and rospy.get_param(names.SIM_TIME_PARAM, False):
+        RestingClock()
 
 
 def end_launch() -> None:

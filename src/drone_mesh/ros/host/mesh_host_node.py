@@ -181,7 +181,7 @@ def main() -> None:
     ~index (int): the drones are divided into ~hosts equal parts, and this program runs the nodes
     of part ~index, 1..~hosts.
     """
-    start_node(main.__doc__, "mesh_host", disable_signals=True)
+    start_node(main.__doc__, "mesh_host", disable_signals=True, every_tick=True)
     show_library_logs_on_rosout()
     with OrderlyStop() as stop:
         clock = FollowedClock(stop.begin_anew)
