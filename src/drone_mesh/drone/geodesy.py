@@ -8,11 +8,12 @@ mathematics: it is pure Python without dependencies, so it installs on every Ras
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import math
 import struct
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple, Sequence
 
 from drone_mesh.arguments import finite
 from drone_mesh.drone.location import Location
@@ -77,18 +78,24 @@ class Origin:
         digest = hashlib.sha256(exact).digest()[:_DIGEST_BYTES]
         return int.from_bytes(digest, "little") or 1  # 0 means: no origin
 
+    @functools.cached_property
+    def _on_earth(self) -> tuple[Any, Sequence[float]]:
+        """The shape of the earth (WGS84), and the origin in metres from its centre."""
+        import pymap3d
+
+        shape = pymap3d.Ellipsoid.from_name("wgs84")
+        place = self.latitude_deg, self.longitude_deg, self.altitude_m
+        return shape, pymap3d.geodetic2ecef(*place, shape)
+
     def to_frame(self, place: EarthPlace) -> Location:
         """The position in metres of the common frame."""
         import pymap3d  # with numpy, most of a second on a Pi; only frames on the earth need it
 
-        east, north, _ = pymap3d.geodetic2enu(
-            place.latitude_deg,
-            place.longitude_deg,
-            self.altitude_m,
-            self.latitude_deg,
-            self.longitude_deg,
-            self.altitude_m,
-        )
+        # geodetic2enu in its parts: it computes the place of the origin again for each place.
+        shape, origin = self._on_earth
+        at = pymap3d.geodetic2ecef(place.latitude_deg, place.longitude_deg, self.altitude_m, shape)
+        x, y, z = (there - here for there, here in zip(at, origin))
+        east, north, _ = pymap3d.uvw2enu(x, y, z, self.latitude_deg, self.longitude_deg)
         return Location(float(north), float(east), place.altitude_m - self.altitude_m)
 
     def to_earth(self, location: Location) -> EarthPlace:
