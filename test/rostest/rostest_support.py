@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import multiprocessing
 import os
 import runpy
@@ -22,6 +23,7 @@ import rospy
 from rosgraph_msgs.msg import Log
 
 from drone_mesh.msg import NRF24, DroneInfo, NodeDebugInfo
+from drone_mesh.ros.graph.resting_clock import RestingClock
 from drone_mesh.srv import Casus, PowerSwitch, RequestGPS, WirelessMessage
 
 PAYLOAD_BYTES = 32
@@ -35,6 +37,9 @@ FORKS.set_forkserver_preload(PRELOADED)
 # The package of a devel space puts src/ first, where the messages are missing. Python 3.13 gives
 # this path to the process that forks.
 sys.path[:] = [path for path in sys.path if path != str(NODES.parent / "src")]
+
+
+rest_between_ticks = functools.lru_cache(RestingClock)  # one in each process
 
 
 def in_order(*cases: type[unittest.TestCase]) -> unittest.TestSuite:
@@ -141,7 +146,10 @@ class LogWatch:
 class MeshWatch:
     """The nodes 0..count-1, from their debug topics. Times are simulated seconds."""
 
-    def __init__(self, count: int) -> None:
+    def __init__(self, count: int, every_tick: bool = False) -> None:
+        """`every_tick`: the test follows each tick of the clock."""
+        if not every_tick:
+            rest_between_ticks()
         self.count = count
         self._infos: dict[int, NodeDebugInfo] = {}
         self._unconnected_in_a_row: dict[int, int] = {}

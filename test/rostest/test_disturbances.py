@@ -42,7 +42,7 @@ class RestartsTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls) -> None:
         cls.log = LogWatch()
-        cls.mesh = MeshWatch(10)
+        cls.mesh = MeshWatch(10, every_tick=True)
 
     def test_the_mesh_is_connected_again_and_a_node_that_was_off_stays_off(self) -> None:
         log, mesh = self.log, self.mesh
@@ -100,7 +100,7 @@ class StrayMessagesTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls) -> None:
         cls.log = LogWatch()
-        cls.mesh = MeshWatch(10)
+        cls.mesh = MeshWatch(10, every_tick=True)
         cls.mesh.wait("all connected", 30, cls.mesh.connected)
 
     def test_a_node_whose_packets_were_redirected_recovers_by_itself(self) -> None:

@@ -65,7 +65,7 @@ class EveryInterfaceTest(unittest.TestCase):
         cls.log = LogWatch()
         cls.used: dict[str, str] = {}
         cls.heard: dict[str, list[Any]] = defaultdict(list)
-        cls.mesh = MeshWatch(7)
+        cls.mesh = MeshWatch(7, every_tick=True)
         cls.listen("/mesh/state", msg.MeshState)
         cls.listen("/mesh/events", msg.MeshEvent)
         cls.listen("/DroneManager/layouts", msg.LayoutProgress)

@@ -22,7 +22,7 @@ class FactoryTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls) -> None:
         cls.log = LogWatch()
-        cls.mesh = MeshWatch(3)
+        cls.mesh = MeshWatch(3, every_tick=True)
         cls.mesh.wait("the first debug messages", 30, lambda: len(cls.mesh.hops()) == 3)
 
     def fly(self, node_id: int, latitude: float, longitude: float, height: int) -> None:

@@ -21,6 +21,7 @@ from drone_mesh.msg import HostProgress
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import start_node
 from drone_mesh.ros.graph.conversions import ros_time
+from drone_mesh.ros.graph.direct_publisher import DirectPublisher
 from drone_mesh.ros.graph.fleet_parameter import (
     drones_if_known,
     get_fleet_parameter,
@@ -39,6 +40,7 @@ from drone_mesh.ros.host.virtual_raspberry_pi import MeshSettings
 
 WAITING_LOG_PERIOD_S = 5.0  # wall; between two log lines about what is being waited for
 PROGRESS_PERIOD_S = 0.5  # wall; the world continues without a host that is silent for two seconds
+STUCK_WORLD_S = 0.5  # wall; the kernel buffers minutes of reports before a send blocks
 
 _log = logging.getLogger(__name__)
 
@@ -64,12 +66,8 @@ class FollowedClock:
 
     def drive(self, host: MeshHost, run: Run) -> None:
         """Advance this host with the clock of this run, and report its progress from now on."""
-        self._progress = rospy.Publisher(
-            names.PROGRESS_TOPIC,
-            HostProgress,
-            headers=run_headers(run),
-            tcp_nodelay=True,
-            queue_size=100,
+        self._progress = DirectPublisher(
+            names.PROGRESS_TOPIC, HostProgress, STUCK_WORLD_S, run_headers(run)
         )
         self.run = run
         self._host = host
@@ -77,7 +75,7 @@ class FollowedClock:
 
     def is_followed(self) -> bool:
         """Whether the world subscribes to the reports."""
-        return self._progress.get_num_connections() > 0
+        return self._progress.has_subscriber()
 
     def report_progress(self) -> None:
         """Report now, even during long work or while time stands still."""
