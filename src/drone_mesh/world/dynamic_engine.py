@@ -23,6 +23,7 @@ from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath, PlanFlight, Vect
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.route import Route
 from drone_mesh.errors import GoalRefused
+from drone_mesh.mobility.pilot import TrackPilot
 from drone_mesh.world.engine import DroneEngine
 from drone_mesh.world.worlds import PhysicalWorld
 
@@ -34,6 +35,7 @@ AT_HOME_M = 0.5
 ONE_PAD = 0  # of the crews: all places where drones start
 MOVED_M = 1e-4  # a smaller movement is not reported
 SETTLED_S = 0.1  # time after the last movement until its position is reported once more
+STANDING_STEP_S = 0.1  # a drone that stands is looked at so often: only others can move it
 
 _log = logging.getLogger(__name__)
 
@@ -144,6 +146,7 @@ class DynamicEngine(DroneEngine):
         self._home, self._crews = Location.from_vector(centre), crews
         self._was_flat = False
         self._settled = True
+        self._stands = False  # on the ground, and nothing moved it lately
         self._held_s = 0.0  # how long an obstacle has held it in the air
         world.wake(self)
 
@@ -171,6 +174,10 @@ class DynamicEngine(DroneEngine):
     def is_flying(self) -> bool:
         return self._route is not None or bool(self._goals)
 
+    def fly_with(self, pilot: TrackPilot | None) -> None:
+        self._stands = False
+        super().fly_with(pilot)
+
     def leave(self) -> None:
         """Like DroneEngine.leave; the crews go on with others."""
         super().leave()
@@ -186,6 +193,9 @@ class DynamicEngine(DroneEngine):
 
     def _take_turn(self, now_s: float) -> bool:
         """After a step of physics: read position and speed, apply forces. Always continues."""
+        soon_s = STANDING_STEP_S - self._world.tick_s / 2
+        if self._stands and not self._goals and now_s - self._stepped_s < soon_s:
+            return True
         passed_s, self._stepped_s = now_s - self._stepped_s, now_s
         position, velocity = self._physics.body_state(self._box)
         if self._pushed is not None:
@@ -211,6 +221,9 @@ class DynamicEngine(DroneEngine):
         elif not self._settled and now_s - self._state.now_s >= SETTLED_S:
             self._settled = True  # listeners that skip reports still get the last one
             self._notify(position, path, now_s)
+        on_ground = position[2] - self._half_height_m <= ON_GROUND_M
+        is_free = self._route is None and self._hover is None and self.pilot is None
+        self._stands = self._settled and on_ground and is_free
         return True
 
     def _begin(self, goal: Location, position: Vector, now_s: float) -> None:

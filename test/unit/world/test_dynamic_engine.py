@@ -68,6 +68,28 @@ def test_it_hovers_at_a_goal_in_the_air_and_uses_its_battery(world):
     assert before - engine.battery_percent() == pytest.approx(1.0, rel=0.01)  # 12 s of 1200
 
 
+def test_a_drone_that_stands_is_looked_at_ten_times_a_second_and_each_time_once_it_shall_fly(world):
+    engine, looks = drone(world), []
+    look, world.body_state = world.body_state, lambda box: looks.append(box) or look(box)
+    run(world, 10.0)
+    assert len(looks) == pytest.approx(100, abs=2)
+    looks.clear()
+    engine.set_goal(0.0, 0.0, 2)
+    run(world, 1.0)
+    assert len(looks) == 100
+
+
+def test_a_standing_drone_that_is_pushed_is_seen_to_move(world):
+    engine = drone(world)
+    run(world, 1.0)
+    for _ in range(20):
+        before, _ = world.body_state(engine._box)
+        world.push(engine._box, (30.0, 0.0, 0.0), before)
+        world.step()
+    assert before[0] > 0.1
+    assert engine.state.position == before
+
+
 def test_speed_and_acceleration_have_limits(world):
     engine = drone(world)
     limits = BodyLimits()
