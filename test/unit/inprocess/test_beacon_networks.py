@@ -7,7 +7,7 @@ import math
 import random
 
 import pytest
-from scenarios import line, placed
+from scenarios import events, line, placed
 
 from drone_mesh.communication.beacon.packets import Beacon
 from drone_mesh.communication.data.outgoing import TicketState
@@ -93,6 +93,16 @@ def test_beacons_become_rarer_while_nothing_changes():
     sent.clear()
     network.run_for(16.0)
     assert 9 <= len(sent) <= 13
+
+
+def test_beacons_that_collide_in_a_large_mesh_at_rest_lose_few_neighbours():
+    network = grid(side=8, rate="250k")
+    network.run_for(30.0)
+    start_s = network.now_s()
+    network.run_for(60.0)
+    assert (
+        len({node for _at_s, _by, node in events(network, "NEIGHBOUR_LOST", since_s=start_s)}) <= 2
+    )
 
 
 def test_a_drone_that_turns_tells_its_neighbours_at_once():

@@ -100,16 +100,13 @@ def test_also_between_more_nodes(nodes, radio, technique):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("technique", ["child_table_tree", "beacon"])
-def test_between_a_hundred_nodes_on_a_shared_channel_one_in_a_hundred_is_later(technique):
-    """Who changes its parent is not known far away until the beacons of all between have told.
-
-    With heartbeats the channel is full if all ask for the gateway's place together.
-    """
+def test_also_between_a_hundred_nodes_on_a_shared_channel(technique):
     network = scenarios.fleet(99, 10, 2, radio="shared", routing=technique)
     network.run_for(120.0)
-    pairs = random.Random(3).sample(list(itertools.permutations(sorted(network.nodes), 2)), 100)
+    pairs = random.Random(3).sample(list(itertools.permutations(sorted(network.nodes), 2)), 300)
     delays = send_each(network, pairs, every_s=0.5)
-    assert sum(delays.get(pair, math.inf) <= 5.0 for pair in pairs) >= 99
+    assert set(delays) == set(pairs)
+    assert max(delays.values()) <= 5.0
 
 
 @pytest.mark.slow

@@ -63,6 +63,7 @@ class Losses:
 
 
 FRESH: Final = 2.5  # intervals: a neighbour that was silent for longer is none
+FRESH_IF_LOSSY: Final = 3.5  # where beacons collide: the loss of two in a row is usual
 MOST_VAIN: Final = 3  # nodes with which it brought no contact; then it counts as one that swallows
 MOST_REFUSED: Final = 3  # packets that it did not take, since it last proved that it hears
 REFUSED_S: Final = 3.0  # within which; a burst of losses is shorter
@@ -74,6 +75,7 @@ class Neighbour:
 
     node: int
     beacon: Beacon
+    fresh: float  # intervals, see FRESH
     heard_s: float = -math.inf
     alive_s: float = -math.inf
     failed_s: float = -math.inf
@@ -145,4 +147,4 @@ class Neighbour:
     def alive(self, now_s: float) -> None:
         """Note a sign of life."""
         self.alive_s = now_s
-        self.until_s = now_s + FRESH * self.beacon.interval_s
+        self.until_s = now_s + self.fresh * self.beacon.interval_s

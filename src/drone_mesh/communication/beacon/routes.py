@@ -12,7 +12,13 @@ from operator import itemgetter
 from typing import Callable, Final, Iterator, NamedTuple, Tuple
 
 from drone_mesh.communication.beacon.disputes import Disputes
-from drone_mesh.communication.beacon.neighbour import WRONG, Losses, Neighbour
+from drone_mesh.communication.beacon.neighbour import (
+    FRESH,
+    FRESH_IF_LOSSY,
+    WRONG,
+    Losses,
+    Neighbour,
+)
 from drone_mesh.communication.beacon.packets import (
     ANCESTORS,
     NO_ANCESTORS,
@@ -93,6 +99,7 @@ class BeaconRoutes(IRoutes):
         self._hints: dict[int, tuple[int, float]] = {}  # by node: a neighbour that led to it, when
         self._losses = Losses(self._range_m)
         self._disputes = Disputes()
+        self._fresh = FRESH if self.one_loss_counts else FRESH_IF_LOSSY
 
     @property
     def now_s(self) -> float:
@@ -106,7 +113,7 @@ class BeaconRoutes(IRoutes):
         neighbour = self.neighbours.get(node)
         is_new = neighbour is None
         if neighbour is None:
-            neighbour = Neighbour(node, beacon)
+            neighbour = Neighbour(node, beacon, self._fresh)
             self.neighbours[node] = neighbour
         neighbour.heard(beacon, self.motion, self.clock.now_s)
         if beacon.parent == self._node_id and neighbour.announced_s:

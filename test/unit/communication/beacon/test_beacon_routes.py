@@ -188,6 +188,14 @@ def test_a_neighbour_silent_for_two_and_a_half_intervals_is_forgotten(routes):
     assert routes.expired() == [1]
 
 
+def test_on_a_shared_channel_a_neighbour_may_lose_two_beacons_and_be_late(shared_routes):
+    shared_routes.heard(2, beacon())
+    shared_routes.clock.now_s = 3.4
+    assert shared_routes.expired() == []
+    shared_routes.clock.now_s = 3.6
+    assert shared_routes.expired() == [2]
+
+
 def test_a_sign_of_life_is_as_good_as_a_beacon(routes):
     routes.heard(1, beacon())
     routes.clock.now_s = 2.0
