@@ -24,6 +24,7 @@ class AccessRules:
     most_yield_s: float  # longest wait for the end of others' trains
     most_hold_s: float  # as most_yield_s, if their end is announced
     broadcast_jitter_s: float  # a broadcast waits for a random part of this
+    once_jitter_s: float  # and so does a packet that is tried once: many challenge a newcomer
     answer_jitter_s: float  # so does any packet within this time after a broadcast was heard
     lifetime_s: float  # a packet that waited for this time is no longer useful
     still_there_s: float  # a node that was heard within this time counts as present
@@ -52,6 +53,7 @@ class AccessRules:
             most_yield_s=100 * cycle_s,
             most_hold_s=200 * cycle_s,
             broadcast_jitter_s=60 * cycle_s,
+            once_jitter_s=180 * cycle_s,
             answer_jitter_s=60 * cycle_s,
             lifetime_s=max(10.0, 3800 * cycle_s),
             still_there_s=max(5.0, 1900 * cycle_s),

@@ -24,6 +24,7 @@ from drone_mesh.communication.interfaces import (
 )
 from drone_mesh.communication.timing import ChannelUse, Medium
 from drone_mesh.communication.wire.messages import (
+    goes_once,
     is_answered,
     is_jittered,
     priority,
@@ -156,7 +157,9 @@ class PacketAntenna(IWirelessCommunication):
         to = receiver(payload)
         if to > MAX_NODE_ID or to == self._radio.node_id:
             return False
-        return self._sender.offer(to, bytes(payload), priority(payload))
+        return self._sender.offer(
+            to, bytes(payload), priority(payload), is_jittered(payload), goes_once(payload)
+        )
 
     def broadcast_message(self, payload: bytes) -> None:
         """Queue one frame for all; each receiver's antenna puts its own id into byte 3."""

@@ -25,6 +25,8 @@ module has those rules, without chips, threads and clocks. The driver and the fa
 6. Each receiver has its own queue, so that waiting for one does not delay the others. A receiver
    that did not acknowledge a packet, and was not heard since, gets fewer tries for the next one; so
    does one that has been silent for longer than nodes of a mesh at rest are.
+7. A packet whose sender begins anew when it is lost is tried once, and a challenge at a random
+   moment: all who hear a newcomer challenge it, and among drones that fly there is always one.
 """
 
 from __future__ import annotations
@@ -144,10 +146,12 @@ class MediumAccess:
         now_s: float,
         priority: Priority = Priority.CONTROL,
         jittered: bool = True,
+        once: bool = False,
     ) -> bool:
         """Queue a packet for a node, or for ALL_NODES. False: too many packets wait already.
 
-        Without `jittered`, the sender of a broadcast has chosen a random moment itself.
+        `once`: try it once. Without `jittered`, the sender of a broadcast or of such a packet has
+        chosen a random moment itself.
 
         Bytes that already wait for the same receiver are not queued twice.
         """
@@ -160,9 +164,11 @@ class MediumAccess:
         rules, not_before_s = self.rules, now_s
         if receiver == ALL_NODES:
             not_before_s += self._rng.random() * rules.broadcast_jitter_s * jittered
+        elif once:
+            not_before_s += self._rng.random() * rules.once_jitter_s * jittered
         elif now_s - self._broadcast_heard_s[priority] < rules.answer_jitter_s:
             not_before_s += self._rng.random() * rules.answer_jitter_s
-        self._queue.add(OutgoingPacket(receiver, payload, priority, now_s, not_before_s))
+        self._queue.add(OutgoingPacket(receiver, payload, priority, now_s, not_before_s, once))
         return True
 
     def limit_tries(self, most: int) -> None:
@@ -248,14 +254,16 @@ class MediumAccess:
             self._queue.remove(packet)
             return Fate.DELIVERED
         if (
-            packet.tries >= self._most_tries(receiver, now_s)
+            packet.once
+            or packet.tries >= self._most_tries(receiver, now_s)
             or now_s - packet.queued_s > rules.lifetime_s
         ):
             counters.sent += 1
             counters.lost += 1
             if self._heard_s.get(receiver, -math.inf) > packet.queued_s - rules.still_there_s:
                 self._learn(True)  # it is there, so the channel is to blame
-            self._silent.add(receiver)
+            if not packet.once:
+                self._silent.add(receiver)
             self._queue.remove(packet)
             return Fate.GIVEN_UP
         packet.not_before_s = now_s + self._pause_s(packet.tries)

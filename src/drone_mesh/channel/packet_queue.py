@@ -14,16 +14,32 @@ ALL_NODES: Final = -1  # receiver of a broadcast
 class OutgoingPacket:
     """One packet on its way out."""
 
-    __slots__ = ("frames", "not_before_s", "payload", "priority", "queued_s", "receiver", "tries")
+    __slots__ = (
+        "frames",
+        "not_before_s",
+        "once",
+        "payload",
+        "priority",
+        "queued_s",
+        "receiver",
+        "tries",
+    )
 
     def __init__(
-        self, receiver: int, payload: bytes, priority: Priority, now_s: float, not_before_s: float
+        self,
+        receiver: int,
+        payload: bytes,
+        priority: Priority,
+        now_s: float,
+        not_before_s: float,
+        once: bool = False,
     ) -> None:
         self.receiver = receiver
         self.payload = payload
         self.priority = priority
         self.queued_s = now_s
         self.not_before_s = not_before_s
+        self.once = once
         self.tries = 0
         self.frames = 0  # in all tries, those included that the radio repeated by itself
 

@@ -58,12 +58,15 @@ class Sender:
         payload: bytes,
         priority: Priority = Priority.CONTROL,
         jittered: bool = True,
+        once: bool = False,
     ) -> bool:
         """Queue a packet for a node or ALL_NODES. False: the queue is full or closed."""
         if self._closed:
             return False
         with self._lock:
-            taken = self._access.offer(receiver, payload, self._runtime.now_s(), priority, jittered)
+            taken = self._access.offer(
+                receiver, payload, self._runtime.now_s(), priority, jittered, once
+            )
         self._wake()
         return taken
 

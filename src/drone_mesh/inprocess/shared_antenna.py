@@ -12,6 +12,7 @@ from drone_mesh.channel.statistics import ChannelMeter, RadioStatistics
 from drone_mesh.communication.interfaces import MAX_NODE_ID, IMeshDebugInfo, IMeshNetwork
 from drone_mesh.communication.timing import ChannelUse, Medium
 from drone_mesh.communication.wire.messages import (
+    goes_once,
     is_answered,
     is_jittered,
     priority,
@@ -90,7 +91,14 @@ class SharedAntenna(SharedRadio):
         to = receiver(payload)
         if not self.powered or to > MAX_NODE_ID or to == self.node_id:
             return False
-        taken = self.access.offer(to, payload, self._clock.now_s, priority(payload))
+        taken = self.access.offer(
+            to,
+            payload,
+            self._clock.now_s,
+            priority(payload),
+            is_jittered(payload),
+            goes_once(payload),
+        )
         self._plan()
         return taken
 

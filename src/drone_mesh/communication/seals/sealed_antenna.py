@@ -47,7 +47,7 @@ LEAST_PACKETS = 3  # damage that a checksum does not show is rarer
 LEAST_CHALLENGES = 2  # without an answer: one may be lost
 
 _CHALLENGE, _ANSWER = int(MessageType.SEAL_CHALLENGE), int(MessageType.SEAL_ANSWER)
-_INTRODUCTIONS = (int(MessageType.PRESENT), int(MessageType.BEACON))
+_PRESENT, _BEACON = int(MessageType.PRESENT), int(MessageType.BEACON)
 _ORDER = int(MessageType.MOVE_TO_LOCATION)
 _NO_SEAL = bytes(SEAL_BYTES)
 
@@ -165,7 +165,9 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
 
     def broadcast_message(self, payload: bytes) -> None:
         payload = self._end_to_end.seal(payload, self._clock()) or payload
-        if payload[TYPE_AT] in _INTRODUCTIONS:
+        kind = payload[TYPE_AT]
+        # On a shared channel, where the next beacon costs less, none is repeated for a newcomer.
+        if kind == _PRESENT or (kind == _BEACON and not self.medium.policy.queued):
             self._present = payload
         self._antenna.broadcast_message(self._seal.seal(payload))
 
@@ -224,7 +226,7 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
         kind = payload[TYPE_AT]
         if kind == _CHALLENGE:
             self._unopened.pop(payload[TO_AT], None)  # without an answer for another reason
-        if self._mesh is not None and kind not in (_CHALLENGE, _ANSWER, *_INTRODUCTIONS):
+        if self._mesh is not None and kind not in (_CHALLENGE, _ANSWER, _PRESENT, _BEACON):
             self._mesh.on_undelivered(payload[:SEAL_AT] + _NO_SEAL, tries, now_s)
 
     def on_antenna_power(self, on: bool, now_s: float) -> None:

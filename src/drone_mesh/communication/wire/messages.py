@@ -298,8 +298,13 @@ body: Callable[[bytes], bytes] = operator.itemgetter(slice(HEADER_BYTES, None))
 
 
 def is_jittered(payload: bytes) -> bool:
-    """Whether a broadcast of this type has to wait for a random time."""
+    """Whether a packet of this type, if it goes to all or once, waits for a random time."""
     return ABOUT[payload[TYPE_AT]].jittered
+
+
+def goes_once(payload: bytes) -> bool:
+    """Whether the radio tries a packet of this type only once."""
+    return ABOUT[payload[TYPE_AT]].once
 
 
 def is_answered(payload: bytes) -> bool:

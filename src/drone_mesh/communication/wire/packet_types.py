@@ -58,7 +58,8 @@ class PacketType(NamedTuple):
     made_of: str = "Message"  # the class that encodes it
     priority: Priority = Priority.CONTROL
     answered: bool = True  # whether a broadcast of it makes several nodes send
-    jittered: bool = True  # whether many nodes would broadcast it at the same moment
+    jittered: bool = True  # whether many nodes would send it at the same moment
+    once: bool = False  # whether its sender begins anew when it is lost, so the radio need not
 
     @property
     def layout(self) -> struct.Struct:
@@ -163,8 +164,11 @@ class MessageType(enum.IntEnum):
     # Where a gateway was, in a mesh with a key
     GATEWAY_PLACE = 125, PacketType(PacketKind.POSITION, _ROUTER, _GATEWAY_PLACE, "GatewayPlace")
     # Asks a neighbour to prove that it has the key, and the proof
-    SEAL_CHALLENGE = 126, PacketType(PacketKind.OTHER, _SEAL, made_of="HopSeal")
-    SEAL_ANSWER = 127, PacketType(PacketKind.OTHER, _SEAL, made_of="HopSeal")
+    SEAL_CHALLENGE = 126, PacketType(PacketKind.OTHER, _SEAL, made_of="HopSeal", once=True)
+    SEAL_ANSWER = (
+        127,
+        PacketType(PacketKind.OTHER, _SEAL, made_of="HopSeal", jittered=False, once=True),
+    )
 
 
 ABOUT = tuple(
