@@ -24,7 +24,7 @@ class AccessRules:
     most_yield_s: float  # longest wait for the end of others' trains
     most_hold_s: float  # as most_yield_s, if their end is announced
     broadcast_jitter_s: float  # a broadcast waits for a random part of this
-    once_jitter_s: float  # and so does a packet that is tried once: many challenge a newcomer
+    once_jitter_s: float  # and so does a challenge that is tried once
     answer_jitter_s: float  # so does any packet within this time after a broadcast was heard
     lifetime_s: float  # a packet that waited for this time is no longer useful
     still_there_s: float  # a node that was heard within this time counts as present
@@ -33,6 +33,7 @@ class AccessRules:
     data_queue_length: int  # of these: users' packets
     most_patience: float  # check periods without probes on a busy channel, at most
     busy_at: float  # share of failed first tries above which a channel counts as busy
+    is_limited: bool = False  # whether the mesh limited the tries
 
     @classmethod
     def for_cycle(cls, cycle_s: float) -> AccessRules:

@@ -25,8 +25,9 @@ module has those rules, without chips, threads and clocks. The driver and the fa
 6. Each receiver has its own queue, so that waiting for one does not delay the others. A receiver
    that did not acknowledge a packet, and was not heard since, gets fewer tries for the next one; so
    does one that has been silent for longer than nodes of a mesh at rest are.
-7. A packet whose sender begins anew when it is lost is tried once, and a challenge at a random
-   moment: all who hear a newcomer challenge it, and among drones that fly there is always one.
+7. Where tries are limited, as every node is heard each second, a packet whose sender begins anew
+   when it is lost is tried once, and a challenge at a random moment: all who hear a newcomer
+   challenge it, and among drones that fly there is always one.
 """
 
 from __future__ import annotations
@@ -150,8 +151,8 @@ class MediumAccess:
     ) -> bool:
         """Queue a packet for a node, or for ALL_NODES. False: too many packets wait already.
 
-        `once`: try it once. Without `jittered`, the sender of a broadcast or of such a packet has
-        chosen a random moment itself.
+        `once`: its sender begins anew. Without `jittered`, the sender of a broadcast or of such a
+        packet has chosen a random moment itself.
 
         Bytes that already wait for the same receiver are not queued twice.
         """
@@ -162,6 +163,7 @@ class MediumAccess:
         if priority is Priority.DATA and self.data_room() <= 0:
             return False
         rules, not_before_s = self.rules, now_s
+        once = once and rules.is_limited
         if receiver == ALL_NODES:
             not_before_s += self._rng.random() * rules.broadcast_jitter_s * jittered
         elif once:
@@ -172,8 +174,8 @@ class MediumAccess:
         return True
 
     def limit_tries(self, most: int) -> None:
-        """Give up a packet after so many tries at most."""
-        self.rules = replace(self.rules, tries=min(self.rules.tries, most))
+        """Give up a packet after so many tries at most; if its sender begins anew, after one."""
+        self.rules = replace(self.rules, tries=min(self.rules.tries, most), is_limited=True)
 
     def data_room(self) -> int:
         """How many packets of priority DATA it would take now."""

@@ -165,7 +165,7 @@ class IWirelessCommunication(abc.ABC):
         return 0.0
 
     def limit_tries(self, most: int) -> None:  # noqa: B027 (only a shared channel has tries)
-        """Give up a packet after so many tries at most."""
+        """Give up a packet after so many tries at most; if its sender begins anew, after one."""
 
     def data_room(self) -> int:
         """How many packets of users it would accept now without delaying those of the mesh."""

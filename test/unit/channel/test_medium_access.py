@@ -231,6 +231,32 @@ def test_a_broadcast_at_a_random_time_of_its_sender_does_not_wait():
     assert access.next_try_s == 1.0
 
 
+def test_where_tries_are_limited_a_packet_whose_sender_begins_anew_is_tried_once():
+    access = MediumAccess(RULES, random.Random(1))
+    access.limit_tries(4)
+    access.offer(7, PACKET, 0.0, jittered=False, once=True)
+    assert access.tried(access.due(0.0), False, 0.0) is Fate.GIVEN_UP
+    assert access.offer(7, PACKET, 1.0)
+    assert access.tried(access.due(1.0), False, 1.0) is Fate.WAITS
+
+
+def test_where_tries_are_limited_such_a_packet_is_tried_at_a_random_moment():
+    waits = []
+    for seed in range(200):
+        access = MediumAccess(RULES, random.Random(seed))
+        access.limit_tries(4)
+        access.offer(7, PACKET, 1.0, once=True)
+        waits.append(access.next_try_s - 1.0)
+    assert 0.0 <= min(waits) < 0.1 * RULES.once_jitter_s
+    assert 0.9 * RULES.once_jitter_s < max(waits) <= RULES.once_jitter_s
+
+
+def test_elsewhere_it_is_tried_at_once_and_as_often_as_any():
+    access = MediumAccess(RULES, random.Random(1))
+    access.offer(7, PACKET, 1.0, once=True)
+    assert access.tried(access.due(1.0), False, 1.0) is Fate.WAITS
+
+
 def test_the_same_bytes_for_the_same_receiver_wait_only_once():
     access = MediumAccess(RULES, random.Random(1))
     assert access.offer(7, PACKET, 0.0)

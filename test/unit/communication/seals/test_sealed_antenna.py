@@ -12,7 +12,7 @@ from drone_mesh.communication.data import packets
 from drone_mesh.communication.interfaces import IMeshNetwork, IWirelessCommunication
 from drone_mesh.communication.seals.seal import HopSeal, _epoch_state
 from drone_mesh.communication.seals.sealed_antenna import SealedAntenna
-from drone_mesh.communication.timing import QUEUED, Medium
+from drone_mesh.communication.timing import IMMEDIATE, QUEUED, Medium
 from drone_mesh.inprocess import Network
 
 
@@ -396,6 +396,20 @@ def test_a_challenge_by_broadcast_says_nothing_about_a_neighbours_key():
     told = "".join(layer.complaints.counts)
     assert "node 9," in told
     assert "node 11," not in told
+
+
+@pytest.mark.parametrize(("policy", "repeated"), [(IMMEDIATE, [3, 40]), (QUEUED, [3])])
+def test_a_newcomer_gets_the_last_introduction_but_on_a_shared_channel_no_beacon(policy, repeated):
+    rig = Rig(node_id=1, medium=Medium(policy=policy))
+    layer = SealedAntenna(rig.antenna, 1, KEY, random.Random(1), lambda: rig.now_s)
+    layer.start_antenna(rig.mesh)
+    kinds = []
+    for node, kind in ((7, 3), (8, 40)):
+        layer.broadcast_message(packet(f"01 01 {kind:02x} ff ff"))
+        rig.antenna.taken.clear()
+        layer.on_msg(HopSeal(node, KEY, random.Random(node), 30.0).challenge(1, 0.0), 0.0)
+        kinds += {sent[2] for sent in rig.antenna.taken if sent[:4] == bytes([1, 1, kind, node])}
+    assert kinds == repeated
 
 
 def test_another_radio_with_this_nodes_id_and_no_key_is_named_and_challenged_by_a_broadcast():
