@@ -200,6 +200,15 @@ def test_with_a_key_beacons_are_sealed_and_everything_arrives():
     assert served >= 0.97
 
 
+@pytest.mark.slow
+def test_with_a_key_fifty_moving_drones_do_not_fill_a_slow_channel_with_challenges():
+    network = moving(nodes=50, rate="250k", key=MeshKey(bytes(range(16))))
+    network.run_for(30.0)
+    echoes, served = arrivals(network, 30)
+    assert echoes >= 0.9
+    assert served >= 0.99
+
+
 def test_with_a_key_orders_are_carried_out_soon_and_much_later_and_after_the_gateway_restarts():
     network = grid(side=4, key=MeshKey(bytes(range(16))))
     assert network.run_until(network.all_connected, within_s=10.0)
