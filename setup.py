@@ -36,9 +36,9 @@ HOT = {
     " times verdicts",
     "communication/control": "delivery node_part pilot places router_states",
     "communication/events": "complaints",
-    "communication/heartbeats": "connection delivery forwarding gateway_plane introduction plane"
-    " queued_delivery",
-    "communication/node": "component gateway router whereabouts",
+    "communication/heartbeats": "connection delivery detours forwarding gateway_plane introduction"
+    " node_search plane queued_delivery",
+    "communication/node": "component gateway router snapshots whereabouts",
     "communication/routing": "child_table_tree",
     "communication/wire": "messages",
     "drone": "location",

@@ -16,7 +16,7 @@ from drone_mesh.drone.fleet import MAX_DRONES
 from drone_mesh.drone.location import Location
 
 PAYLOAD_BYTES: Final = 32  # nRF24L01+ Product Specification 1.0, 7.3.4: a payload is 0..32 bytes
-MAX_NODE_ID = MAX_DRONES - 1  # docs/wire.md, "Identity"
+MAX_NODE_ID: Final = MAX_DRONES - 1  # docs/wire.md, "Identity"
 BROADCAST: Final = 254  # final addressee: every node in range
 NO_ROUTE: Final = 255  # "no such route", "no such node"
 UNLIMITED_ROOM = 2**31

@@ -7,24 +7,33 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import Final, Iterable, Iterator, NamedTuple
+from typing import Final, Iterable, Iterator
 
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.timing import Medium
-from drone_mesh.drone.location import Location
+from drone_mesh.drone.location import Location, metres_between
 
 STEP: Final = 0.1  # of the range: positions of satellites err by far less
 REPORTS: Final = 3.0  # one may be lost
 FLIGHT_S: Final = 10.0  # a repair flight asks for places each second, and some are lost
 
 
-class _Track(NamedTuple):
+class _Track:
     """What one node's reports show."""
 
-    place: Location  # from where its next step counts
-    before: Location | None = None  # its last step
-    stepped_s: float = -math.inf
-    moves_s: float = -math.inf  # when it was last at a third place
+    __slots__ = ("before", "moves_s", "place", "stepped_s")
+
+    def __init__(
+        self,
+        place: Location,
+        before: Location | None = None,
+        stepped_s: float = -math.inf,
+        moves_s: float = -math.inf,
+    ) -> None:
+        self.place = place  # from where its next step counts
+        self.before = before  # its last step
+        self.stepped_s = stepped_s
+        self.moves_s = moves_s  # when it was last at a third place
 
 
 class SeenMotion:
@@ -45,13 +54,15 @@ class SeenMotion:
     def reported(self, node: int, place: Location, now_s: float) -> None:
         """`node` is at `place`, or flies there."""
         track = self._tracks.get(node)
-        if track is None or now_s - self._flew_s.get(node, -math.inf) < FLIGHT_S:
+        flew_s = self._flew_s  # mostly empty
+        if track is None or (flew_s and now_s - flew_s.get(node, -math.inf) < FLIGHT_S):
             self._tracks[node] = _Track(place)
             return
         step_m = self._step_m
-        if math.dist(place, track.place) <= step_m:
+        if metres_between(place, track.place) <= step_m:
             return
-        is_third = track.before is not None and math.dist(place, track.before) > step_m
+        before = track.before
+        is_third = before is not None and metres_between(place, before) > step_m
         moves = is_third and now_s - track.stepped_s <= self.within_s
         moves_s = track.moves_s
         if moves:
@@ -229,8 +240,9 @@ class Neighbours:
         """
         known = self.places.get(node)
         if known is None or heard_s >= known.heard_s:
-            stood = self._goals_s.pop(node, None) is None
-            self._seen.pop(node, None)
+            stood = not self._goals_s or self._goals_s.pop(node, None) is None
+            if self._seen:
+                self._seen.pop(node, None)
             if is_goal:
                 self._goals_s[node] = heard_s
                 if stood:
@@ -245,7 +257,8 @@ class Neighbours:
         It may have ended its flight there, and fallen silent. What others heard shortly before this
         node saw it may be the goal of that flight, which they do not pass on as such.
         """
-        told_s, known = self._goals_s.get(node), self.places.get(node)
+        told_s = self._goals_s.get(node) if self._goals_s else None
+        known = self.places.get(node)
         if told_s is None and known is not None and 0.0 < known.heard_s - heard_s < FLIGHT_S:
             self._seen[node] = HeardPlace(place, heard_s)
         elif told_s is None or heard_s - told_s > FLIGHT_S:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Collection, Iterable, NamedTuple
+from typing import Collection, Final, Iterable, NamedTuple
 
 from drone_mesh.drone.roles import Role
 from drone_mesh.errors import ConfigurationError
 
-MAX_DRONES = 254  # ids 0..253
+MAX_DRONES: Final = 254  # ids 0..253
 DEFAULT_ROUTERS = 17  # as in the field case
 DEFAULT_GRIDSIZE = 6  # routers in a row
 DEFAULT_SPACING_M = 1.0

@@ -46,3 +46,11 @@ class Location(NamedTuple):
         """The place as an order carries it: float32, whole metres of height. To compare orders."""
         latitude, longitude = _ON_THE_WIRE.unpack(_ON_THE_WIRE.pack(self.latitude, self.longitude))
         return Location(latitude, longitude, float(round(self.height)))
+
+
+def metres_between(one: Location, other: Location) -> float:
+    """Straight 3D distance, for the most frequent questions: compiled, it is a plain call."""
+    latitude, longitude, height = one
+    other_latitude, other_longitude, other_height = other
+    north, east, up = latitude - other_latitude, longitude - other_longitude, height - other_height
+    return math.sqrt(north * north + east * east + up * up)

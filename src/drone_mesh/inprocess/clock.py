@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import heapq
 import itertools
 import math
 from collections import deque
+from heapq import heappop, heappush
 from typing import Any, Callable, Protocol, Tuple
 
 from drone_mesh.nrf24.registers import NS_PER_S
@@ -45,7 +45,7 @@ class VirtualClock:
 
     def call_at(self, at_s: float, function: Callable[[Any], None], argument: Any) -> None:
         """Call `function(argument)` at `at_s`, or at once if that is in the past."""
-        heapq.heappush(self._events, (at_s, next(self._order), function, argument))
+        heappush(self._events, (at_s, next(self._order), function, argument))
 
     def call_in_line(self, at_s: float, function: Callable[[Any], None], argument: Any) -> None:
         """Like `call_at`, but cheaper if calls request ascending times."""
@@ -63,7 +63,7 @@ class VirtualClock:
     def run_until(self, until_s: float) -> None:
         """Process all events up to and including `until_s`."""
         events, line = self._events, self._line
-        pop, pop_line = heapq.heappop, line.popleft
+        pop, pop_line = heappop, line.popleft
         while True:
             if line and line[0] < events[0]:
                 at_s, _order, function, argument = line[0]

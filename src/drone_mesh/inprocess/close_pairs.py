@@ -48,6 +48,8 @@ class ClosePairs(Surroundings):
 
     def __init__(self, reach_m: float, places: np.ndarray) -> None:
         """`places`: (n, 3), metres."""
+        self._pairs: np.ndarray = np.zeros(0, int)  # n times one row plus the other; ascending
+        self._close: np.ndarray = np.zeros(0, bool)  # of each of them: within reach
         super().__init__(reach_m, MARGIN, places)
         self._close = self._closest(places)
 
@@ -55,17 +57,18 @@ class ClosePairs(Surroundings):
         """The points have moved: rows of the pairs that are now within reach, or no longer."""
         self.follow(places)
         before, self._close = self._close, self._closest(places)
-        if not np.array_equal(before, self._close):
-            for pair in map(int, np.setxor1d(before, self._close, assume_unique=True)):
-                yield (*divmod(pair, len(places)), pair in self._close)
+        for at in (before != self._close).nonzero()[0]:
+            yield int(self._one[at]), int(self._other[at]), bool(self._close[at])
 
     def _find(self, places: np.ndarray) -> None:
         super()._find(places)
-        self._one, self._other = np.nonzero(np.triu(self._may_be, 1))
-        self._pairs = self._one * len(places) + self._other
+        close = self._pairs[self._close]
+        self._pairs = np.union1d(np.flatnonzero(np.triu(self._may_be, 1)), close)
+        self._close = np.isin(self._pairs, close, assume_unique=True)
+        self._one, self._other = np.divmod(self._pairs, len(places))
 
     def _closest(self, places: np.ndarray) -> np.ndarray:
-        """The pairs within reach, ascending; each as n times its lower row plus the other one."""
+        """Of each pair: whether it is within reach."""
         apart = np.take(places, self._one, axis=0) - np.take(places, self._other, axis=0)
-        close: np.ndarray = self._pairs[_squares(apart) < self._reach_m**2]
+        close: np.ndarray = _squares(apart) < self._reach_m**2
         return close

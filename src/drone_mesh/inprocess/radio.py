@@ -36,6 +36,7 @@ class InProcessAir(IInProcessAir):
     """Which nodes hear each other, and which packets are lost, delayed or cut off."""
 
     clock: VirtualClock
+    hears: Callable[[int, int], bool] | None
 
     def __init__(
         self,
@@ -59,6 +60,7 @@ class InProcessAir(IInProcessAir):
         self._antennas: dict[int, InProcessAntenna] = {}
         self._ids: set[int] = set()  # of all antennas, also before they start and after they stop
         self._cut: set[frozenset[int]] = set()
+        self.hears = None
         self.jammed = False  # a jammer, heard everywhere: no packet arrives; set by experiments
         # Whether two places within range hear each other; set if there are obstacles.
         self.sees: Callable[[Location, Location], bool] | None = None
@@ -248,6 +250,8 @@ class InProcessAir(IInProcessAir):
 
 class InProcessAntenna(IInProcessAntenna):
     """One node's radio."""
+
+    powered: bool
 
     def __init__(self, air: InProcessAir, host: Host) -> None:
         self.node_id = host.node_id

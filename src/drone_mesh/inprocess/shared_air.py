@@ -20,7 +20,7 @@ import numpy as np
 
 from drone_mesh.channel.packet_queue import ALL_NODES, OutgoingPacket
 from drone_mesh.drone.interfaces import IDroneEngine
-from drone_mesh.drone.location import Location
+from drone_mesh.drone.location import Location, metres_between
 from drone_mesh.inprocess.clock import VirtualClock
 from drone_mesh.inprocess.close_pairs import Surroundings
 from drone_mesh.inprocess.interfaces import IInProcessAir, IInProcessAntenna
@@ -110,6 +110,8 @@ class SharedAir(IInProcessAir):
         self._reached: dict[tuple[int, bool], list[SharedRadio]] = {}
         self._where: dict[int, Location] = {}  # of those at rest
         self._places: np.ndarray | None = None  # (n, 3); those in flight may be anywhere: NaN
+        self._listed: list[SharedRadio] = []  # in the order of these places
+        self._row: dict[int, int] = {}  # of each radio in that list
         self._surroundings: dict[float, Surroundings] = {}  # by reach
         self._flying: set[int] = set()
 
@@ -244,7 +246,7 @@ class SharedAir(IInProcessAir):
         if sender == receiver or sender not in radios or receiver not in radios:
             return math.inf, -math.inf  # no link: to itself, or to a radio that is gone
         here, there, space = self._place(sender), self._place(receiver), self.space
-        distance_m = math.dist(here, there)
+        distance_m = metres_between(here, there)
         power_dbm = space.links.received_dbm(distance_m, self._sent_dbm, self._carrier_mhz)
         if space.obstacles is not None:
             power_dbm -= space.lost_db(here.to_vector(), there.to_vector())
@@ -295,12 +297,12 @@ class SharedAir(IInProcessAir):
         """The radios in reach, and a few others: a quick choice among many."""
         if node not in self._radios:
             return []
-        radios = list(self._radios.values())
         if self._places is None:
-            unknown = Location(math.nan, math.nan, math.nan)
-            flying, place = self._flying, self._place
-            places = [unknown if other in flying else place(other) for other in self._radios]
+            unknown, flying = Location(math.nan, math.nan, math.nan), self._flying
+            places = [unknown if other in flying else self._place(other) for other in self._radios]
             self._places = np.fromiter(itertools.chain.from_iterable(places), float).reshape(-1, 3)
+            self._listed = list(self._radios.values())
+            self._row = {other: row for row, other in enumerate(self._radios)}
             for surroundings in self._surroundings.values():
                 surroundings.follow(self._places)
         furthest_m = ROUNDED * self.space.links.furthest_m(
@@ -308,8 +310,8 @@ class SharedAir(IInProcessAir):
         )
         if furthest_m not in self._surroundings:
             self._surroundings[furthest_m] = Surroundings(furthest_m, MARGIN, self._places)
-        rows = self._surroundings[furthest_m].of(radios.index(self._radios[node]))
-        return [radios[row] for row in rows]
+        rows = self._surroundings[furthest_m].of(self._row[node])
+        return [self._listed[row] for row in rows]
 
     def _reaches(self, node: int, other: int, more_db: float) -> bool:
         distance_m, power_dbm = self._link(node, other)

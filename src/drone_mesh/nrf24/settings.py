@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import functools
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -189,20 +190,20 @@ class RadioSettings:
             Register.RX_ADDR_P2: self.node_address(node_id)[:1],
         }
 
-    @property
+    @functools.cached_property
     def frame_s(self) -> float:
         return frame_bits(ADDRESS_BYTES, PAYLOAD_BYTES, self.crc_bytes) / self.data_rate.value
 
-    @property
+    @functools.cached_property
     def answer_frame_s(self) -> float:
         return frame_bits(ADDRESS_BYTES, 0, self.crc_bytes) / self.data_rate.value
 
-    @property
+    @functools.cached_property
     def broadcast_s(self) -> float:
         """From the rise of CE until a broadcast has been sent."""
         return SETTLING_NS / NS_PER_S + self.frame_s
 
-    @property
+    @functools.cached_property
     def acknowledged_s(self) -> float:
         """From the rise of CE until a packet is acknowledged, without losses."""
         return 2 * SETTLING_NS / NS_PER_S + self.frame_s + self.answer_frame_s

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final, Tuple
+from typing import Final
 
 from drone_mesh.communication.beacon.packets import Beacon, Motion, left_out
-from drone_mesh.drone.location import Location
+from drone_mesh.drone.location import Location, metres_between
 
 WEIGHT: Final = 0.1  # of one beacon in the moving mean
 LEAST: Final = 0.05  # of the mean
@@ -20,8 +20,15 @@ STOOD: Final = 0.05  # of the range: what both ends moved between two beacons, a
 FORGOTTEN: Final = 20.0  # intervals: after such a silence a neighbour is a new one
 
 
-_Heard = Tuple[float, float, Location, Location]
-"""Of the last beacon of one neighbour: when, its interval, where this node was, and that one."""
+class _Link:
+    """The link to one neighbour, as of its last beacon."""
+
+    __slots__ = ("heard_s", "interval_s", "kept", "own", "place")
+
+    def __init__(self, own: Location, place: Location) -> None:
+        self.kept = 1.0  # the share of beacons that passed
+        self.heard_s, self.interval_s = -math.inf, 1.0
+        self.own, self.place = own, place  # where this node was, and that one
 
 
 class Losses:
@@ -33,31 +40,29 @@ class Losses:
 
     def __init__(self, range_m: float) -> None:
         self._range_m = range_m
-        self._kept: dict[int, float] = {}  # by neighbour
-        self._heard: dict[int, _Heard] = {}
+        self._links: dict[int, _Link] = {}  # by neighbour
 
     def heard(
         self, node: int, interval_s: float, own: Location, place: Location, now_s: float
     ) -> float:
         """A beacon came; those that were due before it were lost. Returns the cost in hops."""
-        before = self._heard.get(node)
-        self._heard[node] = now_s, interval_s, own, place
-        due = 1 if before is None else max(1, round((now_s - before[0]) / before[1]))
-        if due == 1 and self._kept.get(node) == 1.0:
+        link = self._links.get(node)
+        if link is None:
+            link = self._links[node] = _Link(own, place)
+        kept, intervals = link.kept, (now_s - link.heard_s) / link.interval_s
+        before, before_there = link.own, link.place
+        link.heard_s, link.interval_s, link.own, link.place = now_s, interval_s, own, place
+        if kept == 1.0 and intervals < 1.5:
             return 0.0  # wherever it is
-        if due > FORGOTTEN:
-            before = None
-        is_far = WRONG < math.dist(own, place) / self._range_m <= LUCKY
-        moved_m = 0.0
-        if before is not None:
-            moved_m = math.dist(own, before[2]) + math.dist(place, before[3])
-        if before is not None and moved_m <= STOOD * self._range_m:
-            kept = self._kept[node] * (1.0 - WEIGHT) ** due + WEIGHT
-        elif not is_far:
+        is_known = intervals <= FORGOTTEN + 0.5
+        moved_m = metres_between(own, before) + metres_between(place, before_there)
+        if is_known and moved_m <= STOOD * self._range_m:
+            kept = kept * (1.0 - WEIGHT) ** max(1, round(intervals)) + WEIGHT
+        elif not WRONG < metres_between(own, place) / self._range_m <= LUCKY:
             kept = 1.0
-        else:  # one place may be wrong
-            kept = FAR if before is None else self._kept[node]
-        self._kept[node] = kept = max(LEAST, kept)
+        elif not is_known:  # one place may be wrong
+            kept = FAR
+        link.kept = kept = max(LEAST, kept)
         again = 1.0 / kept - 1.0  # further frames, as expected: De Couto et al. 2003
         return min(MOST, again // STEP * STEP)
 
@@ -114,7 +119,7 @@ class Neighbour:
         self.alive(now_s)
         if beacon.motion is not None:
             self.motion, self.reported_s = beacon.motion, now_s
-            self.apart_m = 0.0 if own is None else math.dist(own.place, beacon.motion.place)
+            self.apart_m = 0.0 if own is None else metres_between(own.place, beacon.motion.place)
         near_s, announced_s, listed_s = self.near_s, self.announced_s, self.listed_s
         for node in beacon.near:
             near_s[node] = now_s

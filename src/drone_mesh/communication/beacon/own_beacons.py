@@ -12,19 +12,22 @@ from dataclasses import dataclass
 from typing import Callable, Final, Iterable
 
 from drone_mesh.communication.beacon.packets import (
+    MOST_BELOW,
     NOT_LISTED,
     Beacon,
     Below,
     Motion,
     apart_m,
     ids_that_fit,
+    room_below,
+    room_near,
 )
 from drone_mesh.communication.beacon.routes import BeaconRoutes
 from drone_mesh.communication.control.places import CommonFrame
 from drone_mesh.communication.interfaces import NO_ROUTE, IMeshSeals
 from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.packet_types import MessageType
-from drone_mesh.drone.location import Location
+from drone_mesh.drone.location import Location, metres_between
 
 OVER_S: Final = 2.0  # noise of a receiver and turns of a drone cancel out
 TURN_S: Final = 0.5  # only so long before a turn is noticed count samples for the new velocity
@@ -68,7 +71,7 @@ class OwnMotion:
             self._samples.clear()
             self._motion = self.region = None
             return None
-        if self._anchor is None or math.dist(self._anchor, place) > self._step_m:
+        if self._anchor is None or metres_between(self._anchor, place) > self._step_m:
             self._moved_s = -math.inf if self._anchor is None else now_s
             self._anchor = place
             self.region = None
@@ -213,6 +216,15 @@ class OwnBeacons:
         gateway, hops, offline = routes.shown
         is_sealed = self.room <= SEALED_ROOM  # a seal leaves room for less: some parts take turns
         has_digest = self.asks or self._sent % DIGEST_EVERY == (0 if is_sealed else 1)
+        digest, looks = self._frame.digest if has_digest else 0, self.asks or hops == NO_ROUTE
+        self.asks = False
+        motion: Motion | None = routes.motion
+        gateway_place, below = self._next_gateway_place(), self._below
+        room, turn = room_below(self.room, motion, gateway_place, digest), self._sent % 2 == 0
+        if room < 0 or (is_sealed and turn and min(MOST_BELOW, room) < len(below.ids())):
+            motion = None
+            room = room_below(self.room, motion, gateway_place, digest)
+        announced = below.to_announce(min(MOST_BELOW, room))
         beacon = Beacon(
             gateway,
             routes.number,
@@ -220,23 +232,16 @@ class OwnBeacons:
             routes.parent,
             routes.ancestors,
             interval_s,
-            routes.motion,
-            self._next_gateway_place(),
-            self._frame.digest if has_digest else 0,
-            self.asks or hops == NO_ROUTE,
-            offline=offline,
+            motion,
+            gateway_place,
+            digest,
+            looks,
+            announced,
+            below.to_show(room_near(room, announced)),
+            offline,
         )
-        self.asks = False
-        below = self._below
-        room, turn = beacon.room_below(self.room), self._sent % 2 == 0
-        if room < 0 or (is_sealed and turn and room < len(below.ids())):
-            beacon = beacon._replace(motion=None)
-            room = beacon.room_below(self.room)
-        announced = below.to_announce(room)
-        near = below.to_show(beacon.room_near(self.room, announced))
-        beacon = beacon._replace(below=announced, near=near)
-        if beacon.motion is not None:
-            self._shown = routes.now_s, beacon.motion
+        if motion is not None:
+            self._shown = routes.now_s, motion
         return beacon.to_body(self.room)
 
     def mislead(self, motion: Motion) -> bool:
@@ -255,7 +260,7 @@ class OwnBeacons:
         if self._routes.is_root or place is None:
             return None
         every = GATEWAY_PLACE_EVERY
-        if told is None or math.dist(told, place) > self._step_m:
+        if told is None or metres_between(told, place) > self._step_m:
             every = 2 if self.room <= SEALED_ROOM else 1  # with a seal, instead of its own
         if self._sent % every:
             return None

@@ -17,19 +17,24 @@ ANCESTORS: Final = 3  # beyond the parent; more do not fit, fewer leave loops am
 SEQUENCE_NUMBERS: Final = 256
 INTERVAL_S: Final = 0.05  # unit of an interval
 _PLACE_M: Final = 0.1  # unit of a place
-_WRAP = 2**16
+_WRAP: Final = 2**16
 _FASTEST_M_S: Final = 50.0  # a velocity is coded by its square root, so slow ones are precise
 
-_END = b"\xff"  # of the new nodes below and of the neighbours, if they do not fill the packet
+_END: Final = b"\xff"  # of the new nodes below, and of the neighbours if they do not fill it
 _AS_BITS: Final = 255  # no node's id; first in a list of nodes below: it consists of bits
 _BITS_AT: Final = 2  # in such a list, behind the first id
-_COUNT, _HAS_PLACE, _HAS_DIGEST, _HAS_GATEWAY_PLACE, _LOOKS = 0x0F, 0x10, 0x20, 0x40, 0x80
-_LONGEST, _OFFLINE = 0x7F, 0x80  # in the byte of the interval
-_PLACE = struct.Struct("<3H3b")
-_GATEWAY_PLACE = struct.Struct("<3H")
-_DIGEST = struct.Struct("<H")
-_HEAD = struct.Struct(f"<BBBBBB{ANCESTORS}s")  # what follows may be absent
-_GATEWAY_AT = HEADER_BYTES + 2
+MOST_BELOW: Final = 0x0F  # bytes for nodes below: their number is in the byte of the flags
+_HAS_PLACE: Final = 0x10
+_HAS_DIGEST: Final = 0x20
+_HAS_GATEWAY_PLACE: Final = 0x40
+_LOOKS: Final = 0x80
+_LONGEST: Final = 0x7F  # in the byte of the interval
+_OFFLINE: Final = 0x80
+_PLACE: Final = struct.Struct("<3H3b")
+_GATEWAY_PLACE: Final = struct.Struct("<3H")
+_DIGEST: Final = struct.Struct("<H")
+_HEAD: Final = struct.Struct(f"<BBBBBB{ANCESTORS}s")  # what follows may be absent
+_GATEWAY_AT: Final = HEADER_BYTES + 2
 _SEARCH = struct.Struct("<BHB")
 _FOUND = struct.Struct("<B")
 
@@ -70,14 +75,28 @@ class Below(NamedTuple):
     listed: tuple[int, ...]
     new: tuple[int, ...] = ()  # since the last beacon, wherever their turn is
 
-    def list_bytes(self) -> bytes:
-        """`listed` as ids, or as the first id and a bit for each one from there on, if shorter."""
-        ids = bytes(self.listed)
-        if len(ids) <= _BITS_AT:
-            return ids
-        bits = sum(1 << (node - ids[0]) % 256 for node in ids)
-        as_bits = bytes((_AS_BITS, ids[0])) + bits.to_bytes((bits.bit_length() + 7) // 8, "little")
-        return min(ids, as_bits, key=len)
+
+def _list_bytes(listed: tuple[int, ...]) -> bytes:
+    """The ids, or the first one and a bit for each one from there on, if that is shorter."""
+    ids = bytes(listed)
+    if not ids or len(ids) <= _BITS_AT + 1 + (ids[-1] - ids[0]) % 256 // 8:
+        return ids
+    bits = sum([1 << (node - ids[0]) % 256 for node in ids])
+    return bytes((_AS_BITS, ids[0])) + bits.to_bytes((bits.bit_length() + 7) // 8, "little")
+
+
+def room_below(room: int, motion: Motion | None, gateway: Location | None, digest: int) -> int:
+    """How many of `room` bytes are left for nodes; negative: not even the rest of it fits."""
+    used = _HEAD.size + 1
+    used += 0 if motion is None else _PLACE.size
+    used += _DIGEST.size if digest else 0
+    used += 0 if gateway is None else _GATEWAY_PLACE.size
+    return room - used
+
+
+def room_near(room: int, below: Below) -> int:
+    """How many neighbours fit behind these nodes below, which have `room` bytes."""
+    return room - len(_list_bytes(below.listed)) - len(below.new) - len(_END)
 
 
 def left_out(below: Below, nodes: Iterable[int]) -> list[int]:
@@ -85,18 +104,20 @@ def left_out(below: Below, nodes: Iterable[int]) -> list[int]:
     listed, first = below.listed, below.after + 1
     if not listed:
         return [] if below.after == NO_LIST else list(nodes)
-    span = (listed[-1] - first) % 256
-    return [node for node in nodes if (node - first) % 256 <= span and node not in listed]
+    span, ids = (listed[-1] - first) % 256, bytes(listed)  # in which a search is fast
+    return [node for node in nodes if (node - first) % 256 <= span and node not in ids]
 
 
 def ids_that_fit(ids: Sequence[int], room: int) -> tuple[int, ...]:
     """The longest beginning of `ids`, in circular order, that a list of `room` bytes can hold."""
-    as_bits = tuple(node for node in ids if (node - ids[0]) % 256 < 8 * (room - _BITS_AT))
+    if len(ids) <= room:
+        return tuple(ids)
+    as_bits = tuple([node for node in ids if (node - ids[0]) % 256 < 8 * (room - _BITS_AT)])
     return max(tuple(ids[:room]), as_bits, key=len)
 
 
 def _listed(data: bytes) -> tuple[int, ...]:
-    """The inverse of `Below.list_bytes`."""
+    """The inverse of `_list_bytes`."""
     if len(data) <= _BITS_AT or data[0] != _AS_BITS:
         return tuple(data)
     bits = int.from_bytes(data[_BITS_AT:], "little")
@@ -130,14 +151,16 @@ class Beacon(NamedTuple):
         body = b""
         if self.motion is not None:
             flags |= _HAS_PLACE
-            body += _PLACE.pack(*_units(self.motion.place), *map(_speed_code, self.motion.velocity))
+            (north, east, up), (v, w, climb) = _units(self.motion.place), self.motion.velocity
+            speeds = _speed_code(v), _speed_code(w), _speed_code(climb)
+            body += _PLACE.pack(north, east, up, *speeds)
         if self.digest:
             flags |= _HAS_DIGEST
             body += _DIGEST.pack(self.digest)
         if self.gateway_place is not None:
             flags |= _HAS_GATEWAY_PLACE
             body += _GATEWAY_PLACE.pack(*_units(self.gateway_place))
-        listed = self.below.list_bytes()
+        listed = _list_bytes(self.below.listed)
         interval = max(1, min(_LONGEST, math.ceil(self.interval_s / INTERVAL_S)))
         head = _HEAD.pack(
             flags | len(listed),
@@ -148,23 +171,8 @@ class Beacon(NamedTuple):
             self.parent,
             bytes(self.ancestors),
         )
-        body += bytes((self.below.after, *listed, *self.below.new))
+        body += bytes((self.below.after,)) + listed + bytes(self.below.new)
         return (head + body + _END + bytes(self.near))[:room].ljust(room, _END)
-
-    def room_below(self, room: int) -> int:
-        """How many of `room` bytes the nodes below may take; negative: the rest does not fit."""
-        return min(_COUNT, self._room(room))
-
-    def room_near(self, room: int, below: Below) -> int:
-        """How many neighbours fit behind these nodes below."""
-        return self._room(room) - len(below.list_bytes()) - len(below.new) - len(_END)
-
-    def _room(self, room: int) -> int:
-        used = _HEAD.size + 1
-        used += 0 if self.motion is None else _PLACE.size
-        used += _DIGEST.size if self.digest else 0
-        used += 0 if self.gateway_place is None else _GATEWAY_PLACE.size
-        return room - used
 
     @classmethod
     @functools.lru_cache(maxsize=256)  # in one process many nodes receive the same one
@@ -173,32 +181,34 @@ class Beacon(NamedTuple):
 
         Places are the nearest to `here` that fit the bytes; without a `here` they are left out.
         """
+        flags: int
+        interval: int
         flags, interval, gateway, number, hops, parent, ancestors = _HEAD.unpack_from(body)
         if MAX_NODE_ID < gateway != NO_ROUTE:
             return None
-        parts = (_HAS_PLACE, _PLACE), (_HAS_DIGEST, _DIGEST), (_HAS_GATEWAY_PLACE, _GATEWAY_PLACE)
-        sizes = sum(part.size for flag, part in parts if flags & flag)
-        if _HEAD.size + sizes + 1 + (flags & _COUNT) > len(body):
-            return None
         at, motion, gateway_place, digest = _HEAD.size, None, None, 0
-        if flags & _HAS_PLACE:
-            *units, v, w, up = _PLACE.unpack_from(body, at)
-            at += _PLACE.size
-            if here is not None:
-                velocity = _speed(v), _speed(w), _speed(up)
-                motion = Motion(_place(units, here), velocity)
+        place_at = at
+        at += _PLACE.size if flags & _HAS_PLACE else 0
+        digest_at = at
+        at += _DIGEST.size if flags & _HAS_DIGEST else 0
+        gateway_at = at
+        at += _GATEWAY_PLACE.size if flags & _HAS_GATEWAY_PLACE else 0
+        if at + 1 + (flags & MOST_BELOW) > len(body):
+            return None
+        if flags & _HAS_PLACE and here is not None:
+            north, east, up, v, w, climb = _PLACE.unpack_from(body, place_at)
+            velocity = _speed(v), _speed(w), _speed(climb)
+            motion = Motion(_place(north, east, up, here), velocity)
         if flags & _HAS_DIGEST:
-            (digest,) = _DIGEST.unpack_from(body, at)
-            at += _DIGEST.size
-        if flags & _HAS_GATEWAY_PLACE:
-            units = list(_GATEWAY_PLACE.unpack_from(body, at))
-            at += _GATEWAY_PLACE.size
-            if here is not None:
-                gateway_place = _place(units, here)
-        after, end = at, at + 1 + (flags & _COUNT)
+            (digest,) = _DIGEST.unpack_from(body, digest_at)
+        if flags & _HAS_GATEWAY_PLACE and here is not None:
+            north, east, up = _GATEWAY_PLACE.unpack_from(body, gateway_at)
+            gateway_place = _place(north, east, up, here)
+        after, end = at, at + 1 + (flags & MOST_BELOW)
         listed = _listed(body[after + 1 : end])
         new, _end, rest = body[end:].partition(_END)
-        if max((*listed, *new), default=0) > MAX_NODE_ID:  # announced further, it would spoil lists
+        below = Below(body[after], listed, tuple(new))
+        if max(listed + below.new, default=0) > MAX_NODE_ID:  # announced, it would spoil lists
             return None
         near = rest.split(_END, 1)[0]
         return cls(
@@ -212,10 +222,28 @@ class Beacon(NamedTuple):
             gateway_place,
             digest,
             bool(flags & _LOOKS),
-            Below(body[after], listed, tuple(new)),
+            below,
             tuple(near),
             bool(interval & _OFFLINE),
         )
+
+
+class BeaconReader:
+    """Decodes beacons, and quickly the same one again: in one process many nodes receive it."""
+
+    def __init__(self) -> None:
+        self._body = b""
+        self._here: Location | None = None
+        self._beacon: Beacon | None = None
+
+    def read(self, body: bytes, here: Location | None) -> Beacon | None:
+        """See `Beacon.from_body`."""
+        if body != self._body or here != self._here:
+            self._body, self._here, self._beacon = body, here, Beacon.from_body(body, here)
+        return self._beacon
+
+
+READER: Final = BeaconReader()
 
 
 def shows_that_it_hears(beacon: Beacon, node: int, as_child: bool) -> bool:
@@ -272,12 +300,17 @@ NO_ANCESTORS: tuple[int, ...] = (NO_ROUTE,) * ANCESTORS
 
 
 def _units(place: Location) -> Units:
-    latitude, longitude, height = (round(value / _PLACE_M) % _WRAP for value in place)
-    return latitude, longitude, height
+    latitude, longitude, height = place
+    return _unit(latitude), _unit(longitude), _unit(height)
 
 
-def _place(units: list[int], here: Location) -> Location:
-    return Location(*(_nearest(unit, value) for unit, value in zip(units, here)))
+def _unit(metres: float) -> int:
+    return round(metres / _PLACE_M) % _WRAP
+
+
+def _place(north: int, east: int, up: int, here: Location) -> Location:
+    latitude, longitude, height = here
+    return Location(_nearest(north, latitude), _nearest(east, longitude), _nearest(up, height))
 
 
 def _nearest(unit: int, near_m: float) -> float:

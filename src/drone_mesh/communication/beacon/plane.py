@@ -10,6 +10,7 @@ from drone_mesh.communication.beacon.courier import Courier, QueuedCourier
 from drone_mesh.communication.beacon.neighbour import LUCKY
 from drone_mesh.communication.beacon.own_beacons import NodesBelow, OwnBeacons, OwnMotion
 from drone_mesh.communication.beacon.packets import (
+    READER,
     Beacon,
     Found,
     Search,
@@ -33,6 +34,7 @@ from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.timing import Due
 from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.packet_types import MessageType
+from drone_mesh.drone.location import metres_between
 
 LOOK_S: Final = 0.2  # links change that slowly
 BIDS_WITHIN_S: Final = 3.0  # routers that lose one parent notice it within two intervals
@@ -265,7 +267,7 @@ class BeaconPlane(IControlPlane):
             self._complaints.dropped("a beacon of another mesh", payload, now_s)
             return
         body = payload[messages.HEADER_BYTES : self._body_end]
-        beacon = Beacon.from_body(body, self._motion.region)
+        beacon = READER.read(body, self._motion.region)
         if beacon is None:
             self._complaints.dropped("a damaged beacon", payload, now_s)
             return
@@ -274,7 +276,7 @@ class BeaconPlane(IControlPlane):
         own, told = routes.motion, beacon.motion
         if self._frame.refuses(creator):
             beacon = beacon._replace(motion=None, gateway_place=None)
-        elif own and told and math.dist(own.place, told.place) > LUCKY * self._range_m:
+        elif own and told and metres_between(own.place, told.place) > LUCKY * self._range_m:
             reason = "a neighbour's place that is out of reach"
             self._complaints.add(reason, told.place.in_words(), now_s)
             beacon = beacon._replace(motion=None)
@@ -319,7 +321,8 @@ class BeaconPlane(IControlPlane):
         if beacon.motion is not None:
             place, velocity = beacon.motion
             neighbours.passes(node, place, self._routes.now_s)
-            flies = math.hypot(*velocity) > FLIES_M_S
+            north, east, up = velocity
+            flies = math.sqrt(north * north + east * east + up * up) > FLIES_M_S
             self._routes.neighbours[node].at_rest = neighbours.at_rest(node, place, flies)
 
     def _take_gateway_place(self, node: int, beacon: Beacon) -> None:

@@ -32,7 +32,7 @@ from drone_mesh.communication.control.delivery import IRoutes
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.neighbours import HeardPlace
 from drone_mesh.communication.timing import Deadlines
-from drone_mesh.drone.location import Location
+from drone_mesh.drone.location import Location, metres_between
 
 DUE: Final = 1.2  # intervals, with their jitter: until then a neighbour's next beacon is not late
 BACK: Final = 2  # sequence numbers: a new neighbour further behind the others may lead nowhere
@@ -83,6 +83,7 @@ class BeaconRoutes(IRoutes):
         self.hops = 0 if self._is_gateway else NO_ROUTE
         self.parent = NO_ROUTE
         self.ancestors = NO_ANCESTORS
+        self._stands_on: Beacon | None = None  # the parent's, whose ancestors these are
         self.number = 0
         self.offline = False  # the preferred gateway has no internet
         self.leaves = False  # this node gave up its connection, and flies
@@ -305,14 +306,16 @@ class BeaconRoutes(IRoutes):
             self._be_root()
         elif best is None:
             self.parent = self.hops = NO_ROUTE
-            self.ancestors = NO_ANCESTORS
+            self.ancestors, self._stands_on = NO_ANCESTORS, None
             self.offline = False
         else:
             parent = self.neighbours[best[-1]]
             beacon = parent.beacon
             self.parent, self.gateway = parent.node, beacon.gateway
             self.hops, self.number = beacon.hops + 1, beacon.number
-            self.ancestors = (beacon.parent, *beacon.ancestors)[:ANCESTORS]
+            if beacon is not self._stands_on:
+                self._stands_on = beacon
+                self.ancestors = (beacon.parent, *beacon.ancestors)[:ANCESTORS]
             self.offline = self._is_offline(beacon)
             self.proved_s = max(self.proved_s, parent.proved_s)
         return before != (self.gateway, self.parent, self.hops, self.offline)
@@ -338,7 +341,7 @@ class BeaconRoutes(IRoutes):
 
     def _be_root(self) -> None:
         self.gateway, self.hops = self._node_id, 0
-        self.parent, self.ancestors = NO_ROUTE, NO_ANCESTORS
+        self.parent, self.ancestors, self._stands_on = NO_ROUTE, NO_ANCESTORS, None
         self.number, self.offline = self._own_number, not self._has_internet
 
     def _leads_up(self, neighbour: Neighbour) -> bool:
@@ -381,7 +384,7 @@ class BeaconRoutes(IRoutes):
             return beacon.hops
         errs = neighbour.motion is None or neighbour.apart_m > WRONG * self._range_m
         from_ = self.motion if errs or neighbour.motion is None else neighbour.motion
-        needed = math.dist(from_.place, place) / (NEEDS * self._range_m)
+        needed = metres_between(from_.place, place) / (NEEDS * self._range_m)
         return max(beacon.hops, math.ceil(needed))
 
     def risk(self, neighbour: Neighbour) -> float:
@@ -480,12 +483,12 @@ class BeaconRoutes(IRoutes):
         if seen is None or self.motion is None or self.clock.now_s - seen.heard_s > SEEN_S:
             return []
         goal = seen.place
-        own_m = math.dist(self.motion.place, goal)
+        own_m = metres_between(self.motion.place, goal)
         nearer_ones = []
         for neighbour in self._all():
             motion = neighbour.motion
             if motion is not None and neighbour.usable and self.risk(neighbour) < GONE:
-                off_m = math.dist(motion.place, goal)
+                off_m = metres_between(motion.place, goal)
                 if off_m < own_m:
                     nearer_ones.append((off_m, Way(neighbour.node, neighbour.heard_s)))
         return [way for _off_m, way in sorted(nearer_ones)]

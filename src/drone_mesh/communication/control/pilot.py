@@ -187,7 +187,8 @@ class Pilot:
 
     def _located(self) -> Location:
         location = self._engine.get_location()
-        if not math.isfinite(sum(location)):
+        latitude, longitude, height = location
+        if not math.isfinite(latitude + longitude + height):
             raise LocationUnknown(f"invalid position of the drone: {location}")
         self._first = self._first or location._replace(height=0.0)
         return location

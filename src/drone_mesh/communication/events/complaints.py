@@ -42,7 +42,8 @@ class Complaints:
 
         A stranger can challenge in a neighbour's name, so it counts only while it goes on.
         """
-        return now_s - self._foreign_s.get(neighbour, -math.inf) <= CHALLENGED_FOR_S
+        foreign_s = self._foreign_s  # mostly empty
+        return bool(foreign_s) and now_s - foreign_s.get(neighbour, -math.inf) <= CHALLENGED_FOR_S
 
     def foreign_neighbour(self, now_s: float) -> str:
         """The latest reason given to `foreign`; empty if it is older than FOREIGN_FOR_S."""

@@ -280,7 +280,8 @@ class ImmediateDelivery(Delivery):
                 self.delivered(other, 1)
             elif not self.send(packet, other, failures=1):
                 self.send_own(packet)
-        super().send_own_to_each(payload, list(set(others).difference(direct)))
+        if len(direct) < len(others):
+            super().send_own_to_each(payload, list(set(others).difference(direct)))
 
     def report_missing(
         self, missing: int, first: int = NO_ROUTE, reported_by: int = NO_ROUTE

@@ -11,6 +11,7 @@ import math
 import random
 import struct
 from dataclasses import dataclass
+from typing import Final
 
 from drone_mesh.communication.control.control_plane import (
     ControlledNode,
@@ -61,9 +62,11 @@ from drone_mesh.communication.wire.packet_types import (
 )
 from drone_mesh.drone.interfaces import IDroneEngine
 
-_PRESENT = int(MessageType.PRESENT)
-_LOCATION = int(MessageType.LOCATION)
-_MOVE_TO_LOCATION = int(MessageType.MOVE_TO_LOCATION)
+_PRESENT: Final = int(MessageType.PRESENT)
+_LOCATION: Final = int(MessageType.LOCATION)
+_MOVE_TO_LOCATION: Final = int(MessageType.MOVE_TO_LOCATION)
+_FLOATS: Final = FLOATS
+_WITH_PLACES: Final = TYPES_WITH_PLACES
 _OF_ROUTERS = [kind for kind, about in enumerate(ABOUT) if about.handler is Handler.ROUTER]
 
 
@@ -231,7 +234,7 @@ class MeshnetworkComponent(NodeSnapshots, IMeshNetwork, IControlHost):
         if to != me:
             self._drop("a packet for another node", payload)
             return
-        if kind in FLOATS and not messages.is_finite(payload):
+        if kind in _FLOATS and not messages.is_finite(payload):
             self._drop("a packet with a number that is not finite", payload)
             return
         if self._neighbours.heard(from_, now_s):
@@ -247,7 +250,7 @@ class MeshnetworkComponent(NodeSnapshots, IMeshNetwork, IControlHost):
                 return
         if kind == _PRESENT and creator == from_:
             self._claims.heard_origin(creator, messages.frame_digest(payload))
-        if kind in TYPES_WITH_PLACES and self._frame.refuses(from_):
+        if kind in _WITH_PLACES and self._frame.refuses(from_):
             self._drop("a place from a node with another or an unknown origin", payload)
             # From a neighbour that has not introduced itself yet, the order is only dropped: its
             # gateway repeats it.

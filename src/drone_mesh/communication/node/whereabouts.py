@@ -19,7 +19,7 @@ from drone_mesh.communication.timing import Deadlines
 from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.messages import GatewayPlace
 from drone_mesh.communication.wire.packet_types import MessageType
-from drone_mesh.drone.location import Location
+from drone_mesh.drone.location import Location, metres_between
 
 NEAR_CLEARANCES = 3.0  # a drone that moves aside once is still within that
 MOST_TOLD = 4  # more drones do not stand that near to one place
@@ -145,10 +145,11 @@ class Whereabouts:
     def _last_places(self, goal: Location, to: int, but: Container[int]) -> list[bytes]:
         """Packets that tell `to` which nodes, `but` these, were last heard near a goal."""
         me, now_s, near = self._node_id, self._deadlines.now_s, []
+        near_m = NEAR_CLEARANCES * self._clearance_m
         for node, heard in self._control.neighbours.taken():
             if node not in but:
-                away_m = math.dist(heard.place, goal)
-                if away_m < NEAR_CLEARANCES * self._clearance_m:  # few are
+                away_m = metres_between(heard.place, goal)
+                if away_m < near_m:  # few are
                     near.append((away_m, node, heard.place, heard.heard_s))
         return [
             LastPlace(node, place, now_s - heard_s).packet(me, to)

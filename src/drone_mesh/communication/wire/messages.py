@@ -17,7 +17,7 @@ import math
 import operator
 import struct
 from dataclasses import dataclass, fields
-from typing import Callable, ClassVar, Final, Iterable, Mapping, NamedTuple, TypeVar
+from typing import Callable, ClassVar, Final, Iterable, NamedTuple, TypeVar
 
 from drone_mesh.communication.interfaces import BROADCAST, PAYLOAD_BYTES
 from drone_mesh.communication.wire.packet_types import (
@@ -197,16 +197,16 @@ _ASKER_PLACE: Final = struct.Struct("<ffH")
 _NEW_REQUEST: Final = _whole("ffH")
 _FLIES_THERE: Final = 2**15
 _GOAL: Final = 2**31  # highest bit of the time in a LOCATION; nothing else uses that
-_GOAL_AT = HEADER_BYTES + LocationMessage.BODY.size - 1  # the byte with that bit
+_GOAL_AT: Final = HEADER_BYTES + LocationMessage.BODY.size - 1  # the byte with that bit
 _GOAL_BYTE: Final = 2**7
 _ORDER_NUMBER = struct.Struct("<H")
 _ORDER_NUMBER_AT = HEADER_BYTES + GoToLocationMessage.BODY.size
 _FRAME_DIGEST: Final = struct.Struct("<H")
-_FRAME_DIGEST_AT = PAYLOAD_BYTES - _FRAME_DIGEST.size  # the last bytes of a PRESENT
+_FRAME_DIGEST_AT: Final = PAYLOAD_BYTES - _FRAME_DIGEST.size  # the last bytes of a PRESENT
 _LOCATION: Final = int(MessageType.LOCATION)
 _NEW_LOCATION: Final = _whole(LocationMessage.BODY.format[1:])
 _PRESENT: Final = int(MessageType.PRESENT)
-_NEW_PRESENT = _whole(IntroduceMessage.BODY.format[1:])
+_NEW_PRESENT: Final = _whole(IntroduceMessage.BODY.format[1:])
 _HEARTBEAT: Final = int(MessageType.HEARTBEAT)
 _HEARTBEAT_HOPS: Final = HEADER_BYTES + 2  # offset of the hop count
 _NEW_HEARTBEAT: Final = _whole(HeartbeatMessage.BODY.format[1:])
@@ -214,7 +214,7 @@ _NEW_HEARTBEAT: Final = _whole(HeartbeatMessage.BODY.format[1:])
 # ids of a ROUTE_RECORD, which follow it.
 _WITHOUT_HOP: Final = struct.Struct(f"<BxBx3sB{PAYLOAD_BYTES - ROUTE_RECORD_AT - 1}s")
 _NEXT_HOP: Final = struct.Struct(f"<4B3sB{PAYLOAD_BYTES - ROUTE_RECORD_AT - 1}s")
-_EXTENSIONS = {  # the bytes after a body that a routing technique may use
+_EXTENSIONS: Final = {  # the bytes after a body that a routing technique may use
     int(MessageType.PRESENT): range(HEADER_BYTES + IntroduceMessage.BODY.size, _FRAME_DIGEST_AT),
     int(MessageType.HEARTBEAT): range(HEADER_BYTES + HeartbeatMessage.BODY.size, PAYLOAD_BYTES),
 }
@@ -257,43 +257,43 @@ class GatewayPlace(NamedTuple):
 
 # Used for each packet: none of these calls a Python function.
 
-header: Callable[[bytes], tuple[int, int, int, int, int]] = struct.Struct(
+header: Final[Callable[[bytes], tuple[int, int, int, int, int]]] = struct.Struct(
     f"<{HEADER_BYTES}B{BODY_BYTES}x"
 ).unpack
 """Creator, from, type, to and forward of 32 bytes. Raises struct.error for another length."""
 
 
-hop: Callable[[bytes], tuple[int, int]] = struct.Struct("<xBxB").unpack_from
+hop: Final[Callable[[bytes], tuple[int, int]]] = struct.Struct("<xBxB").unpack_from
 """The sender and the receiver of this hop."""
 
 _SKIP_HEADER = f"<{HEADER_BYTES}x"
 
-heartbeat_body: Callable[[bytes], tuple[bool, int, int]] = struct.Struct(
+heartbeat_body: Final[Callable[[bytes], tuple[bool, int, int]]] = struct.Struct(
     _SKIP_HEADER + HeartbeatMessage.BODY.format[1:]
 ).unpack_from
 """Whether the creator of a HEARTBEAT knows a gateway, which, and the hops so far."""
 
-preferred_gateway: Callable[[bytes], int] = operator.itemgetter(HEADER_BYTES + 1)
+preferred_gateway: Final[Callable[[bytes], int]] = operator.itemgetter(HEADER_BYTES + 1)
 """The gateway of the creator of a HEARTBEAT; see heartbeat_body."""
 
-present_body: Callable[[bytes], tuple[int, bool]] = struct.Struct(
+present_body: Final[Callable[[bytes], tuple[int, bool]]] = struct.Struct(
     _SKIP_HEADER + IntroduceMessage.BODY.format[1:]
 ).unpack_from
 """The hops of the creator of a PRESENT to its gateway, and whether it knows one."""
 
-sender: Callable[[bytes], int] = operator.itemgetter(FROM_AT)
+sender: Final[Callable[[bytes], int]] = operator.itemgetter(FROM_AT)
 """The node that sends this hop."""
 
-receiver: Callable[[bytes], int] = operator.itemgetter(TO_AT)
+receiver: Final[Callable[[bytes], int]] = operator.itemgetter(TO_AT)
 """The node that this hop is for."""
 
-type_of: Callable[[bytes], int] = operator.itemgetter(TYPE_AT)
+type_of: Final[Callable[[bytes], int]] = operator.itemgetter(TYPE_AT)
 """The type of a packet; see MessageType."""
 
-addressee: Callable[[bytes], int] = operator.itemgetter(FORWARD_AT)
+addressee: Final[Callable[[bytes], int]] = operator.itemgetter(FORWARD_AT)
 """The final addressee of a packet, or BROADCAST."""
 
-body: Callable[[bytes], bytes] = operator.itemgetter(slice(HEADER_BYTES, None))
+body: Final[Callable[[bytes], bytes]] = operator.itemgetter(slice(HEADER_BYTES, None))
 """The 27 bytes after the header."""
 
 
@@ -424,7 +424,7 @@ def hops(payload: bytes) -> int:
     return payload[HEADER_BYTES]
 
 
-EXTENSION_ROOM: Mapping[int, int] = {kind: len(part) for kind, part in _EXTENSIONS.items()}
+EXTENSION_ROOM: Final[dict[int, int]] = {kind: len(part) for kind, part in _EXTENSIONS.items()}
 """The number of bytes after the body that a routing technique may use, for types that have any."""
 
 

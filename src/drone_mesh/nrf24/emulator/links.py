@@ -13,16 +13,16 @@ import random
 from collections import defaultdict
 from pathlib import Path
 from statistics import fmean
-from typing import Callable, Hashable
+from typing import Callable, Final, Hashable
 
 from drone_mesh.compiled import mypyc_attr
 
 SENSITIVITY_DBM = {250_000: -94.0, 1_000_000: -85.0, 2_000_000: -82.0}  # at 0.1 % BER [DS 5.7]
-_FSPL_CONSTANT_DB = -27.55  # free space, metres and MHz (ITU-R P.525)
+_FSPL_CONSTANT_DB: Final = -27.55  # free space, metres and MHz (ITU-R P.525)
 OUTDOORS = 2.7  # exponent of the path loss near the ground
-_NEAREST_M = 0.1  # antennas may share a point; log10(0) may not
+_NEAREST_M: Final = 0.1  # antennas may share a point; log10(0) may not
 _ADDRESS_LOST_BER = 0.1  # with more wrong bits not even the address is recognised
-_SAME_POINT_DBM = 0.0  # the strongest specified input [DS 5.7]
+_SAME_POINT_DBM: Final = 0.0  # the strongest specified input [DS 5.7]
 
 
 class Hop:
@@ -70,10 +70,13 @@ class LinkModel(abc.ABC):
         return math.inf
 
 
+_log10: Final = math.log10
+
+
 def free_space_dbm(distance_m: float, tx_dbm: float, carrier_mhz: int) -> float:
     """Power between isotropic antennas (ITU-R P.525); 40.06 dB loss over 1 m at 2401 MHz."""
     distance_m = max(distance_m, _NEAREST_M)
-    loss_db = 20 * math.log10(distance_m) + 20 * math.log10(carrier_mhz) + _FSPL_CONSTANT_DB
+    loss_db = 20 * _log10(distance_m) + 20 * _log10(carrier_mhz) + _FSPL_CONSTANT_DB
     return min(tx_dbm - loss_db, _SAME_POINT_DBM)
 
 

@@ -16,6 +16,8 @@ from drone_mesh.communication.beacon.packets import (
     ids_that_fit,
     left_out,
     newer,
+    room_below,
+    room_near,
 )
 from drone_mesh.drone.location import Location
 
@@ -37,9 +39,15 @@ def test_a_beacon_has_these_bytes():
     assert ROUTER.to_body(27) == bytes.fromhex(FULL)
 
 
+def room_beside(beacon, room):
+    """For neighbours, in a beacon of so many bytes."""
+    rest = room_below(room, beacon.motion, beacon.gateway_place, beacon.digest)
+    return room_near(rest, beacon.below)
+
+
 def test_neighbours_stand_behind_the_nodes_below():
     shows = ROUTER._replace(near=(3, 14))
-    assert shows.room_near(27, shows.below) == 3
+    assert room_beside(shows, 27) == 3
     body = bytes.fromhex(FULL[:-8] + "03 0e ff")
     assert shows.to_body(27) == body
     assert Beacon.from_body(body, HERE).near == (3, 14)
@@ -67,7 +75,7 @@ def test_a_receiver_without_a_place_takes_the_rest():
 
 
 def test_a_beacon_with_everything_leaves_room_for_a_seal():
-    assert ROUTER.room_below(20) == 1
+    assert room_below(20, ROUTER.motion, ROUTER.gateway_place, ROUTER.digest) == 1
     body = ROUTER._replace(below=Below(5, (6,))).to_body(20)
     assert len(body) == 20
     assert Beacon.from_body(body, HERE).below == Below(5, (6,))
@@ -103,7 +111,7 @@ def test_many_nodes_below_stand_as_the_first_id_and_a_bit_for_each():
     body = bytes.fromhex(FULL[: 18 * 3] + "05 ff 06 2d 00 c0 0c ff ff")
     body = bytes((body[0] + 2, *body[1:]))
     assert crowd.to_body(27) == body
-    assert crowd.room_near(27, crowd.below) == 1
+    assert room_beside(crowd, 27) == 1
     assert Beacon.from_body(body, HERE).below == crowd.below
 
 
