@@ -23,6 +23,7 @@ from drone_mesh.communication.wire.messages import (
 )
 from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.drone.location import Location
+from drone_mesh.errors import MeshError
 from drone_mesh.inprocess.radio import InProcessAir
 from proofs import claims
 from proofs.stranger import Stranger
@@ -32,7 +33,7 @@ BIDDING_S = 300.0
 SWALLOWING_S = 180.0
 FRAMES_PER_S = 100  # more do hardly more
 FAR = Location(4900.0, 4900.0, 0.0)  # 6.9 km away, within the bounds for goals
-HERE, THERE = Location(-5.0, 2.0, 0.0), Location(-2.0, -4.0, 0.0)  # of two orders of the owner
+AWAY_M = 5.0  # to the west, of the owner's first order that is replayed
 LARGEST_BID, PLAUSIBLE_BID = 1e9, 100.0
 
 Attack = Callable[[Stranger], None]
@@ -157,22 +158,25 @@ def _bid(stranger: Stranger, score: float) -> None:
 
 
 def replayed_order(stranger: Stranger) -> None:
-    """The owner sends drone 1 away and back; a second later its first order is replayed."""
-    _replay(stranger, 1, _recorded_order(stranger))
+    """The owner sends a drone away and back; a second later the first order is replayed."""
+    drone, order = _recorded_order(stranger)
+    _replay(stranger, drone, order)
 
 
 def replay_after_restart(stranger: Stranger) -> None:
     """The same, but drone and gateway restart before the order is replayed."""
-    order = _recorded_order(stranger)
-    for node in (1, 0):
+    drone, order = _recorded_order(stranger)
+    for node in (drone, 0):
         stranger.network.restart(node)
     stranger.network.run_for(15.0)
-    _replay(stranger, 1, order)
+    _replay(stranger, drone, order)
 
 
 def replay_on_another_path(stranger: Stranger) -> None:
     """The same, but the order is replayed through another neighbour of the drone."""
-    _replay(stranger, 6, readdressed(_recorded_order(stranger), 6))
+    drone, order = _recorded_order(stranger)
+    beside = next(node for node in stranger.network.links(drone) if node in stranger.in_range())
+    _replay(stranger, beside, readdressed(order, beside))
 
 
 ATTACKS: Mapping[str, Attack] = {
@@ -213,18 +217,24 @@ def _order(stranger: Stranger, to: int, forward: int) -> None:
     stranger.say(MessageType.MOVE_TO_LOCATION, stranger.node_id, to, forward, body)
 
 
-def _recorded_order(stranger: Stranger) -> bytes:
-    """The owner sends drone 1 away and back; returns the first packet of its first order."""
+def _recorded_order(stranger: Stranger) -> tuple[int, bytes]:
+    """The owner sends the nearest drone away and back; returns it and its first order."""
     network = stranger.network
     stranger.listen()
-    for place in (HERE, THERE):
-        while network.location(1) != place:  # an order may get lost
-            network.order(1, place.longitude, place.latitude, allow_shared_place=True)
-            network.run_until(lambda at=place: network.location(1) == at, within_s=30.0)  # type: ignore[misc]
+    home = stranger.drone.get_location()
+    live = [n for n in stranger.in_range() if n and network.nodes[n].antenna.powered]
+    drone = min(live, key=lambda node: network.location(node).distance_m(home))
+    here = network.location(drone)
+    for place in (here._replace(longitude=here.longitude - AWAY_M), here):
+        while network.location(drone) != place:  # an order may get lost
+            network.order(drone, place.longitude, place.latitude, allow_shared_place=True)
+            network.run_until(lambda at=place: network.location(drone) == at, within_s=30.0)  # type: ignore[misc]
     network.run_for(15.0)
-    stranger.ordered[1] = THERE
-    heard = (recorded.payload for recorded in stranger.record)
-    return next(payload for payload in heard if payload[TYPE_AT] == MessageType.MOVE_TO_LOCATION)
+    stranger.ordered[drone] = here
+    for _at_s, receiver, payload in stranger.record:
+        if receiver == drone and payload[TYPE_AT] == MessageType.MOVE_TO_LOCATION:
+            return drone, payload
+    raise MeshError(f"drone {drone} has heard no order")
 
 
 def _replay(stranger: Stranger, receiver: int, order: bytes) -> None:

@@ -76,7 +76,7 @@ def claimed_nonces(stranger: Stranger) -> None:
     kinds = (MessageType.PRESENT, MessageType.HEARTBEAT)
     claims = itertools.cycle(itertools.product(kinds, names))
     for drone in ORDERED:
-        _order_away(stranger, drone)
+        order_west(stranger, drone)
         periods = stranger.every(1.0 / CLAIMS_PER_S, ORDER_PERIOD_S)
         for _, (kind, name) in zip(periods, claims):
             stranger.say(kind, name, 0, 0, b"\1\0\1")
@@ -142,13 +142,13 @@ def replayed_beacons(stranger: Stranger) -> None:
 
 
 def wormhole(stranger: Stranger) -> None:
-    """Carry beacons, and what keys need to know each other, between the gateway and the far side.
+    """Carry beacons, and what keys need to know each other, between those near it and the others.
 
     It carries nothing else, so the nodes of one side take those of the other for neighbours.
     """
     network, air = stranger.network, stranger.network.air
     assert isinstance(air, InProcessAir)
-    near = {0, *network.links(0)}
+    near = set(stranger.in_range())
     latest: dict[int, bytes] = {}  # by node: its last beacon
 
     def play(payload: bytes, to: int) -> None:
@@ -205,8 +205,8 @@ def _names(stranger: Stranger) -> list[int]:
     return [stranger.node_id, *stranger.in_range()]
 
 
-def _order_away(stranger: Stranger, drone: int) -> None:
-    """The owner sends a drone away."""
+def order_west(stranger: Stranger, drone: int) -> None:
+    """The owner sends a drone away, to the west."""
     network = stranger.network
     here = network.location(drone)
     goal = stranger.ordered[drone] = here._replace(longitude=here.longitude - ORDERED_M)
@@ -218,7 +218,7 @@ def _order_in_turn(stranger: Stranger) -> None:
     network = stranger.network
     for turn, drone in enumerate(ORDERED, 1):
         at_s = network.now_s() + turn * CLAIMING_S / 10
-        network.clock.call_at(at_s, functools.partial(_order_away, stranger), drone)
+        network.clock.call_at(at_s, functools.partial(order_west, stranger), drone)
 
 
 def _to_all(stranger: Stranger, name: int, beacon: Beacon) -> None:

@@ -6,15 +6,16 @@ import enum
 import functools
 import math
 import statistics
-from typing import AbstractSet, NamedTuple, Sequence
+from typing import AbstractSet, NamedTuple
 
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.node.node_configuration import DEFAULT_ROUTING
 from drone_mesh.communication.seals.keys import Keys, MeshKey
+from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.communication.wire.messages import present
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import MeshError
-from drone_mesh.inprocess.network import Network
+from drone_mesh.inprocess.network import STEP_S, Network
 from proofs.attacks import (
     ATTACKS,
     RECORDING,
@@ -22,15 +23,14 @@ from proofs.attacks import (
     highest_bid,
     invented_ids,
     plausible_bid,
-    swallowing_relay,
 )
-from proofs.claims import BY_BEACONS, FOR_PACKETS_DOWN
+from proofs.claims import BY_BEACONS, FOR_PACKETS_DOWN, order_west
 from proofs.stranger import BESIDE, Stranger
 
 NODES, SHARED_NODES = 25, 9
 SPACING_M = 6.0
-PLACES = ((0.0, 0.0), (0.0, 0.5), (0.5, 0.0), (0.5, 0.5), (1.0, 1.0))  # of the sides of the mesh
-PLACED = (highest_bid, plausible_bid, swallowing_relay)  # in a line; on the routes of most
+REST_S = 20.0
+JOINING_S = 12.0
 STRANGER = 200
 LURED_M = 50.0  # farther than any repair flies here
 OFF_ORDER_M = 3.0  # tolerance for a drone that its owner ordered to a place
@@ -43,10 +43,40 @@ KEY = MeshKey(_SECRET)
 class Threat(enum.Enum):
     """The kind of attacker, and whether the mesh has a key."""
 
-    NONE = "no attack"
     WITHOUT_KEY = "without key"
     WITH_KEY = "with key"
     CAPTURED = "captured node"  # with its own keys, in a mesh with a key
+
+
+class Place(enum.Enum):
+    """Where the attacker is: this part of the mesh's sides beyond a spot beside the gateway."""
+
+    MIDDLE = (0.5, 0.5)
+    GATEWAY = (0.0, 0.0)
+    LEFT = (0.0, 0.5)
+    FRONT = (0.5, 0.0)
+    CORNER = (1.0, 1.0)  # the far one
+
+
+class Moment(enum.Enum):
+    """When the attack begins."""
+
+    REST = "rest"
+    HALF = "half a period later"  # between two checks of the neighbours
+    FORMING = "start"  # of all nodes
+    FORMED = "formed"  # as soon as all are connected
+    FAILURE = "failure"  # of the router on most routes
+    FLIGHT = "flight"  # of that router, ordered by the owner
+    RESTART = "restart"  # of the gateway
+
+
+class Case(NamedTuple):
+    """One attack by this attacker, from this place, at this moment."""
+
+    name: str
+    threat: Threat
+    place: Place = Place.GATEWAY
+    moment: Moment = Moment.REST
 
 
 class Damage(NamedTuple):
@@ -58,39 +88,44 @@ class Damage(NamedTuple):
     metres: float  # distance of the farthest of them
 
 
-@functools.lru_cache(maxsize=None)  # a search for the worst place has made some of them
-def trial(name: str, threat: Threat, seed: int, place: int = 0) -> Damage:
-    """One attack with this threat, at this one of the PLACES, or the same time without one."""
-    attack = ATTACKS[name]
+def harm(case: Case, seed: int) -> Damage:
+    """What the attack costs more than the same time without one."""
+    attacked = trial(case, seed)
+    if not any(attacked):
+        return attacked  # no worse than whatever happens without one
+    # An attacker that does nothing is the same everywhere, with the keys of a node or without.
+    threat = Threat.WITHOUT_KEY if case.threat is Threat.WITHOUT_KEY else Threat.WITH_KEY
+    quiet = trial(Case(case.name, threat, moment=case.moment), seed, mute=True)
+    lured = attacked.lured - quiet.lured
+    metres = attacked.metres if lured > 0 else 0.0
+    return Damage(attacked.cut_off - quiet.cut_off, attacked.later - quiet.later, lured, metres)
+
+
+@functools.lru_cache(maxsize=None)  # the search for the worst case has made some of them
+def trial(case: Case, seed: int, mute: bool = False) -> Damage:
+    """One attack, or the same time with an attacker that does nothing."""
+    attack = ATTACKS[case.name]
     shared = attack in (invented_ids, borrowed_names)  # where strangers cost airtime
-    radio = "shared" if shared else "disc"
     network = Network(
         seed,
-        radio=radio,
-        key=keys_of if threat in (Threat.WITH_KEY, Threat.CAPTURED) else None,
+        radio="shared" if shared else "disc",
+        key=None if case.threat is Threat.WITHOUT_KEY else keys_of,
         routing="beacon" if attack in BY_BEACONS else DEFAULT_ROUTING,
     )
     if attack in (highest_bid, plausible_bid):
         network.add_gateway(0, 0.0, 0.0)
         for node in (1, 2, 3):
             network.add_router(node, SPACING_M * node, 0.0)
-        at = (2 * SPACING_M, 3.0)
+        sides_m = 2 * SPACING_M, 0.0
     else:
         nodes = SHARED_NODES if shared else NODES
         network.add_fleet(1, nodes - 1, math.ceil(math.sqrt(nodes - 1)), SPACING_M)
-        side_m = SPACING_M * (math.isqrt(nodes - 1) - 1)
-        at = (2.0 + PLACES[place][0] * side_m, 3.0 + PLACES[place][1] * side_m)
-    if not network.run_until(network.all_connected, within_s=60.0):
-        raise MeshError(f"seed {seed}: the mesh does not connect without an attack")
-    network.run_for(20.0)
-    places = {node: network.location(node) for node in network.nodes}
-    stranger = Stranger(network, STRANGER, *at)
-    if threat is Threat.CAPTURED:
-        stranger.join_with(KEY.for_node(STRANGER))
-    stranger.mute = threat is Threat.NONE
-    stranger.switch_on()
-    if threat is Threat.CAPTURED:
-        _join_neighbours(stranger)
+        sides_m = (SPACING_M * (math.isqrt(nodes - 1) - 1),) * 2
+    x, y = (part * side_m for part, side_m in zip(case.place.value, sides_m))
+    stranger = Stranger(network, STRANGER, 2.0 + x, 3.0 + y)
+    stranger.mute = mute
+    proper = {node: network.location(node) for node in network.nodes}
+    _wait_for(case, stranger)
     shares: list[float] = []
     is_down = attack in FOR_PACKETS_DOWN
 
@@ -101,11 +136,49 @@ def trial(name: str, threat: Threat, seed: int, place: int = 0) -> Damage:
     sample(None)
     attack(stranger)
     cut_off = statistics.fmean(shares)
-    lured = _away(network, places, stranger.ordered)
+    lured = _away(network, proper, stranger.ordered)
     stranger.antenna.stop_antenna()
     network.run_for(RECOVERY_S)
     later = share_cut_off(network, stranger.swallows, is_down)
     return Damage(cut_off, later, len(lured), max(lured, default=0.0))
+
+
+def _wait_for(case: Case, stranger: Stranger) -> None:
+    """Let time pass until the attack begins; the attacker is then reachable, and has joined."""
+    network, moment = stranger.network, case.moment
+    network.run_for(STEP_S)  # all nodes have started
+    early = moment in (Moment.FORMING, Moment.FORMED)
+    if early:
+        _join(case, stranger)
+    if moment is Moment.FORMING:
+        return
+    if not network.run_until(network.all_connected, within_s=60.0):
+        raise MeshError("the mesh does not connect without an attack")
+    if early:
+        return
+    network.run_for(REST_S)
+    _join(case, stranger)
+    if case.threat is Threat.CAPTURED:
+        network.run_for(JOINING_S)
+    if moment is Moment.HALF:
+        network.run_for(MeshTiming.check_period_s / 2)
+    elif moment is Moment.FAILURE:
+        network.power(stranger.busiest_relay(), False)
+    elif moment is Moment.FLIGHT:
+        order_west(stranger, stranger.busiest_relay())
+    elif moment is Moment.RESTART:
+        network.restart(0)
+
+
+def _join(case: Case, stranger: Stranger) -> None:
+    """Switch the attacker on; a captured node becomes a neighbour of the others."""
+    captured = case.threat is Threat.CAPTURED and not stranger.mute
+    if captured:
+        stranger.join_with(KEY.for_node(STRANGER))
+    stranger.switch_on()
+    if captured:
+        introduction = present(stranger.node_id, NO_ROUTE, know_gateway=False)
+        stranger.antenna.broadcast_message(introduction)
 
 
 def share_cut_off(network: Network, swallow: AbstractSet[int], down: bool = False) -> float:
@@ -126,15 +199,21 @@ TABLE_HEAD = (
 )
 
 
-def worst_place(name: str, threat: Threat) -> int:
-    """The one of the PLACES from where an attack does most, with the first seed.
+def worst(name: str, threat: Threat) -> Case:
+    """The place and the moment at which the first seed suffers most.
 
-    Recordings are made beside the gateway.
+    Tries each place at rest, then each moment at the worst of them, then each place at that moment.
     """
-    if threat is Threat.NONE or ATTACKS[name] in (*RECORDING, *PLACED):
-        return 0
-    harm = [trial(name, threat, 0, place) for place in range(len(PLACES))]
-    return max(range(len(PLACES)), key=lambda place: (harm[place].cut_off, harm[place].lured))
+    worst = Case(name, threat, Place.MIDDLE)  # where it hears most
+    for field, values in (("place", Place), ("moment", Moment), ("place", Place)):
+        cases = [worst, *(worst._replace(**{field: value}) for value in values)]
+        worst = max(cases, key=_weight)
+    return worst
+
+
+def _weight(case: Case) -> float:
+    cut_off, later, lured, _ = harm(case, seed=0)
+    return round(cut_off + later + lured, 2)
 
 
 def damage_row(name: str, runs: int) -> str:
@@ -143,10 +222,23 @@ def damage_row(name: str, runs: int) -> str:
     for threat in Threat:
         if threat is Threat.CAPTURED and ATTACKS[name] in RECORDING:
             cells.append("")  # a captured node replays recordings like any other radio
-            continue
-        place = worst_place(name, threat)
-        cells.append(_in_words([trial(name, threat, seed, place) for seed in range(runs)]))
+        else:
+            cells.append(_cell(worst(name, threat), runs))
     return f"| {name} | " + " | ".join(cells) + " |"
+
+
+def _cell(case: Case, runs: int) -> str:
+    """What the attack does in the mean, and, if it does anything, where and when."""
+    damages = [harm(case, seed) for seed in range(runs)]
+    cut_off, later, lured, _ = (max(0.0, statistics.fmean(column)) for column in zip(*damages))
+    text = f"{100 * cut_off:.0f} %, later {100 * later:.0f} %"
+    if lured:
+        text += f"; {lured:.1f} lured, {max(d.metres for d in damages):.0f} m"
+    return (
+        text
+        if text == "0 %, later 0 %"
+        else f"{text} ({case.place.name.lower()}, {case.moment.value})"
+    )
 
 
 def with_row(page: str, row: str) -> str:
@@ -163,26 +255,11 @@ def with_row(page: str, row: str) -> str:
     return "\n".join(lines)
 
 
-def _in_words(damage: Sequence[Damage]) -> str:
-    cut_off, later, lured, _ = (statistics.fmean(column) for column in zip(*damage))
-    text = f"{100 * cut_off:.0f} %, later {100 * later:.0f} %"
-    if lured:
-        text += f"; {lured:.1f} lured, {max(d.metres for d in damage):.0f} m"
-    return text
-
-
 def keys_of(node_id: int) -> Keys | None:
     """Each router has its own keys; the stranger's router beside the mesh has none."""
     if node_id == BESIDE:
         return None
     return MeshKey(_SECRET) if node_id == 0 else KEY.for_node(node_id)
-
-
-def _join_neighbours(stranger: Stranger) -> None:
-    """A captured node becomes a neighbour of the others before it attacks."""
-    me = stranger.node_id
-    stranger.antenna.broadcast_message(present(me, NO_ROUTE, know_gateway=False))
-    stranger.network.run_for(12.0)
 
 
 def _arrives(network: Network, node: int, swallow: AbstractSet[int]) -> bool:

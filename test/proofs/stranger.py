@@ -118,9 +118,8 @@ class Stranger(IMeshNetwork):
             return
         network = self.network
         if self._is_inside or not network.sealed:
-            paths = map(network.path_to_gateway, network.nodes)
-            relays = Counter(node for path in paths for node in (path or [])[1:-1])
-            relay = max(sorted(relays), key=relays.__getitem__)
+            network.run_until(network.all_connected, within_s=60.0)
+            relay = self.busiest_relay()
         else:
             relay = BESIDE
             x, y, _ = self.drone.get_location().to_vector()
@@ -129,6 +128,14 @@ class Stranger(IMeshNetwork):
         node = network.nodes[relay]
         node.receiver = Hole(network, relay, [])
         self.swallows.add(relay)
+
+    def busiest_relay(self) -> int:
+        """The live router on most routes to the gateway."""
+        nodes = self.network.nodes
+        paths = map(self.network.path_to_gateway, nodes)
+        relays = Counter(node for path in paths for node in (path or [])[1:-1])
+        live = sorted(node for node in relays if nodes[node].antenna.powered)
+        return max(live, key=relays.__getitem__)
 
     def in_range(self) -> list[int]:
         """The nodes that can hear it."""
