@@ -202,13 +202,15 @@ TABLE_HEAD = (
 def worst(name: str, threat: Threat) -> Case:
     """The place and the moment at which the first seed suffers most.
 
-    Tries each place at rest, then each moment at the worst of them, then each place at that moment.
+    Tries each place at rest, then each moment at the worst of them and beside the gateway, then
+    each place at the worst moment.
     """
-    worst = Case(name, threat, Place.MIDDLE)  # where it hears most
-    for field, values in (("place", Place), ("moment", Moment), ("place", Place)):
-        cases = [worst, *(worst._replace(**{field: value}) for value in values)]
-        worst = max(cases, key=_weight)
-    return worst
+    everywhere = [Case(name, threat, place) for place in Place]
+    at_rest = max(everywhere, key=_weight)
+    spots = (at_rest, Case(name, threat, Place.GATEWAY))
+    moments = [spot._replace(moment=moment) for spot in spots for moment in Moment]
+    worst = max(moments, key=_weight)
+    return max([worst, *(worst._replace(place=place) for place in Place)], key=_weight)
 
 
 def _weight(case: Case) -> float:
