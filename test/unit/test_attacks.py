@@ -123,7 +123,8 @@ def test_the_bids_of_a_captured_node_delay_a_repair_and_do_not_prevent_it(name):
     assert attacked.later == 0.0
 
 
-def test_the_table_has_a_cell_for_each_case():
+def test_the_table_has_a_cell_for_each_case(monkeypatch):
+    monkeypatch.setattr(damage, "worst", Case)  # beside the gateway, at rest
     name = "order replayed after 1 s"
     assert ATTACKS[name] in RECORDING
     row = damage_row(name, runs=1)
@@ -157,8 +158,8 @@ def test_an_attack_is_searched_for_its_worst_place_and_moment(monkeypatch):
 @pytest.mark.parametrize("moment", Moment)
 def test_an_attack_can_begin_at_each_moment(moment):
     """A recorded order does not come true again in a mesh with a key, whenever it was given."""
-    for name in ("order replayed after a restart", "beacons that list all drones"):
-        assert harm(Case(name, Threat.WITH_KEY, Place.MIDDLE, moment), seed=0).lured <= 0
+    case = Case("order replayed after a restart", Threat.WITH_KEY, Place.MIDDLE, moment)
+    assert harm(case, seed=0).lured <= 0
 
 
 def test_an_unknown_attack_is_an_error_in_one_line(capsys):
