@@ -110,6 +110,14 @@ def test_also_between_a_hundred_nodes_on_a_shared_channel(technique):
 
 
 @pytest.mark.slow
+def test_also_with_a_key_between_64_nodes_with_beacons():
+    """Their questions for the gateway's nonce and place do not fill the channel for ever."""
+    network = scenarios.fleet(63, 8, 2, radio="shared", routing="beacon", key=KEY)
+    network.run_for(60.0)
+    assert_all_arrive(network, within_s=5.0, count=60, every_s=0.5)
+
+
+@pytest.mark.slow
 def test_a_burst_of_messages_on_a_shared_channel_is_not_followed_by_questions_that_fill_it():
     """Two a second at random times: if senders ask after a second, 1 in 5 is late from then on."""
     network = scenarios.fleet(99, 10, 1, radio="shared")

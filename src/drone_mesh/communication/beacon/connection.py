@@ -24,6 +24,7 @@ CHECK_S: Final = 1.0  # how often a router without a gateway considers its repai
 ASKS_S: Final = 10.0  # at most so often for the place of a gateway that moves
 PERIOD_S: Final = 60.0  # a router and its gateway tell each other the nonces of their seals
 AGAIN_S: Final = 5.0  # until the gateway has answered twice
+RARER: Final = 3.0  # on a busy channel, per check period of its patience: all relays lead there
 
 
 @dataclass(eq=False)
@@ -134,6 +135,7 @@ class Proofs:
     _places: KnownPlaces
     _seals: IMeshSeals
     _complaints: Complaints
+    _antenna: IWirelessCommunication
     _rng: random.Random
 
     def __post_init__(self) -> None:
@@ -178,7 +180,8 @@ class Proofs:
         if self._routes.parent == NO_ROUTE:
             self.due_s = math.inf
             return
-        self.due_s = now_s + AGAIN_S * (1.0 + self._rng.random())
+        busy = 1.0 + RARER * self._antenna.patience()
+        self.due_s = now_s + AGAIN_S * busy * (1.0 + self._rng.random())
         self._routes.tried[gateway] += not self._seals.may_be_gateway(gateway)
         self._courier.send_own(messages.heartbeat(me, me, gateway, gateway, True, gateway))
         if self._places.asks_gateway:

@@ -96,6 +96,7 @@ class BeaconPlane(IControlPlane):
             node.places,
             node.seals,
             node.complaints,
+            node.antenna,
             node.rng,
         )
         self._watch = ParentWatch(self._routes, medium.hop_s, node.rng)

@@ -41,7 +41,7 @@ class Node:
         seals = SimpleNamespace(may_be_gateway=self.proved.__contains__, has_key=has_key)
         self.proofs = Proofs(
             9, is_gateway, self.routes, courier, requests, self.places, seals,
-            self.complaints, AlwaysHalf(),
+            self.complaints, self.antenna, AlwaysHalf(),
         )  # fmt: skip
 
     def connect(self):
@@ -82,6 +82,12 @@ def test_heartbeats_are_frequent_until_the_second_answer_and_then_come_once_a_mi
     assert node.routes.tried[0] == 1  # only the first one was in vain
     node.proofs.heard(ANSWER, 0)
     assert node.proofs.next_s == 10.0 + 54.0
+
+
+def test_on_a_busy_channel_heartbeats_without_an_answer_are_rarer(node):
+    node.antenna.patience = lambda: 2.0
+    node.sent(2.5)
+    assert node.proofs.next_s == 2.5 + 7.5 * 7.0
 
 
 def test_without_a_way_up_nothing_is_sent_until_there_is_one(node):
