@@ -24,7 +24,7 @@ CHECK_S: Final = 1.0  # how often a router without a gateway considers its repai
 ASKS_S: Final = 10.0  # at most so often for the place of a gateway that moves
 PERIOD_S: Final = 60.0  # a router and its gateway tell each other the nonces of their seals
 AGAIN_S: Final = 5.0  # until the gateway has answered twice
-RARER: Final = 3.0  # on a busy channel, per check period of its patience: all relays lead there
+RARER: Final = 1.0  # on a busy channel, per check period of its patience: all relays lead there
 
 
 @dataclass(eq=False)
