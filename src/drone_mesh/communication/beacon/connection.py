@@ -24,7 +24,8 @@ CHECK_S: Final = 1.0  # how often a router without a gateway considers its repai
 ASKS_S: Final = 10.0  # at most so often for the place of a gateway that moves
 PERIOD_S: Final = 60.0  # a router and its gateway tell each other the nonces of their seals
 AGAIN_S: Final = 5.0  # until the gateway has answered twice
-RARER: Final = 1.0  # on a busy channel, per check period of its patience: all relays lead there
+PATIENT_AFTER: Final = 3  # heartbeats without an answer; the first ones are urgent
+RARER: Final = 3.0  # on a busy channel, per check period of its patience: all relays lead there
 
 
 @dataclass(eq=False)
@@ -143,6 +144,7 @@ class Proofs:
         self.due_s = math.inf  # the next heartbeat
         self._asked_s, self._ask_s = -math.inf, math.inf  # for the place of the gateway: last, next
         self._proven: int | None = None  # the gateway that answered the last one
+        self._vain = 0  # heartbeats since the last answer
 
     def begin(self) -> None:
         """Begin anew for another gateway, at a random moment: many nodes find it at once."""
@@ -180,7 +182,8 @@ class Proofs:
         if self._routes.parent == NO_ROUTE:
             self.due_s = math.inf
             return
-        busy = 1.0 + RARER * self._antenna.patience()
+        self._vain += 1
+        busy = 1.0 + RARER * self._antenna.patience() * (self._vain >= PATIENT_AFTER)
         self.due_s = now_s + AGAIN_S * busy * (1.0 + self._rng.random())
         self._routes.tried[gateway] += not self._seals.may_be_gateway(gateway)
         self._courier.send_own(messages.heartbeat(me, me, gateway, gateway, True, gateway))
@@ -196,6 +199,7 @@ class Proofs:
             if self._is_gateway:
                 self._courier.send_own(messages.heartbeat(me, me, creator, creator, True, me))
         elif creator == self._routes.gateway:
+            self._vain = 0
             if self._proven == creator:  # its second answer: by now it has a proof of this node
                 self.due_s = now_s + PERIOD_S * (1.0 - JITTER * self._rng.random())
             self._proven = creator

@@ -86,8 +86,11 @@ def test_heartbeats_are_frequent_until_the_second_answer_and_then_come_once_a_mi
 
 def test_on_a_busy_channel_heartbeats_without_an_answer_are_rarer(node):
     node.antenna.patience = lambda: 2.0
-    node.sent(2.5)
-    assert node.proofs.next_s == 2.5 + 7.5 * 3.0
+    at_s = 2.5
+    for seconds in (7.5, 7.5, 52.5, 52.5):
+        node.sent(at_s)
+        assert node.proofs.next_s == at_s + seconds
+        at_s += seconds
 
 
 def test_without_a_way_up_nothing_is_sent_until_there_is_one(node):
