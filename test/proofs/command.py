@@ -42,7 +42,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     attack.add_argument(
         "--runs",
         type=whole(1, MOST),
-        default=12,
+        default=3,
         metavar="N",
         help="number of seeds (default %(default)s)",
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 import struct
 from typing import Final, Iterable, NamedTuple, Sequence, Tuple
@@ -175,7 +174,6 @@ class Beacon(NamedTuple):
         return (head + body + _END + bytes(self.near))[:room].ljust(room, _END)
 
     @classmethod
-    @functools.lru_cache(maxsize=256)  # in one process many nodes receive the same one
     def from_body(cls, body: bytes, here: Location | None) -> Beacon | None:
         """Decode the bytes of `to_body`; None if they are damaged.
 
@@ -229,18 +227,21 @@ class Beacon(NamedTuple):
 
 
 class BeaconReader:
-    """Decodes beacons, and quickly the same one again: in one process many nodes receive it."""
+    """Decodes beacons, and quickly the same one again: in one process many nodes receive it.
+
+    Any thread: the last one is replaced as a whole.
+    """
 
     def __init__(self) -> None:
-        self._body = b""
-        self._here: Location | None = None
-        self._beacon: Beacon | None = None
+        self._last: tuple[bytes, Location | None, Beacon | None] = b"", None, None
 
     def read(self, body: bytes, here: Location | None) -> Beacon | None:
         """See `Beacon.from_body`."""
-        if body != self._body or here != self._here:
-            self._body, self._here, self._beacon = body, here, Beacon.from_body(body, here)
-        return self._beacon
+        last_body, last_here, beacon = self._last
+        if body != last_body or here != last_here:
+            beacon = Beacon.from_body(body, here)
+            self._last = body, here, beacon
+        return beacon
 
 
 READER: Final = BeaconReader()

@@ -38,7 +38,7 @@ from drone_mesh.drone.location import metres_between
 
 LOOK_S: Final = 0.2  # links change that slowly
 BIDS_WITHIN_S: Final = 3.0  # routers that lose one parent notice it within two intervals
-WITHOUT_BEACONS_S: Final = 5.0  # 2.5 of the longest intervals, and more
+WITHOUT_BEACONS_S: Final = 5.0  # three of the longest intervals
 MOVED: Final = 0.05  # of the range: a drone further from where it stood flies; from where the
 # others expect it, it has turned
 FLIES_M_S: Final = 0.3  # faster than the place of a drone at rest drifts

@@ -18,6 +18,7 @@ from drone_mesh.configuration import MAX_REAL_TIME_FACTOR, MIN_REAL_TIME_FACTOR
 from drone_mesh.errors import FleetRefused
 from drone_mesh.msg import HostProgress
 from drone_mesh.ros.graph import names
+from drone_mesh.ros.graph.conversions import ros_time
 from drone_mesh.ros.graph.direct_publisher import DirectPublisher
 from drone_mesh.ros.graph.logs import ThrottledLog
 from drone_mesh.ros.graph.simulation import Run, is_left_behind, run_headers
@@ -218,7 +219,7 @@ class WorldRunner:
                 return
             if wait_s > 0.0:
                 time.sleep(wait_s)
-            self._tick.clock.set(*divmod(round(self._world.step() * 1e9), 10**9))
+            self._tick.clock = ros_time(self._world.step())
             self._clock.publish(self._tick)
             if self._nodes is not None:
                 self._nodes.executor.time_advanced()
