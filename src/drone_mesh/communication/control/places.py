@@ -181,6 +181,10 @@ class PlaceRequests:
         """Ask `node` for its place, along the route to it; returns whether that has left."""
         return self._delivery.send_own(self._request(node))
 
+    def ask_neighbour(self, node: int) -> None:
+        """Ask `node`, in reach, for its place; no route to it is needed."""
+        self._antenna.send_message_to(self._request(node))
+
     def ask_all(self, may_fly_on: bool = False) -> None:
         """Ask every node in range for its place; `may_fly_on`: and of others near, as in flight."""
         self._antenna.broadcast_message(self._request(BROADCAST, may_fly_on))

@@ -134,6 +134,8 @@ class ConnectionRepair(RepairActions):
                 self._lost_since_s = self.now_s
                 self._plan_emergency()
         self._strategy.on_neighbour_found(node)
+        if self._flight is not None and not self._flight.on_ground:
+            self._requests.ask_neighbour(node)  # before the next second it may have landed
         if self._landed_unheard:
             self._landed_unheard = False
             if not (self.connected or self._strategy.listens):

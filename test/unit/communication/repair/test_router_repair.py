@@ -1444,6 +1444,18 @@ def test_old_news_and_places_that_are_no_numbers_change_nothing(heard):
     assert rig.engine.goals == [BESIDE_NEIGHBOUR]
 
 
+def test_a_node_that_comes_into_reach_in_flight_is_asked_at_once():
+    """It may be the only one that knows who is at the goal, and the next second is too late."""
+    rig = flying_rig()
+    rig.wait(0.5)
+    rig.forget()
+    rig.hear("09 09 03 01 fe 00 01", "09 09 03 01 fe 00 01")  # 9 introduces itself, twice
+    asked = [sent for sent in rig.sent(REQUEST) if sent[3] == 9]
+    assert [sent[4] for sent in asked] == [9]
+    rig.hear("09 09 45 01 01 01 00 07 00 00 00 41 00 00 8c bf")  # 7 was at the goal a second ago
+    assert rig.engine.goals[-1] != BESIDE_NEIGHBOUR
+
+
 @pytest.mark.parametrize(
     ("flies", "told"), [("80", [packet("01 01 45 03 03 3c 00 05 00 00 00 41")]), ("00", [])]
 )
