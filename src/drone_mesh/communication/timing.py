@@ -215,8 +215,8 @@ class Deadlines:
         self.at_s = [math.inf] * len(Due)  # by Due, infinity: never; changes only here
         self.next_s = math.inf  # the earliest of all
 
-    def set(self, due: Due, at_s: float) -> None:
-        """Schedule `due` at `at_s`; infinity cancels it."""
+    def set(self, due: int, at_s: float) -> None:
+        """Schedule `due`, one of Due, at `at_s`; infinity cancels it."""
         before_s = self.at_s[due]
         self.at_s[due] = at_s
         if at_s <= self.next_s:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections import deque
 from heapq import heappop, heappush
@@ -41,11 +40,12 @@ class VirtualClock:
         # Events requested in order of time, like most packets; cheaper than the heap.
         self._line: deque[Event] = deque()
         self._line_ends_s = -math.inf
-        self._order = itertools.count()  # events of one time run in the order of the requests
+        self._requests = 0  # events of one time run in the order of the requests
 
     def call_at(self, at_s: float, function: Callable[[Any], None], argument: Any) -> None:
         """Call `function(argument)` at `at_s`, or at once if that is in the past."""
-        heappush(self._events, (at_s, next(self._order), function, argument))
+        self._requests += 1
+        heappush(self._events, (at_s, self._requests, function, argument))
 
     def call_in_line(self, at_s: float, function: Callable[[Any], None], argument: Any) -> None:
         """Like `call_at`, but cheaper if calls request ascending times."""
@@ -53,7 +53,8 @@ class VirtualClock:
             self.call_at(at_s, function, argument)
             return
         self._line_ends_s = at_s
-        self._line.append((at_s, next(self._order), function, argument))
+        self._requests += 1
+        self._line.append((at_s, self._requests, function, argument))
 
     def next_event_s(self) -> float:
         """The time of the next event; infinity if none is planned."""

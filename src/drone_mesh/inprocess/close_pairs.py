@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
-from typing import Iterator
+import itertools
+from typing import Iterable, Iterator
 
 import numpy as np
+
+from drone_mesh.drone.location import Location
 
 MARGIN = 0.2  # of the reach: who moves a twentieth of it per second is compared to all each 2 s
 
 
+def by_axis(places: Iterable[Location]) -> np.ndarray:
+    """The coordinates of n points as (3, n): numpy is slow with many rows of three."""
+    rows = np.fromiter(itertools.chain.from_iterable(places), float).reshape(-1, 3)
+    axes: np.ndarray = np.ascontiguousarray(rows.T)
+    return axes
+
+
 def _squares(vectors: np.ndarray) -> np.ndarray:
-    squares: np.ndarray = np.einsum("...i,...i->...", vectors, vectors)
+    squares: np.ndarray = (vectors * vectors).sum(axis=0)
     return squares
 
 
@@ -22,7 +32,7 @@ class Surroundings:
     """
 
     def __init__(self, reach_m: float, margin: float, places: np.ndarray) -> None:
-        """`margin`: of the reach. `places`: (n, 3), metres; a point at NaN may be anywhere."""
+        """`margin`: of the reach. `places`: `by_axis`, metres; a point at NaN may be anywhere."""
         self._reach_m = reach_m
         self._margin_m = margin * reach_m
         self._find(places)
@@ -38,7 +48,7 @@ class Surroundings:
         return rows
 
     def _find(self, places: np.ndarray) -> None:
-        away = places[:, None] - places[None]
+        away = places[:, :, None] - places[:, None]
         self._may_be = ~(_squares(away) > (self._reach_m + self._margin_m) ** 2)  # False for NaN
         self._found_at = places
 
@@ -47,7 +57,7 @@ class ClosePairs(Surroundings):
     """The pairs of points within reach, sought only among those that may have got there."""
 
     def __init__(self, reach_m: float, places: np.ndarray) -> None:
-        """`places`: (n, 3), metres."""
+        """`places`: `by_axis`, metres."""
         self._pairs: np.ndarray = np.zeros(0, int)  # n times one row plus the other; ascending
         self._close: np.ndarray = np.zeros(0, bool)  # of each of them: within reach
         super().__init__(reach_m, MARGIN, places)
@@ -65,10 +75,10 @@ class ClosePairs(Surroundings):
         close = self._pairs[self._close]
         self._pairs = np.union1d(np.flatnonzero(np.triu(self._may_be, 1)), close)
         self._close = np.isin(self._pairs, close, assume_unique=True)
-        self._one, self._other = np.divmod(self._pairs, len(places))
+        self._one, self._other = np.divmod(self._pairs, places.shape[1])
 
     def _closest(self, places: np.ndarray) -> np.ndarray:
         """Of each pair: whether it is within reach."""
-        apart = np.take(places, self._one, axis=0) - np.take(places, self._other, axis=0)
+        apart = np.take(places, self._one, axis=1) - np.take(places, self._other, axis=1)
         close: np.ndarray = _squares(apart) < self._reach_m**2
         return close

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 import random
 from typing import Callable, Iterable, Mapping
-
-import numpy as np
 
 from drone_mesh.communication.interfaces import IMeshDebugInfo, IMeshNetwork
 from drone_mesh.communication.repair.options import RANGE_M
 from drone_mesh.communication.wire.messages import copies_for, hop
 from drone_mesh.drone.location import Location
 from drone_mesh.inprocess.clock import VirtualClock
-from drone_mesh.inprocess.close_pairs import ClosePairs
+from drone_mesh.inprocess.close_pairs import ClosePairs, by_axis
 from drone_mesh.inprocess.interfaces import Host, IInProcessAir, IInProcessAntenna
 
 HOP_DELAY_S = 0.002  # an acknowledged packet takes 1.9 ms on the air (nRF24L01+, 250 kbit/s)
@@ -25,11 +22,6 @@ Deliver = Callable[[bytes], None]
 
 def _ignore(_payload: bytes) -> None:
     """A packet reached an antenna without power, or one that was stopped."""
-
-
-def _as_rows(places: Iterable[Location]) -> np.ndarray:
-    rows: np.ndarray = np.fromiter(itertools.chain.from_iterable(places), float).reshape(-1, 3)
-    return rows
 
 
 class InProcessAir(IInProcessAir):
@@ -115,12 +107,12 @@ class InProcessAir(IInProcessAir):
             for node in moved:
                 self._link(node)
             if self.sees is None:
-                self._pairs = ClosePairs(self.max_distance_m, _as_rows(standing.values()))
+                self._pairs = ClosePairs(self.max_distance_m, by_axis(standing.values()))
             return
         for node in moved:
             standing[node] = self._antennas[node].drone.get_location()
         ids = list(standing)
-        for one, other, near in pairs.moved_to(_as_rows(standing.values())):
+        for one, other, near in pairs.moved_to(by_axis(standing.values())):
             self._set_link(ids[one], ids[other], near)
 
     def _set_link(self, one: int, other: int, near: bool) -> None:

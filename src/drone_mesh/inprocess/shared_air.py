@@ -11,9 +11,8 @@ emulator.
 from __future__ import annotations
 
 import abc
-import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Callable, Final, Iterable, Tuple
 
 import numpy as np
@@ -22,7 +21,7 @@ from drone_mesh.channel.packet_queue import ALL_NODES, OutgoingPacket
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location, metres_between
 from drone_mesh.inprocess.clock import VirtualClock
-from drone_mesh.inprocess.close_pairs import Surroundings
+from drone_mesh.inprocess.close_pairs import Surroundings, by_axis
 from drone_mesh.inprocess.interfaces import IInProcessAir, IInProcessAntenna
 from drone_mesh.nrf24.emulator.air import CAPTURE_DB, RPD_DBM, RPD_NS
 from drone_mesh.nrf24.emulator.links import Hop, LinkModel
@@ -49,6 +48,7 @@ class Transmission:
     start_ns: int
     end_s: float
     others: list[Transmission]  # that overlap with it
+    readers: list[SharedRadio] = field(default_factory=list)  # whose drivers are about to read it
 
 
 class SharedRadio(IInProcessAntenna):
@@ -70,6 +70,10 @@ class SharedRadio(IInProcessAntenna):
     @abc.abstractmethod
     def frame_arrived(self, frame: Transmission) -> None:
         """A frame for this radio has arrived undamaged."""
+
+    @abc.abstractmethod
+    def read(self, frame: Transmission) -> None:
+        """The driver reads the payload of a frame that has arrived."""
 
 
 class SharedAir(IInProcessAir):
@@ -109,7 +113,7 @@ class SharedAir(IInProcessAir):
         self._links: dict[tuple[int, int], Link] = {}
         self._reached: dict[tuple[int, bool], list[SharedRadio]] = {}
         self._where: dict[int, Location] = {}  # of those at rest
-        self._places: np.ndarray | None = None  # (n, 3); those in flight may be anywhere: NaN
+        self._places: np.ndarray | None = None  # by_axis; those in flight may be anywhere: NaN
         self._listed: list[SharedRadio] = []  # in the order of these places
         self._row: dict[int, int] = {}  # of each radio in that list
         self._surroundings: dict[float, Surroundings] = {}  # by reach
@@ -300,7 +304,7 @@ class SharedAir(IInProcessAir):
         if self._places is None:
             unknown, flying = Location(math.nan, math.nan, math.nan), self._flying
             places = [unknown if other in flying else self._place(other) for other in self._radios]
-            self._places = np.fromiter(itertools.chain.from_iterable(places), float).reshape(-1, 3)
+            self._places = by_axis(places)
             self._listed = list(self._radios.values())
             self._row = {other: row for row, other in enumerate(self._radios)}
             for surroundings in self._surroundings.values():

@@ -240,7 +240,9 @@ class SharedAntenna(SharedRadio):
         broadcast = packet.receiver == ALL_NODES
         if broadcast or packet is not self._last_taken:
             self._unread += 1
-            self._clock.call_at(now_s + READ_S, self._read, (frame.sender.node_id, packet))
+            if not frame.readers:  # one event of the clock for all
+                self._clock.call_at(now_s + READ_S, _read, frame)
+            frame.readers.append(self)
         if not broadcast:
             self._last_taken = packet
             self.listening_since_s = None
@@ -250,19 +252,25 @@ class SharedAntenna(SharedRadio):
         self._counters.airtime_s += self._settings.answer_frame_s
         self._air.transmit(self, frame.packet, answers=frame.sender)
 
-    def _read(self, arrived: tuple[int, OutgoingPacket]) -> None:
+    def read(self, frame: Transmission) -> None:
         self._unread -= 1
         self._counters.received += 1
-        sender_id, packet = arrived
+        packet = frame.packet
         if self._mesh is None or not self.powered:
             return
         broadcast = packet.receiver == ALL_NODES
         train = place_in_train(packet.payload, self.node_id)
         answers = packet.priority if broadcast and is_answered(packet.payload) else None
-        self.access.heard(sender_id, self._clock.now_s, broadcast=answers, train=train)
+        sender_id, now_s = frame.sender.node_id, self._clock.now_s
+        self.access.heard(sender_id, now_s, broadcast=answers, train=train)
         payload = readdressed(packet.payload, self.node_id) if broadcast else packet.payload
         self._air.delivered += 1
         self._hear(payload)
+
+
+def _read(frame: Transmission) -> None:
+    for radio in frame.readers:
+        radio.read(frame)
 
 
 class SharedChannel(SharedAir):

@@ -116,7 +116,6 @@ class Neighbour:
     def heard(self, beacon: Beacon, own: Motion | None, now_s: float) -> None:
         """Its beacon arrived, while this node was where `own` says."""
         self.beacon, self.heard_s = beacon, now_s
-        self.alive(now_s)
         if beacon.motion is not None:
             self.motion, self.reported_s = beacon.motion, now_s
             self.apart_m = 0.0 if own is None else metres_between(own.place, beacon.motion.place)

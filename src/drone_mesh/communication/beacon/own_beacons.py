@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import bisect
 import math
-from collections import deque
 from dataclasses import dataclass
 from typing import Callable, Final, Iterable
 
@@ -46,7 +45,7 @@ class OwnMotion:
         self._anchor: Location | None = None
         self.region: Location | None = None  # about where it is: the same for most nodes near it
         self._moved_s = -math.inf
-        self._samples: deque[tuple[float, Location]] = deque()
+        self._samples: list[tuple[float, Location]] = []
         self._motion: Motion | None = None
         self._asked_s = -AGAIN_S
         self._least_s = OVER_S / 2
@@ -59,7 +58,7 @@ class OwnMotion:
         """Forget the velocity: the node is not where that led."""
         self._least_s = TURN_S
         while self._samples and now_s - self._samples[0][0] > TURN_S:
-            self._samples.popleft()
+            self._samples.pop(0)
 
     def at(self, now_s: float) -> Motion | None:
         """Position and velocity now; None while the position is unknown."""
@@ -79,8 +78,8 @@ class OwnMotion:
             self.region = Location(*(REGION_M * round(value / REGION_M) for value in place))
         samples = self._samples
         samples.append((now_s, place))
-        while now_s - samples[1][0] >= OVER_S if len(samples) > 1 else False:
-            samples.popleft()
+        while len(samples) > 1 and now_s - samples[1][0] >= OVER_S:
+            samples.pop(0)
         since_s, before = samples[0]
         seconds = max(now_s - since_s, self._least_s)  # a short time would exaggerate the noise
         self._motion = Motion(

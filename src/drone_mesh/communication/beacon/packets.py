@@ -195,7 +195,7 @@ class Beacon(NamedTuple):
             return None
         if flags & _HAS_PLACE and here is not None:
             north, east, up, v, w, climb = _PLACE.unpack_from(body, place_at)
-            velocity = _speed(v), _speed(w), _speed(climb)
+            velocity = _SPEEDS[v], _SPEEDS[w], _SPEEDS[climb]
             motion = Motion(_place(north, east, up, here), velocity)
         if flags & _HAS_DIGEST:
             (digest,) = _DIGEST.unpack_from(body, digest_at)
@@ -315,7 +315,7 @@ def _place(north: int, east: int, up: int, here: Location) -> Location:
 
 
 def _nearest(unit: int, near_m: float) -> float:
-    near = round(near_m / _PLACE_M)
+    near = math.floor(near_m / _PLACE_M)
     off = (unit - near + _WRAP // 2) % _WRAP - _WRAP // 2
     return (near + off) * _PLACE_M
 
@@ -327,3 +327,6 @@ def _speed_code(speed_m_s: float) -> int:
 
 def _speed(code: int) -> float:
     return math.copysign(_FASTEST_M_S * (code / 127) ** 2, code)
+
+
+_SPEEDS: Final = [_speed(code) for code in (*range(128), *range(-128, 0))]  # by code

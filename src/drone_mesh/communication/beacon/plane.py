@@ -235,7 +235,6 @@ class BeaconPlane(IControlPlane):
         """Schedule the next call of `on_due`."""
         routes = self._routes
         due_s = min(self._trickle.due_s, self._proofs.next_s)
-        due_s = min(due_s, routes.first_end_s() + 1e-3)
         parent = routes.neighbours.get(routes.parent)
         if parent is not None:
             due_s = min(due_s, self._watch.due_s(parent))
@@ -243,6 +242,7 @@ class BeaconPlane(IControlPlane):
             due_s = min(due_s, self._verdicts.retry_s)
         if self._connection is not None:
             due_s = min(due_s, self._connection.due_s)
+        due_s = min(due_s, routes.first_end_s(due_s) + 1e-3)
         self._deadlines.set(Due.ROUTING, max(due_s, routes.now_s))
 
     # Beacons ---------------------------------------------------------------------------------

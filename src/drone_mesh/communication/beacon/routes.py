@@ -98,6 +98,7 @@ class BeaconRoutes(IRoutes):
         # By gateway: the number on which the parent said that it has no internet, and when.
         self._offline: dict[int, tuple[int, float]] = {}
         self._hints: dict[int, tuple[int, float]] = {}  # by node: a neighbour that led to it, when
+        self._ends_s = math.inf  # no neighbour will have been silent for too long before
         self._losses = Losses(self._range_m)
         self._disputes = Disputes()
         self._fresh = FRESH if self.one_loss_counts else FRESH_IF_LOSSY
@@ -117,6 +118,7 @@ class BeaconRoutes(IRoutes):
             neighbour = Neighbour(node, beacon, self._fresh)
             self.neighbours[node] = neighbour
         neighbour.heard(beacon, self.motion, self.clock.now_s)
+        self._lives(neighbour)
         if beacon.parent == self._node_id and neighbour.announced_s:
             self._compare(neighbour)
         if shows_that_it_hears(beacon, self._node_id, as_child=node == self.parent):
@@ -190,13 +192,17 @@ class BeaconRoutes(IRoutes):
         """A sign of life of a node: a packet of it, or an acknowledgement."""
         neighbour = self.neighbours.get(node)
         if neighbour is not None:
-            neighbour.alive(self.clock.now_s)
+            self._lives(neighbour)
+
+    def _lives(self, neighbour: Neighbour) -> None:
+        neighbour.alive(self.clock.now_s)
+        self._ends_s = min(self._ends_s, neighbour.until_s)
 
     def took(self, node: int) -> None:
         """A neighbour acknowledged a packet of this node."""
         neighbour = self.neighbours.get(node)
         if neighbour is not None:
-            neighbour.alive(self.clock.now_s)
+            self._lives(neighbour)
             self._proved(neighbour)
 
     def _proved(self, neighbour: Neighbour) -> None:
@@ -259,20 +265,23 @@ class BeaconRoutes(IRoutes):
 
     def expired(self) -> list[int]:
         """Forget neighbours that were silent for too long, and return them."""
-        if self.clock.now_s <= self.first_end_s():
+        if self.clock.now_s <= self.first_end_s(before_s=self.clock.now_s):
             return []
         old = [n.node for n in self.neighbours.values() if self.clock.now_s > n.until_s]
         for node in old:
             del self.neighbours[node]
         return old
 
-    def first_end_s(self) -> float:
-        """When the first neighbour will have been silent for too long."""
-        first_s = math.inf
-        for neighbour in self.neighbours.values():
-            if neighbour.until_s < first_s:
-                first_s = neighbour.until_s
-        return first_s
+    def first_end_s(self, before_s: float) -> float:
+        """When the first neighbour will have been silent for too long, if before `before_s`.
+
+        Otherwise a time that is not before it: most beacons ask, and few neighbours end.
+        """
+        if self._ends_s < before_s:
+            self._ends_s = math.inf
+            for neighbour in self.neighbours.values():
+                self._ends_s = min(self._ends_s, neighbour.until_s)
+        return self._ends_s
 
     # The way up --------------------------------------------------------------------------------
 

@@ -144,7 +144,7 @@ class Noise:
         self._from_ns = round(from_s * NS_PER_S)
         self._until_ns = math.inf if until_s == math.inf else round(until_s * NS_PER_S)
         self._bursts: deque[tuple[float, float]] = deque()  # start, end; those of late
-        self._drawn_to_ns: float = self._from_ns
+        self._drawn_to_ns = float(self._from_ns)
 
     def stop(self, at_ns: int) -> None:
         """End the noise at this time."""
