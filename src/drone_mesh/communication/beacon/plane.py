@@ -7,7 +7,7 @@ from typing import Final
 
 from drone_mesh.communication.beacon.connection import Connection, Proofs
 from drone_mesh.communication.beacon.courier import Courier, QueuedCourier
-from drone_mesh.communication.beacon.neighbour import LUCKY
+from drone_mesh.communication.beacon.neighbour import LUCKY, Neighbour
 from drone_mesh.communication.beacon.own_beacons import NodesBelow, OwnBeacons, OwnMotion
 from drone_mesh.communication.beacon.packets import (
     READER,
@@ -171,7 +171,8 @@ class BeaconPlane(IControlPlane):
         for node in routes.expired():
             self._trickle.reset(now_s)
             self._gone(node, heard.lost(node, now_s))
-        for node in heard.deaf().intersection(routes.neighbours):
+        deaf = heard.deaf()  # mostly nobody
+        for node in deaf and deaf.intersection(routes.neighbours):
             neighbour = routes.neighbours[node]
             if now_s - neighbour.doubted_s >= DEAF_AGAIN_S:
                 neighbour.doubted_s = now_s
@@ -287,9 +288,10 @@ class BeaconPlane(IControlPlane):
         is_quiet = now_s < self._look_s and not routes.is_news(creator, beacon)
         self._below.heard(creator, beacon)
         is_new = routes.heard(creator, beacon)
-        if not routes.neighbours[creator].deaf:
+        neighbour = routes.neighbours[creator]
+        if not neighbour.deaf:
             self._neighbours.hears(creator)
-        self._take_place(creator, beacon)
+        self._take_place(neighbour, beacon)
         if self._courier.holds or not is_quiet:  # few beacons
             self._consider(creator, beacon, is_new)
         self._take_gateway_place(creator, beacon)
@@ -316,15 +318,15 @@ class BeaconPlane(IControlPlane):
             self._courier.retry()
         self._plan()
 
-    def _take_place(self, node: int, beacon: Beacon) -> None:
-        neighbours = self._neighbours
+    def _take_place(self, neighbour: Neighbour, beacon: Beacon) -> None:
+        neighbours, node = self._neighbours, neighbour.node
         neighbours.set_hops(node, beacon.hops)
         if beacon.motion is not None:
             place, velocity = beacon.motion
             neighbours.passes(node, place, self._routes.now_s)
             north, east, up = velocity
             flies = math.sqrt(north * north + east * east + up * up) > FLIES_M_S
-            self._routes.neighbours[node].at_rest = neighbours.at_rest(node, place, flies)
+            neighbour.at_rest = neighbours.at_rest(node, place, flies)
 
     def _take_gateway_place(self, node: int, beacon: Beacon) -> None:
         """Store the gateway's place from its own beacon or the parent's."""

@@ -163,7 +163,7 @@ class BeaconRoutes(IRoutes):
 
     def _is_offline(self, beacon: Beacon) -> bool:
         """Whether the gateway had no internet, when it sent the number of this beacon or later."""
-        known = self._offline.get(beacon.gateway)
+        known = self._offline.get(beacon.gateway) if self._offline else None
         if known is None or beacon.offline:
             return beacon.offline
         number, at_s = known
@@ -301,7 +301,7 @@ class BeaconRoutes(IRoutes):
         if present is not None and self._leads_up(present):
             best = self._rank(present)
             most = equal = best[0]
-        for neighbour in self.neighbours.values():
+        for neighbour in self._all():
             hops = neighbour.beacon.hops
             if hops > most or hops == equal or neighbour is present:
                 continue  # most are not better, whatever the risk of their links
