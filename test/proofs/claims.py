@@ -158,6 +158,8 @@ def wormhole(stranger: Stranger) -> None:
         _creator, from_, kind, to, _forward = messages.header(payload)
         whole = messages.readdressed(payload, BROADCAST)
         others: Iterable[int] = ()
+        if from_ not in network.nodes:
+            return True  # its own, of a captured node
         if kind in (MessageType.SEAL_CHALLENGE, MessageType.SEAL_ANSWER):
             others = (to,)
         elif kind == MessageType.BEACON and latest.get(from_) != whole:

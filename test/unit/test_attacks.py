@@ -87,6 +87,13 @@ def test_beacons_of_a_black_hole_draw_nobody_who_knows_places(threat, place):
     assert trial(case, seed=1).cut_off <= SLACK
 
 
+@pytest.mark.parametrize("moment", [Moment.FAILURE, Moment.FLIGHT, Moment.RESTART])
+def test_a_captured_node_that_draws_who_lost_its_way_is_soon_found_out(moment):
+    """A third to two thirds were cut off while nobody asked whether the gateway answers."""
+    case = Case("beacons of a black hole", Threat.CAPTURED, Place.MIDDLE, moment)
+    assert trial(case, seed=0).cut_off < 0.25
+
+
 def test_a_node_that_promises_a_beacon_and_falls_silent_is_soon_forgotten():
     case = Case("a beacon, then silence", Threat.WITHOUT_KEY, Place.MIDDLE)
     assert trial(case, seed=1).cut_off <= SLACK

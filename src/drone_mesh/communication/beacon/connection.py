@@ -24,6 +24,7 @@ CHECK_S: Final = 1.0  # how often a router without a gateway considers its repai
 ASKS_S: Final = 10.0  # at most so often for the place of a gateway that moves
 PERIOD_S: Final = 60.0  # a router and its gateway tell each other the nonces of their seals
 AGAIN_S: Final = 5.0  # until the gateway has answered twice
+NEW_S: Final = 20.0  # at most so often because of a new parent: in motion they change all the time
 PATIENT_AFTER: Final = 3  # heartbeats without an answer; the first ones are urgent
 RARER: Final = 3.0  # on a busy channel, per check period of its patience: all relays lead there
 
@@ -145,6 +146,7 @@ class Proofs:
         self._asked_s, self._ask_s = -math.inf, math.inf  # for the place of the gateway: last, next
         self._proven: int | None = None  # the gateway that answered the last one
         self._vain = 0  # heartbeats since the last answer
+        self._told_s, self._through = -math.inf, NO_ROUTE  # the last one: when, to whom first
 
     def begin(self) -> None:
         """Begin anew for another gateway, at a random moment: many nodes find it at once."""
@@ -155,6 +157,13 @@ class Proofs:
         """A gateway is reached."""
         if self.due_s == math.inf:
             self.begin()
+
+    def has_new_parent(self) -> None:
+        """Tell the gateway soon, if it has not answered through this parent yet: it may swallow."""
+        parent, soon_s = self._routes.parent, max(self._routes.now_s, self._told_s + NEW_S)
+        is_known = parent == NO_ROUTE or self._routes.in_vain_through(parent) is not None
+        if not is_known and not self._vain and soon_s + AGAIN_S < self.due_s < math.inf:
+            self.due_s = soon_s + AGAIN_S * self._rng.random()
 
     def ask_soon(self) -> None:
         """A beacon tells another place of the gateway than it told itself."""
@@ -182,7 +191,10 @@ class Proofs:
         if self._routes.parent == NO_ROUTE:
             self.due_s = math.inf
             return
+        if self._vain and self._through == self._routes.parent:
+            self._routes.asked(self._through, in_vain=True)
         self._vain += 1
+        self._told_s, self._through = now_s, self._routes.get_direction_to_node(gateway)
         busy = 1.0 + RARER * self._antenna.patience() * (self._vain >= PATIENT_AFTER)
         self.due_s = now_s + AGAIN_S * busy * (1.0 + self._rng.random())
         self._routes.tried[gateway] += not self._seals.may_be_gateway(gateway)
@@ -200,6 +212,7 @@ class Proofs:
                 self._courier.send_own(messages.heartbeat(me, me, creator, creator, True, me))
         elif creator == self._routes.gateway:
             self._vain = 0
+            self._routes.asked(self._through, in_vain=False)
             if self._proven == creator:  # its second answer: by now it has a proof of this node
                 self.due_s = now_s + PERIOD_S * (1.0 - JITTER * self._rng.random())
             self._proven = creator

@@ -201,6 +201,7 @@ class BeaconPlane(IControlPlane):
             return
         if routes.parent != parent:
             self._watch.has_new_parent()
+            self._proofs.has_new_parent()
             if self._connection is not None:
                 self._connection.has_new_parent()
         if routes.shown != shown:

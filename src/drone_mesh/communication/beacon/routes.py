@@ -46,6 +46,9 @@ ANOTHER_GATEWAY: Final = 1.5  # hops that another gateway must be nearer
 UNPROVEN: Final = 32.0  # hops: any gateway that proved to be one is nearer than one that did not
 TRIES: Final = 4  # heartbeats in vain to one that did not, then another one gets its chance
 MOST_DOUBTS: Final = 7  # times UNPROVEN, which is less than OFFLINE
+IN_VAIN: Final = 8  # hops at most, one for each question to the gateway that had no answer
+PARDONED: Final = 2  # of them, where losses are usual
+REMEMBERED_S: Final = 600.0  # whether the gateway answered through a neighbour
 OFFLINE: Final = 256.0  # hops: any gateway with internet is nearer than one without
 SEEN_S: Final = 10.0  # an older place of a node does not tell the way to it
 NEAR: Final = 2.0  # intervals: an older report that a neighbour hears a node shows no way to it
@@ -99,6 +102,8 @@ class BeaconRoutes(IRoutes):
         self._offline: dict[int, tuple[int, float]] = {}
         self._hints: dict[int, tuple[int, float]] = {}  # by node: a neighbour that led to it, when
         self._ends_s = math.inf  # no neighbour will have been silent for too long before
+        # By neighbour: questions to the gateway through it since the last answer, and when it was.
+        self._asked: dict[int, tuple[int, float]] = {}
         self._losses = Losses(self._range_m)
         self._disputes = Disputes()
         self._fresh = FRESH if self.one_loss_counts else FRESH_IF_LOSSY
@@ -258,6 +263,16 @@ class BeaconRoutes(IRoutes):
         if known is not None and neighbour != node:
             known.vain.add(node)
 
+    def asked(self, neighbour: int, in_vain: bool) -> None:
+        """A question to the gateway went through this neighbour: it was in vain, or answered."""
+        before = self.in_vain_through(neighbour) or 0
+        self._asked[neighbour] = before + 1 if in_vain else 0, self.clock.now_s
+
+    def in_vain_through(self, neighbour: int) -> int | None:
+        """How many such questions had no answer since the last one; None: nobody knows."""
+        vain, at_s = self._asked.get(neighbour, (0, -math.inf))
+        return vain if self.clock.now_s - at_s < REMEMBERED_S else None
+
     def led_s(self, node: int) -> float:
         """When a packet of this node came last over a relay. Any thread."""
         _neighbour, at_s = self._hints.get(node, (NO_ROUTE, -math.inf))
@@ -378,6 +393,9 @@ class BeaconRoutes(IRoutes):
         gateway = neighbour.beacon.gateway
         if not self._may_be_gateway(gateway):
             cost += UNPROVEN * min(1 + self.tried[gateway] // TRIES, MOST_DOUBTS)
+        vain = self._asked and self.in_vain_through(neighbour.node)
+        if vain and neighbour.node != gateway:  # it may swallow what it takes
+            cost += min(IN_VAIN, max(0, vain - (0 if self.one_loss_counts else PARDONED)))
         return cost, neighbour.node != self.parent, -neighbour.heard_s, neighbour.node
 
     def _hops_through(self, neighbour: Neighbour) -> float:

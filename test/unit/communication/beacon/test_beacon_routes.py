@@ -68,6 +68,45 @@ def test_there_is_no_way_to_the_next_hop_of_who_never_had_one(routes):
     assert routes.get_direction_to_node(1) == 1
 
 
+def asked_in_vain(routes, neighbour, times):
+    for _ in range(times):
+        routes.asked(neighbour, in_vain=True)
+    routes.choose()
+    return routes.parent
+
+
+def test_each_question_without_an_answer_costs_a_hop_for_ten_minutes(routes):
+    routes.heard(1, beacon())
+    routes.heard(2, beacon(hops=2, parent=8))
+    routes.heard(3, beacon(hops=10, parent=8))
+    assert asked_in_vain(routes, 1, times=1) == 1
+    assert asked_in_vain(routes, 1, times=1) == 2
+    routes.choose()
+    routes.neighbours.pop(2)
+    assert asked_in_vain(routes, 1, times=7) == 1  # eight hops at most
+    routes.heard(2, beacon(hops=2, parent=8, number=6))
+    routes.choose()
+    assert routes.parent == 2
+    routes.clock.now_s = 600.0
+    for node in (1, 2):
+        routes.heard(node, beacon(hops=node, parent=0 if node == 1 else 8, number=7))
+    routes.choose()
+    assert routes.parent == 1
+
+
+def test_where_losses_are_usual_two_questions_without_an_answer_say_nothing(shared_routes):
+    for node in (1, 2):
+        shared_routes.heard(node, beacon())
+    assert asked_in_vain(shared_routes, 1, times=2) == 1
+    assert asked_in_vain(shared_routes, 1, times=1) == 2
+
+
+def test_the_gateway_itself_swallows_nothing(routes):
+    routes.heard(0, beacon(hops=0, parent=255))
+    routes.heard(1, beacon())
+    assert asked_in_vain(routes, 0, times=5) == 0
+
+
 @pytest.mark.parametrize("generation", range(4))
 def test_a_neighbour_that_stands_on_this_node_is_no_parent(routes, generation):
     line = [4, 5, 6, 0]

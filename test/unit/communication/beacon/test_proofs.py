@@ -44,9 +44,14 @@ class Node:
             self.complaints, self.antenna, AlwaysHalf(),
         )  # fmt: skip
 
-    def connect(self):
-        self.routes.heard(1, Beacon(0, 5, 1, 0, NO_ANCESTORS, 1.0))
+    def hears(self, *neighbours, number=5):
+        """Each one hop from the gateway."""
+        for neighbour in neighbours:
+            self.routes.heard(neighbour, Beacon(0, number, 1, 0, NO_ANCESTORS, 1.0))
         self.routes.choose()
+
+    def connect(self):
+        self.hears(1)
         self.proofs.connected()
 
     def sent(self, now_s):
@@ -100,6 +105,33 @@ def test_without_a_way_up_nothing_is_sent_until_there_is_one(node):
     assert node.proofs.next_s == math.inf
     node.connect()
     assert node.proofs.next_s == 5.0
+
+
+def test_a_parent_through_which_the_gateway_does_not_answer_gives_way_to_another(node):
+    for number, at_s in enumerate((2.5, 10.0), 6):
+        node.routes.clock.now_s = at_s
+        node.hears(1, 2, number=number)
+        assert node.routes.parent == 1
+        assert node.sent(at_s) == [TO_GATEWAY, ASKS]
+    node.hears(1, 2, number=8)
+    assert node.routes.parent == 2
+    node.proofs.heard(ANSWER, 0)
+    assert (node.routes.in_vain_through(1), node.routes.in_vain_through(2)) == (1, 0)
+
+
+def test_a_new_parent_is_tried_soon_if_the_gateway_never_answered_through_it(node):
+    for at_s in (2.5, 10.0):
+        node.sent(at_s)
+        node.proofs.heard(ANSWER, 0)
+    node.proofs.has_new_parent()  # the same one
+    assert node.proofs.next_s == 64.0
+    node.routes.neighbours.clear()
+    node.hears(2, number=6)
+    node.proofs.has_new_parent()
+    assert node.proofs.next_s == 32.5  # 20 s after the last one, as in motion parents often change
+    node.routes.clock.now_s = 29.0
+    node.proofs.has_new_parent()
+    assert node.proofs.next_s == 32.5
 
 
 def test_a_gateway_that_moves_is_asked_once_in_ten_seconds_at_a_random_moment(node):
