@@ -10,9 +10,10 @@ import pytest
 from proofs import attacks, claims, damage
 
 from drone_mesh.channel.access_rules import AccessRules
-from drone_mesh.communication.beacon.connection import AGAIN_S, PERIOD_S
+from drone_mesh.communication.beacon.connection import AGAIN_S, NEW_S, PERIOD_S
 from drone_mesh.communication.beacon.disputes import REMEMBERED_S
-from drone_mesh.communication.beacon.routes import STALE
+from drone_mesh.communication.beacon.routes import IN_VAIN, PARDONED, STALE
+from drone_mesh.communication.beacon.routes import REMEMBERED_S as ASKED_S
 from drone_mesh.communication.beacon.times import JITTER
 from drone_mesh.communication.data import packets as data
 from drone_mesh.communication.events import complaints
@@ -90,7 +91,11 @@ SENTENCES = [
     f"{'a minute' if REMEMBERED_S == 60 else '?'}",
     f"a heartbeat within {AGAIN_S:g} s after it connects",
     f"again after {AGAIN_S:g} to {2 * AGAIN_S:g} s until the gateway",
-    f"every {PERIOD_S * (1 - JITTER):g} to {PERIOD_S:g} s. After a restart",
+    f"every {PERIOD_S * (1 - JITTER):g} to {PERIOD_S:g} s. With a new parent",
+    f"has not answered within {'ten' if ASKED_S == 600 else '?'} minutes, the next one comes "
+    f"within {AGAIN_S:g} s, or {NEW_S:g} to {NEW_S + AGAIN_S:g} s after the last one",
+    f"at most {'eight' if IN_VAIN == 8 else '?'}, for {'ten' if ASKED_S == 600 else '?'} minutes "
+    f"(on a shared channel from the {'third' if PARDONED == 2 else '?'} one on)",
     f"more than {damage.LURED_M:g} m from their place, or more than {damage.OFF_ORDER_M:g} m from",
     f"| {STRANGERS} losses in {LIMIT_PERIOD_S:g} s; until the {LIMIT_PERIOD_S:g} s are over",
     f"| {REPEATS} announcements in {LIMIT_PERIOD_S:g} s;",
