@@ -4,24 +4,29 @@ The names of `__all__` here, in `drone_mesh.inprocess` and in `drone_mesh.lab` a
 package (docs/architecture.md, "What users may import").
 """
 
-# ruff: noqa: E402, I001 - a compiled core must be found before its sources
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING
+
 from drone_mesh.compiled import use_build
 
-use_build()
+use_build()  # a compiled core must be found before its sources
 
-from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE
-from drone_mesh.communication.repair.interfaces import IRepairStrategy, Step
-from drone_mesh.communication.repair.strategies import Thesis
-from drone_mesh.communication.routing.child_table_tree import ChildTableTree
-from drone_mesh.communication.routing.interfaces import IRoutingTechnique
-from drone_mesh.communication.timing import MeshTiming
-from drone_mesh.communication.wire.messages import type_of
-from drone_mesh.communication.wire.packet_types import MessageType
-from drone_mesh.drone.fleet import plan_fleet
-from drone_mesh.drone.goal import check_goal
-from drone_mesh.drone.interfaces import IDroneEngine
-from drone_mesh.drone.location import Location
-from drone_mesh.errors import GoalRefused, LocationUnknown
+if TYPE_CHECKING:
+    from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE
+    from drone_mesh.communication.repair.interfaces import IRepairStrategy, Step
+    from drone_mesh.communication.repair.strategies import Thesis
+    from drone_mesh.communication.routing.child_table_tree import ChildTableTree
+    from drone_mesh.communication.routing.interfaces import IRoutingTechnique
+    from drone_mesh.communication.timing import MeshTiming
+    from drone_mesh.communication.wire.messages import type_of
+    from drone_mesh.communication.wire.packet_types import MessageType
+    from drone_mesh.drone.fleet import plan_fleet
+    from drone_mesh.drone.goal import check_goal
+    from drone_mesh.drone.interfaces import IDroneEngine
+    from drone_mesh.drone.location import Location
+    from drone_mesh.errors import GoalRefused, LocationUnknown
 
 __all__ = [
     "BROADCAST",
@@ -41,3 +46,28 @@ __all__ = [
     "plan_fleet",
     "type_of",
 ]
+
+_MODULES = {  # a program loads only those whose names it uses
+    "BROADCAST": "drone_mesh.communication.interfaces",
+    "NO_ROUTE": "drone_mesh.communication.interfaces",
+    "ChildTableTree": "drone_mesh.communication.routing.child_table_tree",
+    "GoalRefused": "drone_mesh.errors",
+    "IDroneEngine": "drone_mesh.drone.interfaces",
+    "IRepairStrategy": "drone_mesh.communication.repair.interfaces",
+    "IRoutingTechnique": "drone_mesh.communication.routing.interfaces",
+    "Location": "drone_mesh.drone.location",
+    "LocationUnknown": "drone_mesh.errors",
+    "MeshTiming": "drone_mesh.communication.timing",
+    "MessageType": "drone_mesh.communication.wire.packet_types",
+    "Step": "drone_mesh.communication.repair.interfaces",
+    "Thesis": "drone_mesh.communication.repair.strategies",
+    "check_goal": "drone_mesh.drone.goal",
+    "plan_fleet": "drone_mesh.drone.fleet",
+    "type_of": "drone_mesh.communication.wire.messages",
+}
+
+
+def __getattr__(name: str) -> object:
+    if name not in _MODULES:
+        raise AttributeError(f"module {__name__} has no attribute {name}")
+    return getattr(importlib.import_module(_MODULES[name]), name)

@@ -17,6 +17,8 @@ WEB = {"fastapi", "fastapi_offline", "pydantic", "starlette", "uvicorn", "websoc
 REPORT = {"jinja2", "matplotlib"}
 SIMULATION = {"numpy", "pybullet", "rospy"}
 AUTOPILOT = {"pymap3d", "pymavlink"}
+NODE = {"drone_mesh.communication.node.component"}  # the software of a node of the mesh
+TECHNIQUES = {"drone_mesh.communication.repair.strategies", "drone_mesh.communication.routing"}
 
 
 @functools.lru_cache(maxsize=None)
@@ -38,7 +40,7 @@ def imports_when_loaded(source: Path) -> set[str]:
 
 
 def loaded_by(program: Path) -> set[str]:
-    """Top-level packages that are loaded when this program starts, through our own modules."""
+    """What is loaded when this program starts, through our own modules; also each package."""
     packages: set[str] = set()
     seen: set[Path] = set()
     waiting = [program]
@@ -48,7 +50,7 @@ def loaded_by(program: Path) -> set[str]:
             continue
         seen.add(source)
         for name in imports_when_loaded(source):
-            packages.add(name.split(".")[0])
+            packages |= {name, name.split(".")[0]}
             parts = name.split(".")
             for length in range(1, len(parts) + 1):
                 path = (ROOT / "src").joinpath(*parts[:length])
@@ -62,16 +64,17 @@ def loaded_by(program: Path) -> set[str]:
     [
         ("drone_factory", WEB | REPORT),  # internet:=mock, the default
         ("mesh_host", WEB | REPORT),
-        ("drone_manager", WEB | REPORT),
-        ("wireless_signal_simulator", WEB | REPORT),
-        ("status", WEB | REPORT | {"rosbag"}),
-        ("layout", WEB | REPORT | {"rosbag"}),
-        ("fly_actions", WEB | REPORT),
-        ("mesh_markers", WEB | REPORT),
-        ("console", REPORT | {"fastapi", "pybullet", "rosbag"}),
+        ("drone_manager", NODE | WEB | REPORT),
+        ("wireless_signal_simulator", NODE | TECHNIQUES | WEB | REPORT),
+        ("status", NODE | TECHNIQUES | WEB | REPORT | {"rosbag"}),
+        ("layout", NODE | TECHNIQUES | WEB | REPORT | {"rosbag"}),
+        ("fly_actions", NODE | WEB | REPORT),
+        ("mesh_markers", NODE | TECHNIQUES | WEB | REPORT),
+        ("console", NODE | REPORT | {"fastapi", "pybullet", "rosbag"}),
         ("report", WEB | {"pybullet"}),
         ("raspberry_router", WEB | REPORT | SIMULATION | AUTOPILOT),
         ("raspberry_gateway", WEB | REPORT | SIMULATION | AUTOPILOT),
+        ("mesh_send", NODE | TECHNIQUES | SIMULATION),
     ],
 )
 def test_a_program_does_not_load_what_only_others_need(program: str, unwanted: set[str]) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass
-from typing import Iterable, Sequence
+from typing import TYPE_CHECKING, Iterable, Sequence
 
 import numpy as np
 
@@ -13,7 +13,6 @@ from drone_mesh.air.obstacles import Box
 from drone_mesh.communication.control.router_states import RepairState
 from drone_mesh.communication.events.observer import MeshEvent, MeshEventKind
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.node.component import MeshnetworkComponent
 from drone_mesh.communication.repair.status import NOTHING_TO_REPAIR
 from drone_mesh.drone.battery import Endurance
 from drone_mesh.drone.fence import Fence
@@ -28,6 +27,9 @@ from drone_mesh.state.model import (
     NodeStatus,
     ObstacleStatus,
 )
+
+if TYPE_CHECKING:  # programs that only show a mesh, or order flights, do without a node's software
+    from drone_mesh.communication.node.component import MeshnetworkComponent
 
 _SEVERAL_AT_ONCE = (
     MeshEventKind.NEIGHBOUR_FOUND,

@@ -5,14 +5,13 @@ from __future__ import annotations
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import Callable, TypeVar
+from typing import TYPE_CHECKING, Callable, TypeVar
 
 import rospkg
 import rospy
 from std_msgs.msg import String
 
 from drone_mesh.air.obstacles import Obstacles
-from drone_mesh.configuration import FactoryConfiguration, load_configuration
 from drone_mesh.drone.fence import Fence
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.location import Location
@@ -21,6 +20,9 @@ from drone_mesh.fence_file import areas_json, fence_in, rows_of_file
 from drone_mesh.formations.layouts import Layouts
 from drone_mesh.formations.missions import Mission, read_missions
 from drone_mesh.ros.graph import names
+
+if TYPE_CHECKING:  # it loads all routing techniques
+    from drone_mesh.configuration import FactoryConfiguration
 
 PACKAGE = "drone_mesh"
 
@@ -40,6 +42,8 @@ def factory_configuration(*keys: str) -> FactoryConfiguration:
 
     Raises ConfigurationError.
     """
+    from drone_mesh.configuration import load_configuration
+
     given = {key: rospy.get_param(f"~{key}", "") for key in keys}
     return _read("~config", "factory.yaml", lambda path: load_configuration(path, given))
 
