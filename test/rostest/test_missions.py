@@ -107,7 +107,7 @@ class MissionsTest(unittest.TestCase):
         good = order(2, waypoints=there, speed=2.0)
         self.assertTrue(good.success)
         self.passes(2, (6.0, 6.0, 1.0))
-        wait_for("the end of a mission", WALL_LIMIT_S, lambda: not len(self.node(2).heading))
+        wait_for("the end of a mission", WALL_LIMIT_S, lambda: self.node(2).mission == "")
         answer = order(2, action=FlyMissionRequest.RESUME)
         self.assertEqual((answer.success, answer.message), (False, "drone 2 has no mission"))
         answer = order(1, action=9)
