@@ -51,6 +51,7 @@ class RecordingAntenna(IWirelessCommunication):
         self.gets_lost = lambda payload: False
         self.powered = True
         self.is_whole = True
+        self.periods = 0.0  # its patience
         self.power = lambda: None  # whether it hears power; None: it cannot tell
 
     @property
@@ -87,6 +88,9 @@ class RecordingAntenna(IWirelessCommunication):
 
     def on(self):
         return self.powered
+
+    def patience(self):
+        return self.periods
 
     def hears_power(self):
         return self.power()

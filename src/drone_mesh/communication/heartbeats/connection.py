@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import random
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Callable, NamedTuple
 
 from drone_mesh.communication.control.places import KnownPlaces, PlaceRequests
 from drone_mesh.communication.control.router_states import (
@@ -58,6 +58,7 @@ class GatewayConnection:
     _places: KnownPlaces
     _report: Reporter
     _has_key: bool
+    _patience: Callable[[], float]  # of the antenna, in check periods
     _rng: random.Random
 
     def __post_init__(self) -> None:
@@ -203,6 +204,11 @@ class GatewayConnection:
             if another != NO_ROUTE:
                 self._technique.other_can_communicate_with_node(another, self.gateway)
             self._heartbeat_sent_s = -math.inf
+            self.send_heartbeat()
+
+    def doubt_next_hop(self, patience: float) -> None:
+        """A neighbour cannot reach the next hop, which may have left unheard: try it at once."""
+        if self._medium.policy.checks_soon and self._states.connected and not self.proven(patience):
             self.send_heartbeat()
 
     def another_next_hop(self, but: int) -> int:
@@ -351,7 +357,8 @@ class GatewayConnection:
     def _answer_window_s(self) -> float:
         medium = self._medium
         hops = self.hops if self.hops != NO_ROUTE else _HOPS_UNTIL_KNOWN
-        return medium.answer_s + medium.answer_per_hop_s * hops
+        window_s = medium.answer_s + medium.answer_per_hop_s * hops
+        return window_s * (1.0 + self._patience())  # an answer waits in the queues of relays
 
     def _asks_a_neighbour(self) -> bool:
         """Whether a neighbour was recently asked for its gateway. If not, one is asked now."""

@@ -108,6 +108,7 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
             node.places,
             node.report,
             node.seals.has_key,
+            node.antenna.patience,
             node.rng,
         )
 
@@ -256,6 +257,8 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
             self._connection.on_route_lost()
             told_alone = messages.addressee(payload) != BROADCAST
             self._host.on_node_missing(missing, told_alone)
+            if missing == self._connection.next_hop():
+                self._connection.doubt_next_hop(self._antenna.patience())
 
     @receives(*_OF_TECHNIQUES)
     def on_packet_of_technique(self, payload: bytes, creator: int, from_: int) -> None:

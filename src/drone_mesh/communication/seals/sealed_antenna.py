@@ -7,6 +7,7 @@ Neither of them handles seals; the component only puts less into a packet (`rese
 from __future__ import annotations
 
 import random
+from collections import defaultdict, deque
 from typing import Callable, Sequence
 
 from drone_mesh.communication.events.complaints import Complaints
@@ -44,6 +45,7 @@ FRESH_PERIODS = 3.0  # a neighbour sends something once per check period
 FOREIGN_AFTER_S = 20.0  # two check periods; a restarted neighbour answers by then
 FORGOTTEN_S = 60.0  # then the counts start again
 LEAST_PACKETS = 3  # damage that a checksum does not show is rarer
+REPEATED_S, REPEATED = 2.0, 4  # a challenge is pending for as long; packets, at most
 LEAST_CHALLENGES = 2  # without an answer: one may be lost
 
 _CHALLENGE, _ANSWER = int(MessageType.SEAL_CHALLENGE), int(MessageType.SEAL_ANSWER)
@@ -82,6 +84,9 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
         self._message_seal = MessageSeal(keys)
         self._mesh: IMeshNetwork | None = None
         self._present = b""  # the last one, for neighbours that could not open it
+        # By neighbour: what it acknowledges even if it must ask for the epoch before it can open it.
+        self._sent: defaultdict[int, deque[tuple[float, bytes]]]
+        self._sent = defaultdict(lambda: deque(maxlen=REPEATED))
         self._unopened: dict[int, list[float]] = {}  # by node: the first challenges, not answered
         # By node, since when and how many: packets of somebody else
         self._forged: dict[int, tuple[float, int]] = {}
@@ -152,14 +157,14 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
             if payload[TYPE_AT] == _ORDER:
                 way = self._end_to_end.way_of_order(payload[FORWARD_AT])
                 if way is not None and way != payload[TO_AT]:
-                    sealed = self._seal.seal(messages.readdressed(payload, way))
+                    sealed = self._sealed(messages.readdressed(payload, way))
                     if self._antenna.send_message_to(sealed):
                         return True
-        return self._antenna.send_message_to(self._seal.seal(payload))
+        return self._antenna.send_message_to(self._sealed(payload))
 
     def send_messages(self, payloads: Sequence[bytes]) -> list[bool]:
         proven = [self._proven(payload) for payload in payloads]
-        sealed = [self._seal.seal(payload) for payload in proven if payload is not None]
+        sealed = [self._sealed(payload) for payload in proven if payload is not None]
         taken = iter(self._antenna.send_messages(sealed))
         return [payload is None or next(taken) for payload in proven]
 
@@ -179,6 +184,11 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
 
     def on(self) -> bool:
         return self._antenna.on()
+
+    def _sealed(self, payload: bytes) -> bytes:
+        """A packet for one neighbour with its seal; kept, in case that neighbour cannot open it."""
+        self._sent[payload[TO_AT]].append((self._clock(), payload))
+        return self._seal.seal(payload)
 
     def _proven(self, payload: bytes) -> bytes | None:
         """A packet with its end-to-end seal; None: its addressee could not verify it yet."""
@@ -293,6 +303,9 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
         if self._present:
             present = messages.readdressed(self._present, from_)
             self._send(self._seal.seal(present))
+        for sent_s, payload in self._sent.pop(from_, ()):
+            if now_s - sent_s < REPEATED_S:
+                self._antenna.send_message_to(self._seal.seal(payload))
         if not self._seal.knows(from_, now_s):
             self._challenge(from_, now_s)
 

@@ -90,7 +90,7 @@ def test_heartbeats_are_frequent_until_the_second_answer_and_then_come_once_a_mi
 
 
 def test_on_a_busy_channel_heartbeats_without_an_answer_are_rarer(node):
-    node.antenna.patience = lambda: 2.0
+    node.antenna.periods = 2.0
     at_s = 2.5
     for seconds in (7.5, 7.5, 52.5, 52.5):
         node.sent(at_s)

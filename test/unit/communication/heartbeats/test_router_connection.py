@@ -65,6 +65,17 @@ def test_a_router_that_does_not_know_its_distance_waits_as_long_as_for_ten_hops(
         rig.wait(wait_s)
 
 
+def test_on_a_busy_channel_a_router_waits_longer_for_an_answer():
+    rig = Rig(medium=replace(Medium(), answer_s=1.0, answer_per_hop_s=0.2))
+    rig.antenna.periods = 0.5
+    rig.know_neighbour(0)
+    rig.mesh.control.told_of_gateway(0)
+    for wait_s, sent in ((4.4, 1), (0.2, 0), (0.0, 1)):
+        rig.mesh.control.send_heartbeat(0)
+        assert len(rig.sent(HEARTBEAT)) == sent
+        rig.wait(wait_s)
+
+
 def test_becoming_connected_introduces_the_node_at_once():
     rig = Rig()
     rig.hear(ANSWER)
@@ -540,6 +551,23 @@ def test_a_router_whose_only_route_is_gone_asks_around_at_once():
     rig.hear("02 02 05 01 01 00")
     assert not rig.mesh.get_connected_to_gateway()
     assert packet("01 01 03 fe fe 02 00") in rig.broadcasts()
+
+
+@pytest.mark.parametrize(("missing", "tries"), [("02", True), ("04", False)])
+@pytest.mark.parametrize(("patience", "is_proven"), [(0.0, False), (2.5, True)])
+def test_a_router_tries_its_next_hop_at_once_if_a_neighbour_misses_it(
+    missing, tries, patience, is_proven
+):
+    """It may have flown away, and its goal was not heard; unless the gateway has just answered."""
+    rig = shared_rig()
+    rig.antenna.periods = patience
+    rig.connect_through(2)
+    rig.know_neighbour(3)
+    rig.know_neighbour(4)
+    rig.wait(2.0)
+    rig.hear(f"03 03 05 01 fe {missing}")
+    through_2 = packet("01 01 04 02 00 01 00")
+    assert rig.sent(HEARTBEAT) == [through_2] * (tries and not is_proven)
 
 
 PRESENT_OF_3 = "03 03 03 01 fe 01 01"  # one hop from its gateway, as node 2 is

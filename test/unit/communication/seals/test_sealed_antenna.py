@@ -417,3 +417,15 @@ def test_another_radio_with_this_nodes_id_and_no_key_is_named_and_challenged_by_
     layer.on_msg(packet("01 01 03 01 fe 00 01"), 0.0)
     assert layer.complaints.counts == {"another radio uses id 1": 1}
     assert (rig.antenna.taken, [sent[2] for sent in rig.broadcasts()]) == ([], [126])
+
+
+@pytest.mark.parametrize("radio", ["disc", "shared"])
+def test_a_message_arrives_over_a_neighbour_that_was_silent_for_three_check_periods(radio):
+    """It acknowledges the packet, but has to ask for the epoch before it can open another one."""
+    network = line(3, node_keys, radio)
+    network.run_for(60.0)
+    relay = network.nodes[1].receiver
+    relay._seal._peers[2].heard_s -= 31.0
+    network.send(2, 0, b"once", reliable=False)
+    network.run_for(1.0)
+    assert [message.payload for message in network.received.get(0, [])] == [b"once"]
