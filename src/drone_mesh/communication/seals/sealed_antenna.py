@@ -84,7 +84,7 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
         self._message_seal = MessageSeal(keys)
         self._mesh: IMeshNetwork | None = None
         self._present = b""  # the last one, for neighbours that could not open it
-        # By neighbour: what it acknowledges even if it must ask for the epoch before it can open it.
+        # By neighbour: what it acknowledges also if it cannot open it before it knows the epoch
         self._sent: defaultdict[int, deque[tuple[float, bytes]]]
         self._sent = defaultdict(lambda: deque(maxlen=REPEATED))
         self._unopened: dict[int, list[float]] = {}  # by node: the first challenges, not answered
