@@ -358,7 +358,9 @@ class GatewayConnection:
         medium = self._medium
         hops = self.hops if self.hops != NO_ROUTE else _HOPS_UNTIL_KNOWN
         window_s = medium.answer_s + medium.answer_per_hop_s * hops
-        return window_s * (1.0 + self._patience())  # an answer waits in the queues of relays
+        if self._states.connected:  # else another try costs less than the wait for a lost one
+            window_s *= 1.0 + self._patience()  # an answer waits in the queues of relays
+        return window_s
 
     def _asks_a_neighbour(self) -> bool:
         """Whether a neighbour was recently asked for its gateway. If not, one is asked now."""

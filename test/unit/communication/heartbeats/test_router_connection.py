@@ -65,15 +65,16 @@ def test_a_router_that_does_not_know_its_distance_waits_as_long_as_for_ten_hops(
         rig.wait(wait_s)
 
 
-def test_on_a_busy_channel_a_router_waits_longer_for_an_answer():
+@pytest.mark.parametrize(("patience", "waits_s"), [(0.0, 1.4), (0.5, 2.1)])
+def test_on_a_busy_channel_a_connected_router_waits_longer_for_an_answer(patience, waits_s):
     rig = Rig(medium=replace(Medium(), answer_s=1.0, answer_per_hop_s=0.2))
-    rig.antenna.periods = 0.5
-    rig.know_neighbour(0)
-    rig.mesh.control.told_of_gateway(0)
-    for wait_s, sent in ((4.4, 1), (0.2, 0), (0.0, 1)):
-        rig.mesh.control.send_heartbeat(0)
-        assert len(rig.sent(HEARTBEAT)) == sent
-        rig.wait(wait_s)
+    rig.antenna.periods = patience
+    rig.connect_through(2)
+    rig.mesh.control.send_heartbeat(0)
+    rig.wait(waits_s - 0.1)
+    assert rig.mesh.get_connected_to_gateway()
+    rig.wait(0.2)
+    assert not rig.mesh.get_connected_to_gateway()
 
 
 def test_becoming_connected_introduces_the_node_at_once():
