@@ -30,6 +30,12 @@ def check(page: Visit, state: str) -> None:
         assert results.violations_count == 0, f"{state}, {scheme}: {results.generate_report()}"
 
 
+def hear(page: Visit) -> None:
+    """Wait for a state of the mesh: while axe runs, the page hears none, and then sends no order."""
+    clock = page.page.inner_text("#clock")
+    page.wait_for("a new state", lambda: page.page.inner_text("#clock") != clock)
+
+
 @pytest.mark.parametrize("size", [(1400, 880), (390, 780)], ids=["desk", "phone"])
 def test_axe_finds_no_violation(start_console, visit, size):
     width, height = size
@@ -37,9 +43,10 @@ def test_axe_finds_no_violation(start_console, visit, size):
     page.wait_for_drones(18)
     keyboard = page.page.keyboard
     check(page, "nothing selected")
+    hear(page)
     keyboard.press("n")
     keyboard.press("p")
-    page.page.wait_for_selector(".toast")
+    page.page.wait_for_selector(".toast button")
     check(page, "a node, and a toast with a button")
     if width < 500:
         page.page.check("#show-legend")
@@ -96,6 +103,7 @@ def test_axe_finds_no_violation(start_console, visit, size):
     page.page.click("#demonstrate")
     page.wait_for("the question before it", lambda: page.page.is_visible("#confirm"))
     check(page, "the question before a demonstration")
+    hear(page)
     page.page.click("#confirm >> text=Show it")
     page.wait_for("the story", lambda: page.page.is_visible("#story-card"))
     check(page, "a demonstration")
