@@ -31,7 +31,7 @@ def check(page: Visit, state: str) -> None:
 
 
 def hear(page: Visit) -> None:
-    """Wait for a state of the mesh: while axe runs, the page hears none, and then sends no order."""
+    """Wait for a state of the mesh: the page hears none while axe runs, and then sends no order."""
     clock = page.page.inner_text("#clock")
     page.wait_for("a new state", lambda: page.page.inner_text("#clock") != clock)
 
