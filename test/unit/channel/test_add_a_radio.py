@@ -41,7 +41,7 @@ def test_twelve_nodes_with_100_ms_per_packet_connect_and_carry_orders(seed):
     assert decided == []
 
 
-@pytest.mark.parametrize(("seed", "last_connects_in_flight"), [(1, False), (3, True)])
+@pytest.mark.parametrize(("seed", "last_connects_in_flight"), [(2, False), (3, True)])
 def test_behind_a_dead_relay_one_drone_flies_at_a_time_at_the_pace_of_the_slow_radio(
     seed, last_connects_in_flight
 ):

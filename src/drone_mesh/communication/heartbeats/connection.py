@@ -359,7 +359,8 @@ class GatewayConnection:
         hops = self.hops if self.hops != NO_ROUTE else _HOPS_UNTIL_KNOWN
         window_s = medium.answer_s + medium.answer_per_hop_s * hops
         if self._states.connected:  # else another try costs less than the wait for a lost one
-            window_s *= 1.0 + self._patience()  # an answer waits in the queues of relays
+            patient_s = window_s * (1.0 + self._patience())  # it waits in the queues of relays
+            window_s = max(window_s, min(patient_s, self._check_period_s))
         return window_s
 
     def _asks_a_neighbour(self) -> bool:

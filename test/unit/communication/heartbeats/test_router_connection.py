@@ -65,7 +65,7 @@ def test_a_router_that_does_not_know_its_distance_waits_as_long_as_for_ten_hops(
         rig.wait(wait_s)
 
 
-@pytest.mark.parametrize(("patience", "waits_s"), [(0.0, 1.4), (0.5, 2.1)])
+@pytest.mark.parametrize(("patience", "waits_s"), [(0.0, 1.4), (0.5, 2.1), (20.0, 10.0)])
 def test_on_a_busy_channel_a_connected_router_waits_longer_for_an_answer(patience, waits_s):
     rig = Rig(medium=replace(Medium(), answer_s=1.0, answer_per_hop_s=0.2))
     rig.antenna.periods = patience
