@@ -69,6 +69,8 @@ class EveryInterfaceTest(unittest.TestCase):
         cls.listen("/mesh/state", msg.MeshState)
         cls.listen("/mesh/events", msg.MeshEvent)
         cls.listen("/DroneManager/layouts", msg.LayoutProgress)
+        # Early: a subscriber counts a connection before the publisher sends it anything.
+        cls.listen("/Nodes/0/received", msg.ReceivedData)
         for node in STARTS:
             cls.used[any_id(f"/Nodes/{node}/debug")] = "NodeDebugInfo"
         cls.mesh.wait("all connected", 60, cls.mesh.connected)
@@ -204,7 +206,6 @@ class EveryInterfaceTest(unittest.TestCase):
         self.assertGreaterEqual(sample.carried, len(sample.types))
 
     def test_03_a_message_reaches_the_gateway(self) -> None:
-        self.listen("/Nodes/0/received", msg.ReceivedData)
         sent = self.ask(
             "/Nodes/4/send",
             srv.SendData,
