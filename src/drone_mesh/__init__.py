@@ -6,9 +6,9 @@ package (docs/architecture.md, "What users may import").
 
 from __future__ import annotations
 
-import importlib
 from typing import TYPE_CHECKING
 
+from drone_mesh.by_name import on_demand
 from drone_mesh.compiled import use_build
 
 use_build()  # a compiled core must be found before its sources
@@ -47,27 +47,24 @@ __all__ = [
     "type_of",
 ]
 
-_MODULES = {  # a program loads only those whose names it uses
-    "BROADCAST": "drone_mesh.communication.interfaces",
-    "NO_ROUTE": "drone_mesh.communication.interfaces",
-    "ChildTableTree": "drone_mesh.communication.routing.child_table_tree",
-    "GoalRefused": "drone_mesh.errors",
-    "IDroneEngine": "drone_mesh.drone.interfaces",
-    "IRepairStrategy": "drone_mesh.communication.repair.interfaces",
-    "IRoutingTechnique": "drone_mesh.communication.routing.interfaces",
-    "Location": "drone_mesh.drone.location",
-    "LocationUnknown": "drone_mesh.errors",
-    "MeshTiming": "drone_mesh.communication.timing",
-    "MessageType": "drone_mesh.communication.wire.packet_types",
-    "Step": "drone_mesh.communication.repair.interfaces",
-    "Thesis": "drone_mesh.communication.repair.strategies",
-    "check_goal": "drone_mesh.drone.goal",
-    "plan_fleet": "drone_mesh.drone.fleet",
-    "type_of": "drone_mesh.communication.wire.messages",
-}
-
-
-def __getattr__(name: str) -> object:
-    if name not in _MODULES:
-        raise AttributeError(f"module {__name__} has no attribute {name}")
-    return getattr(importlib.import_module(_MODULES[name]), name)
+__getattr__ = on_demand(
+    __name__,
+    {  # a program loads only those whose names it uses
+        "BROADCAST": "drone_mesh.communication.interfaces",
+        "NO_ROUTE": "drone_mesh.communication.interfaces",
+        "ChildTableTree": "drone_mesh.communication.routing.child_table_tree",
+        "GoalRefused": "drone_mesh.errors",
+        "IDroneEngine": "drone_mesh.drone.interfaces",
+        "IRepairStrategy": "drone_mesh.communication.repair.interfaces",
+        "IRoutingTechnique": "drone_mesh.communication.routing.interfaces",
+        "Location": "drone_mesh.drone.location",
+        "LocationUnknown": "drone_mesh.errors",
+        "MeshTiming": "drone_mesh.communication.timing",
+        "MessageType": "drone_mesh.communication.wire.packet_types",
+        "Step": "drone_mesh.communication.repair.interfaces",
+        "Thesis": "drone_mesh.communication.repair.strategies",
+        "check_goal": "drone_mesh.drone.goal",
+        "plan_fleet": "drone_mesh.drone.fleet",
+        "type_of": "drone_mesh.communication.wire.messages",
+    },
+)

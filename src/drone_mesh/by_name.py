@@ -1,4 +1,4 @@
-"""Loads what a user names: a short name that is known, or package.module:Name."""
+"""Loads by name: what a user names, as package.module:Name too, and the names of a package."""
 
 from __future__ import annotations
 
@@ -9,6 +9,17 @@ from typing import Any, Callable, Iterator, Mapping, TypeVar
 from drone_mesh.errors import ConfigurationError
 
 Part = TypeVar("Part")
+
+
+def on_demand(package: str, modules: Mapping[str, str]) -> Callable[[str], object]:
+    """The `__getattr__` of a package (PEP 562): the use of a name loads the module that has it."""
+
+    def load(name: str) -> object:
+        if name not in modules:
+            raise AttributeError(f"module {package} has no attribute {name}")
+        return getattr(importlib.import_module(modules[name]), name)
+
+    return load
 
 
 def load_by_name(what: str, name: str) -> Any:

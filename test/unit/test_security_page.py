@@ -52,6 +52,7 @@ SENTENCES = [
     f"claimed more than {seal.OVERTAKING} beyond it",
     f"then doubles, from {PAUSE_S:g} s to {PAUSE_S * 2**seal.DOUBTS:g} s, and all neighbours "
     f"together get at most {seal.MOST_DOUBTED} of them in {PAUSE_S:g} s",
+    f"the last {'four' if antenna.REPEATED == 4 else '?'} packets that it sent "
     f"to the challenger within {antenna.REPEATED_S:g} s",
     f"at most {seal.ANSWERS} of one neighbour and {seal.MOST_ANSWERS} of all in {PAUSE_S:g} s",
     f"remembers the last {seal.NONCES_KEPT} nonces",

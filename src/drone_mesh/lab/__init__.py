@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import importlib
 from typing import TYPE_CHECKING
+
+from drone_mesh.by_name import on_demand
 
 if TYPE_CHECKING:
     from drone_mesh.lab.metrics import measure_all
@@ -25,19 +26,16 @@ __all__ = [
     "tell_story",
 ]
 
-_MODULES = {  # each with other requirements, so that a name loads only its own
-    "PlacementPolicy": "drone_mesh.lab.policies",
-    "RoutingPolicy": "drone_mesh.lab.policies",
-    "RunRecord": "drone_mesh.lab.record",
-    "measure_all": "drone_mesh.lab.metrics",
-    "mesh_table": "drone_mesh.view.table",
-    "render_page": "drone_mesh.lab.run_report.page",
-    "run_sequence": "drone_mesh.lab.sequence",
-    "tell_story": "drone_mesh.lab.run_report.story",
-}
-
-
-def __getattr__(name: str) -> object:
-    if name not in _MODULES:
-        raise AttributeError(f"module {__name__} has no attribute {name}")
-    return getattr(importlib.import_module(_MODULES[name]), name)
+__getattr__ = on_demand(
+    __name__,
+    {  # each with other requirements, so that a name loads only its own
+        "PlacementPolicy": "drone_mesh.lab.policies",
+        "RoutingPolicy": "drone_mesh.lab.policies",
+        "RunRecord": "drone_mesh.lab.record",
+        "measure_all": "drone_mesh.lab.metrics",
+        "mesh_table": "drone_mesh.view.table",
+        "render_page": "drone_mesh.lab.run_report.page",
+        "run_sequence": "drone_mesh.lab.sequence",
+        "tell_story": "drone_mesh.lab.run_report.story",
+    },
+)

@@ -206,9 +206,9 @@ class GatewayConnection:
             self._heartbeat_sent_s = -math.inf
             self.send_heartbeat()
 
-    def doubt_next_hop(self, patience: float) -> None:
+    def doubt_next_hop(self) -> None:
         """A neighbour cannot reach the next hop, which may have left unheard: try it at once."""
-        if self._medium.policy.checks_soon and self._states.connected and not self.proven(patience):
+        if self._medium.policy.checks_soon and self._states.connected and not self.proven():
             self.send_heartbeat()
 
     def another_next_hop(self, but: int) -> int:
@@ -293,28 +293,29 @@ class GatewayConnection:
         """Whether the preferred gateway said so within so many check periods."""
         return self._deadlines.now_s - self._resigned_s <= periods * self._check_period_s
 
-    def proven(self, patience: float) -> bool:
-        """Whether the gateway answered within the last `patience` check periods.
+    def proven(self) -> bool:
+        """Whether the gateway has answered lately: on a busy channel it is asked less often.
 
         With a key, answers for others do not tell this router the gateway's nonce.
         """
         now_s, period_s = self._deadlines.now_s, self._check_period_s
         if self._has_key and now_s - self._answered_itself_s > NONCE_PERIODS * period_s:
             return False
-        return self._answered_s > now_s - patience * period_s
+        return self._answered_s > now_s - self._patience() * period_s
 
     def answered_itself(self) -> None:
         """The gateway has answered a heartbeat of this router."""
         self._answered_itself_s = self._deadlines.now_s
 
-    def check(self, patience: float) -> None:
+    def check(self) -> None:
         """The part of the periodic check for a connected router."""
         shows_way_back = self.swallowing.wants_heartbeat(self.hops)
         if shows_way_back:
             self.send_heartbeat()
         to, answered_s = self.next_hop(), self._answered_itself_s
+        patience = self._patience()
         asked = self._relay_check.run(self.gateway, to, self.hops, answered_s, patience)
-        if shows_way_back or self.proven(patience):
+        if shows_way_back or self.proven():
             return
         fresh_periods = self._medium.place_periods
         self._ask_for_places(fresh_periods * self._check_period_s, asked)

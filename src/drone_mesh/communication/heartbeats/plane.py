@@ -130,7 +130,7 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         was_connected = self._states.connected
         self._technique.maintain_routing()
         if was_connected:
-            self._connection.check(self._antenna.patience())
+            self._connection.check()
         elif self._connection.just_lost or before is not ConnectionState.SEARCHING:
             pass  # a repair counts from the next check, or a heartbeat is under way
         elif self._connection.asks_gateway_that_resigned():
@@ -258,7 +258,7 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
             told_alone = messages.addressee(payload) != BROADCAST
             self._host.on_node_missing(missing, told_alone)
             if missing == self._connection.next_hop():
-                self._connection.doubt_next_hop(self._antenna.patience())
+                self._connection.doubt_next_hop()
 
     @receives(*_OF_TECHNIQUES)
     def on_packet_of_technique(self, payload: bytes, creator: int, from_: int) -> None:
@@ -334,11 +334,11 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         The preferred gateway's is sent as if alone. On a busy channel, skip neighbours that were
         heard recently.
         """
-        patience, gateway = self._antenna.patience(), self.gateway
-        if gateway in others and not self._connection.proven(patience):
+        gateway = self.gateway
+        if gateway in others and not self._connection.proven():
             self._connection.send_heartbeat()
         since_s = math.inf
-        patience = max(patience, self._medium.heard_periods)
+        patience = max(self._antenna.patience(), self._medium.heard_periods)
         if patience > 0.0:
             since_s = self._deadlines.now_s - patience * self._check_period_s
         heard_s = self._neighbours.last_heard_s

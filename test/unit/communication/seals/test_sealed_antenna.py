@@ -429,3 +429,18 @@ def test_a_message_arrives_over_a_neighbour_that_was_silent_for_three_check_peri
     network.send(2, 0, b"once", reliable=False)
     network.run_for(1.0)
     assert [message.payload for message in network.received.get(0, [])] == [b"once"]
+
+
+@pytest.mark.parametrize("radio", ["disc", "shared"])
+def test_of_many_frames_in_a_neighbours_name_fewer_come_back_than_were_sent(radio):
+    def delivered(forged):
+        network = line(3, node_keys, radio)
+        network.run_for(30.0)
+        before = network.air.delivered
+        for number in range(600):
+            if forged:
+                network.inject(1, packet(f"02 02 04 01 01 {'00' * 20} {number % 256:02x} 01 61"))
+            network.run_for(0.05)
+        return network.air.delivered - before
+
+    assert delivered(forged=True) - delivered(forged=False) < 600 / 2
