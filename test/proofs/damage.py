@@ -27,7 +27,7 @@ from proofs.attacks import (
 from proofs.claims import BY_BEACONS, FOR_PACKETS_DOWN, order_west
 from proofs.stranger import BESIDE, Stranger
 
-NODES, SHARED_NODES = 25, 9
+NODES, SHARED_NODES, BIDDING_NODES = 25, 9, 4
 SPACING_M = 6.0
 REST_S = 20.0
 JOINING_S = 12.0
@@ -101,24 +101,31 @@ def harm(case: Case, seed: int) -> Damage:
     return Damage(attacked.cut_off - quiet.cut_off, attacked.later - quiet.later, lured, metres)
 
 
+def mesh_size(name: str) -> int:
+    """Of the mesh that this attack is made on, with its gateway."""
+    attack = ATTACKS[name]
+    if attack in (invented_ids, borrowed_names):
+        return SHARED_NODES  # on a shared channel, where strangers cost airtime
+    return BIDDING_NODES if attack in (highest_bid, plausible_bid) else NODES
+
+
 @functools.lru_cache(maxsize=None)  # the search for the worst case has made some of them
 def trial(case: Case, seed: int, mute: bool = False) -> Damage:
     """One attack, or the same time with an attacker that does nothing."""
     attack = ATTACKS[case.name]
-    shared = attack in (invented_ids, borrowed_names)  # where strangers cost airtime
+    nodes = mesh_size(case.name)
     network = Network(
         seed,
-        radio="shared" if shared else "disc",
+        radio="shared" if nodes == SHARED_NODES else "disc",
         key=None if case.threat is Threat.WITHOUT_KEY else keys_of,
         routing="beacon" if attack in BY_BEACONS else DEFAULT_ROUTING,
     )
-    if attack in (highest_bid, plausible_bid):
+    if nodes == BIDDING_NODES:
         network.add_gateway(0, 0.0, 0.0)
-        for node in (1, 2, 3):
+        for node in range(1, nodes):
             network.add_router(node, SPACING_M * node, 0.0)
         sides_m = 2 * SPACING_M, 0.0
     else:
-        nodes = SHARED_NODES if shared else NODES
         network.add_fleet(1, nodes - 1, math.ceil(math.sqrt(nodes - 1)), SPACING_M)
         sides_m = (SPACING_M * (math.isqrt(nodes - 1) - 1),) * 2
     x, y = (part * side_m for part, side_m in zip(case.place.value, sides_m))
@@ -214,8 +221,9 @@ def worst(name: str, threat: Threat) -> Case:
 
 
 def _weight(case: Case) -> float:
+    """Three shares of the mesh: cut off, cut off later, lured away."""
     cut_off, later, lured, _ = harm(case, seed=0)
-    return round(cut_off + later + lured, 2)
+    return round(cut_off + later + lured / mesh_size(case.name), 2)
 
 
 def damage_row(name: str, runs: int) -> str:

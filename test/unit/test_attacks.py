@@ -162,6 +162,30 @@ def test_an_attack_is_searched_for_its_worst_place_and_moment(monkeypatch):
     assert damage_row("false gateway", runs=2) == f"| false gateway | {cell} | {cell} | {cell} |"
 
 
+@pytest.mark.parametrize(
+    ("name", "lured", "cut_off", "worst"),
+    [
+        ("false gateway", 5, 0.21, Place.FRONT),  # 5 of 25 drones
+        ("false gateway", 5, 0.19, Place.LEFT),
+        ("frames in neighbours' names", 2, 0.23, Place.FRONT),  # 2 of 9
+        ("frames in neighbours' names", 2, 0.21, Place.LEFT),
+        ("bids of 1e9", 1, 0.26, Place.FRONT),  # 1 of 4
+        ("bids of 1e9", 1, 0.24, Place.LEFT),
+    ],
+)
+def test_a_lured_drone_weighs_as_much_as_one_that_is_cut_off(
+    monkeypatch, name, lured, cut_off, worst
+):
+    harmed = {Place.LEFT: Damage(0.0, 0.0, lured, 5.0), Place.FRONT: Damage(cut_off, 0.0, 0, 0.0)}
+    nothing = Damage(0.0, 0.0, 0, 0.0)
+
+    def trial(case, seed, mute=False):
+        return nothing if mute else harmed.get(case.place, nothing)
+
+    monkeypatch.setattr(damage, "trial", trial)
+    assert damage.worst(name, Threat.WITHOUT_KEY).place is worst
+
+
 @pytest.mark.parametrize("moment", Moment)
 def test_an_attack_can_begin_at_each_moment(moment):
     """A recorded order does not come true again in a mesh with a key, whenever it was given."""
