@@ -278,6 +278,11 @@ class Neighbours:
         """The last reported place of `node`."""
         return self.places.get(node)
 
+    def goal_of(self, node: int, now_s: float) -> Location | None:
+        """Where `node` flies, if it told so a moment ago."""
+        told_s = self._goals_s.get(node, -math.inf)
+        return self.places[node].place if now_s - told_s < FLIGHT_S else None
+
     def under_way(self, now_s: float) -> Iterator[tuple[int, Location | None, Location]]:
         """Who told its goal a moment ago, from where it flies (None: unknown), and to where."""
         for node, told_s in self._goals_s.items():

@@ -134,6 +134,12 @@ class FlightPath:
             for one, other in zip(away, away[1:])
         )
 
+    def above_goal_s(self, height_m: float) -> float:
+        """When it is this high above its goal on the way down, or begins that way, if lower."""
+        down_m = self.above_goal[2] - self.goal[2]
+        left = min(1.0, height_m / down_m) if down_m > 0.0 else 0.0
+        return self.start_s + self.duration_s * (1.0 - left * (1.0 - DESCENT_STARTS_AT))
+
     @staticmethod
     def _share_across(share: float) -> float:
         """The share of the way across, at this share of the flight's time."""

@@ -53,6 +53,12 @@ def test_a_flight_of_no_distance_is_over_at_once():
     assert path.position_at(5.0) == (1.0, 2.0, 3.0)
 
 
+@pytest.mark.parametrize(("above_m", "at_s"), [(0.0, 5.0), (1.0, 4.8), (2.5, 4.5), (9.0, 4.5)])
+def test_a_flight_is_so_high_above_its_goal_on_the_way_down_at_this_time(above_m, at_s):
+    path = FlightPath((0.0, 0.0, 0.0), (10.0, 0.0, 0.0), 0.0, 2.0, ceiling_m=2.5)
+    assert path.above_goal_s(above_m) == pytest.approx(at_s)
+
+
 def test_descending_starts_at_nine_tenths_of_the_time():
     assert not PATH.is_descending(100.0 + 22.4)
     assert PATH.is_descending(100.0 + 22.5)

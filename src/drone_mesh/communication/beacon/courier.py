@@ -100,9 +100,9 @@ class Courier(IDelivery):
                 return
         self._carry(transit)
 
-    def send(self, payload: bytes, to: int) -> None:
-        """Send a packet to the neighbour `to`, and nowhere else."""
-        self._hand_over(payload, to)
+    def send(self, payload: bytes, to: int) -> bool:
+        """Send a packet to the neighbour `to`, and nowhere else. False: it did not take it."""
+        return self._hand_over(payload, to)
 
     def undelivered(self, payload: bytes) -> None:
         """The antenna gave up a packet: send it another way."""

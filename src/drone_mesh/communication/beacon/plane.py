@@ -332,12 +332,15 @@ class BeaconPlane(IControlPlane):
     def _take_gateway_place(self, node: int, beacon: Beacon) -> None:
         """Store the gateway's place from its own beacon or the parent's."""
         places, now_s, place = self._places, self._routes.now_s, beacon.gateway_place
-        is_gateway = node == self._routes.gateway
+        is_gateway, goal = node == self._routes.gateway, None
         if is_gateway:
+            goal = self._neighbours.goal_of(node, now_s)  # it is followed there
             place = None if beacon.motion is None else self._routes.neighbours[node].at_rest
         elif node != self._routes.parent:
             return
-        if place is None or not self._claims.may_be_at(place, gateway=True, says_so=is_gateway):
+        says_so = is_gateway and goal is None
+        place = goal or place
+        if place is None or not self._claims.may_be_at(place, gateway=True, says_so=says_so):
             return
         self._routes.gateway_place = place
         if not self._proofs.has_key:

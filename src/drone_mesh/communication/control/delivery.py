@@ -20,6 +20,10 @@ class IDelivery(metaclass=abc.ABCMeta):
     def send_own(self, payload: bytes) -> bool:
         """Send this node's own packet towards its addressee. False: there is no way to it."""
 
+    @abc.abstractmethod
+    def send(self, payload: bytes, to: int) -> bool:
+        """Send a packet to the neighbour `to`, and nowhere else. False: it did not take it."""
+
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class IRoutes(metaclass=abc.ABCMeta):

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from drone_mesh.communication.control.control_plane import IControlPlane
 from drone_mesh.communication.control.node_part import due
 from drone_mesh.communication.control.pilot import Pilot
+from drone_mesh.communication.control.places import PlaceRequests
 from drone_mesh.communication.control.router_states import RepairState, RouterStates
 from drone_mesh.communication.events.observer import MeshEventKind, Reporter
 from drone_mesh.communication.interfaces import IWirelessCommunication
@@ -27,9 +28,25 @@ class Flights:
     _control: IControlPlane
     _orders: OrderIntake
     _report: Reporter
+    _requests: PlaceRequests
+    _deadlines: Deadlines
 
     def took_off(self) -> None:
-        """The drone leaves its place because of an order."""
+        """The drone leaves its place because of an order: those who lose it may follow it."""
+        self._announce_goal()
+
+    def _announce_goal(self) -> None:
+        goal = self._pilot.goal
+        if goal is not None:
+            self._requests.announce(goal)
+            self._deadlines.set(Due.GOAL, self._deadlines.now_s + GOAL_AGAIN_S)
+
+    @due(Due.GOAL)
+    def announce_goal_again(self) -> None:
+        self._deadlines.set(Due.GOAL, math.inf)
+        goal = self._pilot.goal
+        if goal is not None:
+            self._requests.announce(goal)
 
     @due(Due.ASK_POSITION)
     def watch(self) -> None:
@@ -52,15 +69,13 @@ class RouterFlights(Flights):
 
     _states: RouterStates
     _repair: ConnectionRepair
-    _deadlines: Deadlines
     _antenna: IWirelessCommunication
 
     def took_off(self) -> None:
         """The drone leaves its place because of an order: tell the neighbours where it flies."""
         goal = self._pilot.goal
         if self._repair.medium.policy.announces_flights and goal is not None:
-            self._repair.announce_place(goal)
-            self._deadlines.set(Due.GOAL, self._deadlines.now_s + GOAL_AGAIN_S)
+            self._announce_goal()
             for neighbour in sorted(self._control.neighbours.ids()):
                 heard = self._control.neighbours.place_of(neighbour)
                 if heard is not None and heard.place.distance_m(goal) >= self._repair.range_m:
@@ -75,13 +90,6 @@ class RouterFlights(Flights):
         if not self._states.connected or self._states.repair is RepairState.FLYING:
             return False
         return self._pilot.distance_m <= SHORT_FLIGHT * self._repair.range_m
-
-    @due(Due.GOAL)
-    def announce_goal_again(self) -> None:
-        self._deadlines.set(Due.GOAL, math.inf)
-        goal = self._pilot.goal
-        if goal is not None:
-            self._repair.announce_place(goal)
 
     @due(Due.ASK_POSITION)
     def watch(self) -> None:

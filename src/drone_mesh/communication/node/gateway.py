@@ -6,6 +6,7 @@ import math
 import random
 
 from drone_mesh.communication.control.control_plane import ITechnique
+from drone_mesh.communication.control.places import PlaceRequests
 from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.communication.interfaces import (
     MAX_NODE_ID,
@@ -70,8 +71,9 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
             self._options.clearance_m,
             self._has_key,
         )
+        requests = PlaceRequests(node_id, self._pilot, antenna, control.delivery, deadlines)
         self._flights = self._orders.flights = Flights(
-            self._pilot, control, self._orders, self._report
+            self._pilot, control, self._orders, self._report, requests, deadlines
         )
         self._parts += [self._book, self._reports, self._whereabouts, self._flights]
 

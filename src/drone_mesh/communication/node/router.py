@@ -42,6 +42,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
         self._states = states = RouterStates()
         super().__init__(node_id, antenna, engine, routing, rng, states, settings)
         control, deadlines, pilot = self.control, self._deadlines, self._pilot
+        requests = PlaceRequests(node_id, pilot, antenna, control.delivery, deadlines)
         self._repair = ConnectionRepair(
             node_id,
             states,
@@ -52,7 +53,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
             antenna,
             engine,
             pilot,
-            PlaceRequests(node_id, pilot, antenna, control.delivery, deadlines),
+            requests,
             self.places,
             self._report,
             repair or Thesis(),
@@ -76,9 +77,10 @@ class MeshnetworkRouter(MeshnetworkComponent):
             control,
             self._orders,
             self._report,
+            requests,
+            deadlines,
             states,
             self._repair,
-            deadlines,
             antenna,
         )
         self._orders.flights = self._flights

@@ -85,10 +85,10 @@ class Whereabouts:
             self._control.neighbours.motion.flies_for_repair(creator, now_s)
         self._control.neighbours.set_place(creator, place, now_s, flies_there)
         self._is_taken(place)
-        self._answer(creator)
+        self._answer(creator, is_here=flies_there and creator == from_)
         if flies_there:
             for packet in self._last_places(place, creator, but=(creator, self._node_id)):
-                self._control.delivery.send_own(packet)
+                self._send_back(packet, creator, is_here=creator == from_)
         elif creator == from_ and messages.addressee(payload) == self._node_id:
             self.on_leads(creator)
 
@@ -126,7 +126,7 @@ class Whereabouts:
     def _is_taken(self, place: Location) -> None:
         """A node that asks for places is at `place` or flies there."""
 
-    def _answer(self, asker: int) -> None:
+    def _answer(self, asker: int, is_here: bool = False) -> None:
         goal = self._pilot.goal
         place = goal or self._pilot.location()
         if place is None:
@@ -137,10 +137,19 @@ class Whereabouts:
             age_s = now_s - places.gateway_seen_s
             extension = GatewayPlace(self._control.gateway, places.gateway, age_s)
             if self._has_key:
-                self._control.delivery.send_own(extension.to_payload(me, asker))
+                self._send_back(extension.to_payload(me, asker), asker, is_here)
             else:
                 answer = extension.appended_to(answer)
-        self._control.delivery.send_own(answer)
+        self._send_back(answer, asker, is_here)
+
+    def _send_back(self, packet: bytes, asker: int, is_here: bool) -> None:
+        """Send an answer; to an asker that flies by, here, where it asked.
+
+        Routes lead to where it was, and it may land before they find it.
+        """
+        delivery = self._control.delivery
+        if not (is_here and delivery.send(packet, asker)):
+            delivery.send_own(packet)
 
     def _last_places(self, goal: Location, to: int, but: Container[int]) -> list[bytes]:
         """Packets that tell `to` which nodes, `but` these, were last heard near a goal."""

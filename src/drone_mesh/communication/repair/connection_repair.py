@@ -33,7 +33,7 @@ from drone_mesh.communication.repair.spots import (
     spot_beside_rivals,
 )
 from drone_mesh.communication.repair.status import NO_CHECK_YET, NOTHING_TO_REPAIR, RepairStatus
-from drone_mesh.communication.timing import Due
+from drone_mesh.communication.timing import FLIGHT_POSITION_PERIOD_S, Due
 from drone_mesh.communication.wire.messages import GatewayPlace, MovementNegotiationMessage
 from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.drone.location import Location
@@ -190,6 +190,8 @@ class ConnectionRepair(RepairActions):
                 self._look_again()
             elif flight.paused:
                 flight.fly_on()
+            else:
+                self._requests.ask_all()
             return False
         is_over = not flight.ask_again()
         if not is_over:
@@ -311,6 +313,8 @@ class ConnectionRepair(RepairActions):
         if flight is None:
             return
         flight.each_second()
+        if self.now_s < flight.last_ask_s() < self.now_s + FLIGHT_POSITION_PERIOD_S:
+            self.wait_until(flight.last_ask_s())
         if flight.lands:
             self._last.hurry(flight)
         elif self._last.becomes_due(self.now_s, flies=True):

@@ -79,6 +79,7 @@ class GroupRepair(LoneRepair):
     def fly_alone(self) -> None:
         """Fly one step, and come back if no node is heard there. After the last step, begin again.
 
+        Each time it looks at the place of one more node first: that one may have a gateway.
         A drone that flies to the gateway, as after an order, looks for it on the way: it need not.
         """
         mesh, here = self.mesh, self.mesh.own_place()
@@ -88,9 +89,11 @@ class GroupRepair(LoneRepair):
             if mesh.is_unheard():
                 self.reason = "hears others and is not heard: its transmitter may be broken"
                 return
-            self._was_everywhere = False
-            mesh.try_again()
-            step, self.reason = self._next_step(alone=True)
+            step = self.beside_another()
+            if step is None:
+                self._was_everywhere = False
+                mesh.try_again()
+                step, self.reason = self._next_step(alone=True)
         if step is None:
             self._was_everywhere = not mesh.why_not_fly()
             return
@@ -171,7 +174,10 @@ class GroupRepair(LoneRepair):
         return None, reason
 
     def _occupant(self, step: Step) -> int:
-        """A reachable node at the goal of `step`, or the owner of that place; else NO_ROUTE."""
+        """A reachable node at the goal of `step`, or the owner of that place; else NO_ROUTE.
+
+        Who stands beside the gateway and has none finds none there, as its link may have failed.
+        """
         mesh = self.mesh
         if step.owner in mesh.neighbours():
             return step.owner
@@ -179,6 +185,8 @@ class GroupRepair(LoneRepair):
         for node, view in mesh.reachable().items():
             if node == step.owner and view.age_s <= mesh.now_s - self._asked_s:
                 return node
+            if step.home and view.hops == NO_ROUTE:
+                continue
             if (
                 view.place is not None
                 and view.age_s < OCCUPIED_FOR_S

@@ -34,7 +34,7 @@ from drone_mesh.drone.location import Location
 
 RADIO_FAILED = "its radio does not work"
 JAMMED = "its channel is jammed"
-TRIED_SPOTS = 4  # more take all spots around a place, so that the drone drifts away
+TRIED_SPOTS = 6  # of two turns; more take all spots around a place, so that the drone drifts away
 
 
 class Step(NamedTuple):
@@ -172,6 +172,16 @@ class RepairActions(abc.ABC):
             for known, owner in candidates
             for place in self.within_fence(known)
             if may_be_flown_to(place)
+        ]
+
+    def places_of_others(self) -> list[Step]:
+        """Where the other nodes were of which it knows, the one that was heard last first."""
+        known = sorted(self._neighbours.places.items(), key=lambda one: -one[1].heard_s)
+        return [
+            Step(place, node)
+            for node, heard in known
+            for place in self.within_fence(heard.place)
+            if node != self.node_id and may_be_flown_to(place)
         ]
 
     def within_fence(self, place: Location | None) -> list[Location]:

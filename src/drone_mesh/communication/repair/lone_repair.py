@@ -36,6 +36,7 @@ class LoneRepair(IRepairStrategy):
     _stood_at: Location | None = None  # during a look around: its start
     _looked = False  # since the connection was lost
     _was_everywhere = False  # alone, it has no further step
+    _was_beside_another = False  # of those that it knows, since it began again
     _in_silence = False  # several neighbours fell silent together before it
     _landed_s = -math.inf  # from its latest look around
     _jammed_s = -math.inf  # when its channel was last found to be jammed
@@ -46,6 +47,7 @@ class LoneRepair(IRepairStrategy):
         super().start(mesh)
         self._lost: set[int] = set()  # neighbours that were not heard again
         self._samples: list[bool] | None = None  # of the power in the channel, while it measures
+        self._visited: set[int] = set()  # the others beside whose places it has looked
 
     def patience(self, silent: bool) -> float:
         """In silence, the first look around comes after the usual time, and further ones rarely."""
@@ -56,7 +58,8 @@ class LoneRepair(IRepairStrategy):
     def on_gateway_found(self) -> None:
         """Start over: the next loss is a new one."""
         self._stood_at, self._looked, self._samples = None, False, None
-        self._was_everywhere = False
+        self._was_everywhere = self._was_beside_another = False
+        self._visited.clear()
         self._jammed_s = -math.inf
         self.listens = False
 
@@ -120,6 +123,19 @@ class LoneRepair(IRepairStrategy):
     @abc.abstractmethod
     def fly_alone(self) -> None:
         """Take the next step, after the channel was found not to be jammed."""
+
+    def beside_another(self) -> Step | None:
+        """To the place of another node that it knows, the one heard last first; one in a turn."""
+        mesh, self._was_beside_another = self.mesh, not self._was_beside_another
+        if not self._was_beside_another or mesh.why_not_fly():
+            return None
+        for step in mesh.places_of_others():
+            if step.owner not in self._visited and not mesh.was_at(step):
+                self._visited.add(step.owner)
+                return step
+        self._visited.clear()
+        self._was_beside_another = False
+        return None
 
     def _hears_others(self) -> bool:
         return bool(self.mesh.neighbours().keys() - {self._dead})

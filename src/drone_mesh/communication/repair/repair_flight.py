@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Callable
 
@@ -11,6 +12,7 @@ from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.repair.interfaces import Step
 from drone_mesh.communication.repair.options import RepairOptions
 from drone_mesh.communication.repair.spots import (
+    NEAR,
     ROUNDING_M,
     Landing,
     TakenPlaces,
@@ -78,6 +80,14 @@ class RepairFlight:
         self._requests.ask_all()
         if self.stops_when_connected:
             self._introduce()
+
+    def last_ask_s(self) -> float:
+        """When to ask once more on this leg: just before it could no longer turn aside.
+
+        A drone that comes down comes into reach of nodes on the ground, in less than a second.
+        """
+        above_m = NEAR * self._options.clearance_m
+        return math.inf if self._way is None else self._way.above_goal_s(above_m)
 
     def stop_when_connected(self) -> None:
         """Stop at the first connection, unless this flight leads back."""

@@ -192,7 +192,8 @@ def test_an_order_for_its_own_drone_is_flown_and_the_landing_reported():
     rig.engine.place = Location(3.0, 4.0, 5.0)
     rig.wait(1.1)
     assert rig.routing.empty()
-    assert rig.broadcasts() == [packet("01 01 03 fe fe 00 01")]
+    goal = packet("01 01 01 fe fe 00 00 40 40 00 00 80 40 05 00 00 00 00 80")
+    assert rig.broadcasts() == [goal, goal, packet("01 01 03 fe fe 00 01")]
 
 
 @pytest.mark.parametrize(

@@ -610,7 +610,7 @@ def test_alone_after_every_step_it_looks_where_it_was_connected_last_and_then_st
     """
     rig = lone_rig()
     left_s = []
-    while rig.now_s < 1200.0:
+    while rig.now_s < 1800.0:
         rig.wait(1.0)
         if len(rig.engine.goals) > len(left_s):
             rig.engine.place = rig.engine.goals[-1]
@@ -623,6 +623,21 @@ def test_alone_after_every_step_it_looks_where_it_was_connected_last_and_then_st
     sides = [goal for goal in rig.engine.goals if goal.distance_m(Location(4.0, 0.0, 0.0)) < 1.2]
     looked_from = [math.degrees(math.atan2(g.longitude, g.latitude - 4.0)) for g in sides]
     assert {round(bearing) % 360 for bearing in looked_from} == {0, 180, 300, 120}
+
+
+def test_alone_after_every_step_it_looks_at_the_place_of_another_node_and_comes_back():
+    """That one may have a gateway; of those that it knows, each time one, the latest first."""
+    rig = lone_rig(heard=["06 02 01 01 01 00 00 d0 41"])  # latitude 26
+    rig.wait(1.0)
+    rig.hear("07 02 01 01 01 00 00 a0 41")  # latitude 20
+    while rig.now_s < 2000.0:
+        rig.wait(1.0)
+        if rig.engine.goals:
+            rig.engine.place = rig.engine.goals[-1]
+    goals = rig.engine.goals
+    looked = [n for n, goal in enumerate(goals) if goal.latitude > 13.5]
+    assert [goals[n].latitude for n in looked] == pytest.approx([20.0, 26.0], abs=1.2)
+    assert [goals[n + 1] for n in looked] == [goals[n - 1] for n in looked]
 
 
 def test_a_drone_that_knows_no_place_and_is_where_it_was_connected_last_stays_and_says_so():
@@ -1008,6 +1023,20 @@ def test_a_place_is_occupied_while_its_owner_answers_over_whatever_route():
     assert packet("01 01 02 03 02" + FROM_12) in rig.sent(REQUEST)  # asks the owner itself
     rig.hear(place(3, 30.0), "02 03 01 01 01 00 00 f0 41")  # 2 lives, somewhere else
     assert rig.sent(BID) == [own_bid(3, -1.0)]
+
+
+def test_who_stands_beside_the_gateways_place_and_has_no_gateway_does_not_occupy_it():
+    """Its link may have failed: it stood there for minutes while others could have looked."""
+    rig = group_rig(2, 3)
+    rig.antenna.dead = set()
+    rig.hear(place(3, 5.0))  # the gateway's place is at 4
+    for round_s in (0.0, 40.0):
+        rig.wait_until(BIDS_S + round_s)
+        rig.hear(bid(2, -1.0), bid(3, -1.0))
+        rig.wait(TO_DECISION_S)
+    rig.forget()
+    rig.wait_until(BIDS_S + 80.0)
+    assert own_bid(2, 1 / 9) in rig.sent(BID)
 
 
 def test_after_two_rounds_without_a_flier_the_place_of_the_gateway_counts():
@@ -1565,14 +1594,21 @@ def flying_rig():
     return rig
 
 
-def test_in_flight_it_asks_all_nodes_in_range_once_a_second_where_they_are():
+def test_in_flight_it_asks_all_nodes_in_range_where_they_are_once_a_second_and_before_it_lands():
+    """On its way down it comes into reach of others, and can still turn aside for a moment."""
     rig = flying_rig()
-    fly(rig, Location(11.0, 0.0, 2.0))
-    fly(rig, Location(10.0, 0.0, 2.0))
+    rig.engine.place = Location(11.0, 0.0, 2.0)
+    rig.wait(0.9)
+    assert rig.broadcasts() == []
+    rig.wait(0.05)  # it took off 1.95 s ago, and will be 1.5 m above its goal
     requests = rig.broadcasts()
+    assert len(requests) == 1
+    fly(rig, Location(10.0, 0.0, 2.0))
+    fly(rig, Location(9.0, 0.0, 2.0))
+    requests += rig.broadcasts()
     starts = [request[:9].hex(" ") for request in requests]
-    assert starts == ["01 01 02 fe fe 00 00 00 41"] * 2  # latitude 8
-    assert [request[13:15].hex(" ") for request in requests] == ["01 80"] * 2  # it flies there
+    assert starts == ["01 01 02 fe fe 00 00 00 41"] * 3  # latitude 8
+    assert [request[13:15].hex(" ") for request in requests] == ["01 80"] * 3  # it flies there
 
 
 def test_to_the_gateway_it_flies_in_legs_and_presents_itself():
