@@ -14,6 +14,7 @@ from drone_mesh.inprocess import Network
 from drone_mesh.lab.network_sample import gateways_of, physical_graph
 
 _FLIGHTS = (MeshEventKind.FLIGHT_DECIDED, MeshEventKind.FLIGHT_ORDERED)
+TOUCH_M = 1e-3  # of sums
 EVENTS_BACK = 20  # when a flight starts, its event is among this many latest ones
 
 
@@ -97,14 +98,19 @@ class Flights:
                 self._note_known(self._current[node])
 
     def _note_known(self, leg: Leg) -> None:
-        """Note who is nearer to the rest of its way than the clearance, and could be known."""
+        """Note to whom the rest of its way comes nearer than the clearance, and could be known.
+
+        A way that leads away from one beside whom the drone landed unawares comes no nearer.
+        """
         now_s = self._network.clock.now_s
+        here = Location.from_vector(leg.path.position_at(now_s))
         on_way = {
             node: place
             for node, place in self._resting_places()
             if node not in leg.warned_of
             and node != leg.node
-            and leg.path.passes_m(place.to_vector(), now_s) < CLEARANCE_M
+            and leg.path.passes_m(place.to_vector(), now_s)
+            < min(CLEARANCE_M, here.distance_m(place) - TOUCH_M)
         }
         if on_way:
             path = leg.path

@@ -255,7 +255,7 @@ RECORDED = [
     "67.440 3 LANDED 255",
     "67.452 3 CONNECTED 0 2 hops",
 ]
-RECORDED_PACKETS = 190
+RECORDED_PACKETS = 193
 
 
 def test_a_recorded_run_of_layout_201_without_node_2():

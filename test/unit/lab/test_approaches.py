@@ -231,3 +231,10 @@ def test_a_repair_flight_is_warned_when_it_comes_into_reach_of_one_that_knows(ki
     flights.look()
     is_repair = kind is MeshEventKind.FLIGHT_DECIDED
     assert (4 in flights.legs[0].warned_of) == is_repair
+
+
+def test_a_flight_away_from_one_beside_whom_the_drone_landed_unawares_is_not_warned_of_it():
+    network, flights = leg_of_1(None, goal=(12.5, 0.0, 0.0))
+    network.run_for(10.0)
+    network.nodes[1].drone.fly_to(Location.from_vector((16.0, 3.0, 0.0)))
+    assert [leg.warned_of for leg in flights.legs] == [{2}, set()]

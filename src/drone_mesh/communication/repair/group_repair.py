@@ -176,16 +176,17 @@ class GroupRepair(LoneRepair):
     def _occupant(self, step: Step) -> int:
         """A reachable node at the goal of `step`, or the owner of that place; else NO_ROUTE.
 
-        Who stands beside the gateway and has none finds none there, as its link may have failed.
+        Who stands beside the gateway for two rounds and has none: its link may have failed.
         """
         mesh = self.mesh
         if step.owner in mesh.neighbours():
             return step.owner
         radius_m = mesh.clearance_m * (2 * PITCH if step.home else NEAR)
+        stays = self._rounds_without_flier >= ROUNDS_WITHOUT_FLIER
         for node, view in mesh.reachable().items():
             if node == step.owner and view.age_s <= mesh.now_s - self._asked_s:
                 return node
-            if step.home and view.hops == NO_ROUTE:
+            if step.home and stays and view.hops == NO_ROUTE:
                 continue
             if (
                 view.place is not None
