@@ -94,7 +94,10 @@ class Courier(IDelivery):
             transit = Transit(payload, from_, now_s)  # its creator sends the same once more
             self._remember(identity, transit)
         else:
-            transit.sent_s[from_] = now_s  # it has it, and could not deliver it
+            if transit.came_from in transit.sent_s and from_ not in transit.sent_s:
+                transit.came_from = from_  # it went back from here, and came round
+            else:
+                transit.sent_s[from_] = now_s  # it has it, and could not deliver it
             self._on_returned(from_, forward)
             if transit in self._held:
                 return

@@ -186,6 +186,8 @@ def _from(first: int, nodes: Iterable[int]) -> list[int]:
 
 GATEWAY_PLACE_EVERY: Final = 4  # beacons: one of so many carries the gateway's place
 DIGEST_EVERY: Final = 4  # beacons: one of so many carries the digest of the origin
+PLACE_EVERY: Final = 2  # beacons: if its lists are long, one of so many carries its own place
+PLACE_AT_REST_EVERY: Final = 4  # a drone that stands is where the last one said
 SEALED_ROOM: Final = 20  # bytes of a beacon with a seal
 
 
@@ -197,6 +199,7 @@ class OwnBeacons:
     _frame: CommonFrame
     _routes: BeaconRoutes
     _below: NodesBelow
+    _motion: OwnMotion
     _step_m: float  # a node so near to where it is expected is there, and so is a gateway
 
     def __post_init__(self) -> None:
@@ -219,8 +222,10 @@ class OwnBeacons:
         self.asks = False
         motion: Motion | None = routes.motion
         gateway_place, below = self._next_gateway_place(), self._below
-        room, turn = room_below(self.room, motion, gateway_place, digest), self._sent % 2 == 0
-        if room < 0 or (is_sealed and turn and min(MOST_BELOW, room) < len(below.ids())):
+        room = room_below(self.room, motion, gateway_place, digest)
+        every = PLACE_AT_REST_EVERY if self._motion.stands(routes.now_s) else PLACE_EVERY
+        yields = is_sealed and self._sent % every != 1
+        if room < 0 or (yields and min(MOST_BELOW, room) < len(below.ids())):
             motion = None
             room = room_below(self.room, motion, gateway_place, digest)
         announced = below.to_announce(min(MOST_BELOW, room))

@@ -70,7 +70,9 @@ class BeaconPlane(IControlPlane):
         self._step_m = MOVED * node.range_m
         self._motion = OwnMotion(node.pilot.place, self._step_m)
         self._below = NodesBelow(self._me, self._routes)
-        self._own = OwnBeacons(node.seals, node.frame, self._routes, self._below, self._step_m)
+        self._own = OwnBeacons(
+            node.seals, node.frame, self._routes, self._below, self._motion, self._step_m
+        )
         self._body_end = messages.HEADER_BYTES + self._own.room
         self._trickle = Trickle(medium, node.rng)
         self._searches = Searches(self._me, self._routes, self._broadcast, medium.hop_s)
@@ -370,7 +372,7 @@ class BeaconPlane(IControlPlane):
     def _learn(self, creator: int, from_: int, kind: int, payload: bytes) -> bool:
         routes = self._routes
         routes.alive(from_)
-        if creator != from_:
+        if creator != from_ and kind != MessageType.SEARCH:  # all repeat it: the first one counts
             routes.led_to(creator, from_)
         return True
 

@@ -490,7 +490,8 @@ class BeaconRoutes(IRoutes):
     def _announcements(self, node: int) -> Iterator[tuple[tuple[bool, int, float], Way]]:
         """The neighbours that announce `node` below them; a child, and the latest, first.
 
-        Among children that dispute it, the one with the fewest such claims, and the first.
+        Among children that dispute it, the one with the fewest such claims, and the first. Then
+        those whose way up leads over it, unless it comes here first, the nearest to it first.
         """
         now_s = self.clock.now_s
         for neighbour in filter(lambda one: one.usable, self._all()):
@@ -501,8 +502,10 @@ class BeaconRoutes(IRoutes):
                 age_s = at_s if claims else now_s - at_s + self.risk(neighbour)
                 listed_s = neighbour.listed_s.get(node, at_s)
                 yield (not is_child, claims, age_s), Way(neighbour.node, listed_s)
-            elif node == neighbour.beacon.parent or node in neighbour.beacon.ancestors:
-                yield (True, 0, math.inf), Way(neighbour.node, neighbour.heard_s)
+                continue
+            up = neighbour.beacon.parent, *neighbour.beacon.ancestors
+            if node in up and self._node_id not in up[: up.index(node)]:
+                yield (True, up.index(node), math.inf), Way(neighbour.node, neighbour.heard_s)
 
     def _nearer(self, node: int) -> list[Way]:
         """The neighbours that are nearer to the last known place of `node`, the nearest first."""

@@ -49,3 +49,14 @@ def test_a_gateway_in_flight_is_looked_for_at_the_goal_that_it_announced():
     rig.wait(11.0)
     rig.hear("00 00 28 01 fe 15 10 00 fe 00 ff ff ff ff 7d 00 66 00 00 00 00 00 00 00 01")
     assert rig.mesh.places.gateway == Location(pytest.approx(12.5), pytest.approx(10.2), 0.0)
+
+
+def test_the_way_back_to_who_searches_is_the_one_that_the_search_took_first():
+    """Every node repeats it, also those further on: their copies show no way back."""
+    rig = Rig(routing=BeaconTechnique())
+    rig.hear(*BEACONS)
+    rig.hear("05 02 29 01 fe 21 01 00 0a", "05 03 29 01 fe 21 01 00 09")
+    rig.wait(0.2)
+    rig.forget()
+    rig.hear("21 04 2a 01 05 21")
+    assert rig.sent() == [packet("21 01 2a 02 05 21")]

@@ -290,6 +290,23 @@ def test_a_neighbour_whose_ancestor_a_node_is_leads_to_it(routes):
     assert ways(routes, 50) == [1]
 
 
+def test_of_neighbours_that_stand_on_a_node_the_one_next_to_it_is_first(routes):
+    routes.heard(1, beacon(hops=6, parent=7, others=(6, 50)))
+    routes.heard(2, beacon(hops=5, parent=6, others=(50, 3)))
+    routes.heard(3, beacon(hops=4, parent=50, others=(3, 4)))
+    assert ways(routes, 50) == [3, 2, 1]
+
+
+def test_a_child_that_stands_on_a_node_through_this_one_does_not_lead_to_it(routes):
+    """Packets went down to it, round over its neighbours, and came back as copies."""
+    routes.heard(26, beacon(hops=5, parent=50))
+    routes.choose()
+    routes.heard(8, beacon(hops=7, parent=9, others=(26, 50)))
+    routes.heard(19, beacon(hops=8, parent=8, others=(9, 26)))
+    assert ways(routes, 50) == [26]
+    assert ways(routes, 26) == [26]
+
+
 def test_a_node_is_looked_for_where_it_was_seen():
     seen = {50: (Location(0.0, 20.0, 0.0), 0.0)}
 

@@ -95,6 +95,21 @@ def test_a_packet_that_comes_back_over_a_detour_goes_another_way(node):
     assert node.returned == [(4, 9)]
 
 
+def test_a_packet_that_comes_round_after_it_went_back_goes_back_to_who_brought_it(node):
+    """It waited here for ever: its creator, which can search everywhere, never had it again."""
+    node.neighbours = [3]
+    node.hear(FROM_5_THROUGH_2)
+    node.hear("05 03 00 01 09 07", 0.1)
+    (transit,) = node.courier.holds
+    node.otherwise = transit.came_from
+    node.courier.retry()
+    node.otherwise = HOLD
+    node.hear("05 04 00 01 09 07", 0.8)
+    assert node.receivers() == [3, 2]
+    assert transit.came_from == 4
+    assert 4 not in transit.sent_s
+
+
 @pytest.mark.parametrize(
     ("kind", "comes", "leaves", "comes_back"),
     [("04", "01 09 01", "01 09 02", "01 09 06"), ("c2", "07 07", "07 07 01 01", "07 07 02 01 03")],

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import pytest
 
-from drone_mesh.communication.beacon.own_beacons import NodesBelow, OwnMotion
+from drone_mesh.communication.beacon.own_beacons import NodesBelow, OwnBeacons, OwnMotion
 from drone_mesh.communication.beacon.packets import (
     NO_ANCESTORS,
     NONE_BELOW,
@@ -13,6 +15,7 @@ from drone_mesh.communication.beacon.packets import (
     Below,
 )
 from drone_mesh.communication.beacon.routes import BeaconRoutes
+from drone_mesh.communication.control.places import CommonFrame
 from drone_mesh.communication.timing import Deadlines
 from drone_mesh.drone.location import Location
 
@@ -168,3 +171,21 @@ def test_neighbours_are_shown_in_turn(node):
         node.hears(neighbour, beacon(hops=3, parent=8))
     assert [node.below.to_show(2) for _ in range(3)] == [(3, 5), (7, 3), (5, 7)]
     assert node.below.to_show(0) == ()
+
+
+@pytest.mark.parametrize(("east_m_s", "with_place"), [(0.5, [1, 3, 5, 7]), (0.0, [1, 5])])
+def test_beside_a_seal_long_lists_take_turns_with_a_place_that_is_told_less_often_at_rest(
+    node, drone, motion, east_m_s, with_place
+):
+    seals = SimpleNamespace(reserved_bytes=lambda _kind: 7)
+    own = OwnBeacons(seals, CommonFrame(0), node.routes, node.below, motion, 0.45)
+    node.hears(1, beacon(hops=3, parent=9, below=Below(59, tuple(range(20, 60)))))
+    told = []
+    for second in range(1, 9):
+        node.routes.clock.now_s = float(second)
+        drone.place = Location(0.0, east_m_s * second, 0.0)
+        node.routes.motion = motion.at(second)
+        sent = Beacon.from_body(own.next_body(1.0), drone.place)
+        assert sent is not None
+        told += [second] if sent.motion else []
+    assert told == with_place
