@@ -283,6 +283,11 @@ class Neighbours:
         told_s = self._goals_s.get(node, -math.inf)
         return self.places[node].place if now_s - told_s < FLIGHT_S else None
 
+    def flies_m(self, node: int) -> float:
+        """How far `node` flies from where it stood to the goal that it announced; 0: not known."""
+        left = self._left.get(node)
+        return 0.0 if left is None else left.distance_m(self.places[node].place)
+
     def under_way(self, now_s: float) -> Iterator[tuple[int, Location | None, Location]]:
         """Who told its goal a moment ago, from where it flies (None: unknown), and to where."""
         for node, told_s in self._goals_s.items():

@@ -147,6 +147,7 @@ class Medium:
     heard_periods: float = 0.0
     place_periods: float = 0.0
     data_pause_s: float = 0.005  # between bursts of users' packets
+    takes_off_after_s: float = 0.0  # from the announcement of an ordered flight, not acknowledged
     report_frame_s: float = 0.0  # between two reports of a drone in flight at 1 hop
 
     @classmethod
@@ -166,6 +167,7 @@ class Medium:
             heard_periods=1.05,
             place_periods=2.5,
             data_pause_s=4 * hop_s,
+            takes_off_after_s=fast.stretched(0.3),
             report_frame_s=fast.stretched(2.0),
         )
 
@@ -199,9 +201,10 @@ class Due(enum.IntEnum):
     NODE_REPORT = 6  # the next report to the gateway
     OWN_ID = 7  # the end of the time in which it gives way to another radio with its id
     CHECK = 8  # the periodic check of routes and connection
-    GOAL = 9  # repeats a drone's goal after take-off
-    REPAIR = 10  # the repair's timer
-    ORDERS = 11  # a gateway's open orders
+    GOAL = 9  # repeats the announcement of an ordered flight
+    TAKE_OFF = 10  # the ordered flight that was announced
+    REPAIR = 11  # the repair's timer
+    ORDERS = 12  # a gateway's open orders
 
 
 class Deadlines:

@@ -99,6 +99,7 @@ class Pilot:
         self._complaints = complaints
         self._flight: Flight | None = None
         self.goal: Location | None = None  # of the current flight
+        self.departure: Location | None = None  # goal of an ordered flight that begins soon
         self._origin: Location | None = None  # start of the flight, or of the first of several
         self.distance_m = math.inf  # straight from there to the goal; infinity: not known
         self.flight_end = ""  # why the last flight ended short of its goal
@@ -124,21 +125,27 @@ class Pilot:
         except LocationUnknown:
             return None
 
-    def obey(self, goal: Location) -> bool:
-        """Start an ordered flight, or change the goal of the current one.
+    @property
+    def destination(self) -> Location | None:
+        """The goal of the flight that begins soon, or of the current one."""
+        return self.departure or self.goal
 
-        Returns False if the drone already flies there. Raises GoalRefused, and changes nothing, if
-        it cannot fly, or the goal is out of bounds, outside a fence or refused by the engine.
-        """
+    def check(self, goal: Location) -> None:
+        """Raise GoalRefused if it cannot fly, or `goal` is out of bounds or outside a fence."""
         check_goal(*goal, self._engine.fences())
         why_not = self._engine.why_not_fly()
         if why_not:
             raise GoalRefused(f"drone {self._node_id} cannot fly: {why_not}")
-        if self.goal == goal:
-            return False
+
+    def obey(self, goal: Location) -> None:
+        """Start an ordered flight, or change the goal of the current one.
+
+        Raises GoalRefused, and keeps the current flight, if `check` or the engine refuses the goal.
+        """
+        self.departure = None
+        self.check(goal)
         self._engine.set_goal(*goal)
         self._begin(goal)
-        return True
 
     def step_back_to(self, goal: Location, lands: bool = False) -> None:
         """Start a repair flight, or the last one if it `lands`, or change its goal."""
@@ -182,7 +189,7 @@ class Pilot:
         return True
 
     def forget_flight(self) -> None:
-        self._flight = self.goal = None
+        self._flight = self.goal = self.departure = None
         self._deadlines.set(Due.ASK_POSITION, math.inf)
 
     def _located(self) -> Location:

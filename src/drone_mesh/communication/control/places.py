@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Iterable
 
 from drone_mesh.communication.control.delivery import IDelivery
 from drone_mesh.communication.control.pilot import Pilot
@@ -194,25 +194,31 @@ class PlaceRequests:
 
         Each place once: on a busy channel routers connect anew all the time.
         """
-        goal = self._pilot.goal
+        goal = self._pilot.destination
         place = goal or self._pilot.location()
         if place is None or (self._told and self._told.distance_m(place) < TOLD_M):
             return
         self._told = place
         self._broadcast(place, is_goal=goal is not None)
 
-    def announce(self, goal: Location) -> None:
-        """Tell every node in range where this drone flies, or is about to fly."""
-        self._broadcast(goal, is_goal=True)
+    def announce(self, goal: Location, acknowledged_by: Iterable[int] = ()) -> None:
+        """Tell every node in range where this drone flies, or is about to fly.
 
-    def _broadcast(self, place: Location, is_goal: bool) -> None:
+        Nobody acknowledges a broadcast: these neighbours are told one by one as well.
+        """
+        packet = self._broadcast(goal, is_goal=True)
+        for neighbour in acknowledged_by:
+            self._antenna.send_message_to(messages.readdressed(packet, neighbour))
+
+    def _broadcast(self, place: Location, is_goal: bool) -> bytes:
         now_s = self._deadlines.now_s
         packet = messages.own_location(place, is_goal, now_s, self._node_id, BROADCAST)
         self._antenna.broadcast_message(packet)
+        return packet
 
     def _request(self, to: int, may_fly_on: bool = False) -> bytes:
         """A request with the place of this node: its destination, if it flies."""
-        goal = self._pilot.goal
+        goal = self._pilot.destination
         place = goal or self._pilot.place()
         flies_there = may_fly_on or goal is not None
         return messages.request_for_place(self._node_id, to, place, flies_there=flies_there)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Iterable
 
 from drone_mesh.communication.control.control_plane import IControlPlane
 from drone_mesh.communication.control.node_part import due
@@ -16,7 +17,7 @@ from drone_mesh.communication.orders.intake import OrderIntake
 from drone_mesh.communication.repair.connection_repair import ConnectionRepair
 from drone_mesh.communication.timing import Deadlines, Due
 
-GOAL_AGAIN_S = 0.15  # broadcasts are not acknowledged, and it is soon out of reach
+GOAL_AGAIN_S = 0.15  # broadcasts are not acknowledged
 SHORT_FLIGHT = 0.25  # of the range: the discs before and after share 84 % of their area
 
 
@@ -31,20 +32,27 @@ class Flights:
     _requests: PlaceRequests
     _deadlines: Deadlines
 
-    def took_off(self) -> None:
-        """The drone leaves its place because of an order: those who lose it may follow it."""
+    def notice_s(self) -> float:
+        """How long before it takes off it tells the others; a gateway is looked for anyway."""
+        return 0.0
+
+    def departs(self) -> None:
+        """The drone will leave its place because of an order: those who lose it may follow it."""
         self._announce_goal()
 
-    def _announce_goal(self) -> None:
-        goal = self._pilot.goal
+    def took_off(self) -> None:
+        """The drone leaves its place because of an order."""
+
+    def _announce_goal(self, acknowledged_by: Iterable[int] = ()) -> None:
+        goal = self._pilot.destination
         if goal is not None:
-            self._requests.announce(goal)
+            self._requests.announce(goal, acknowledged_by)
             self._deadlines.set(Due.GOAL, self._deadlines.now_s + GOAL_AGAIN_S)
 
     @due(Due.GOAL)
     def announce_goal_again(self) -> None:
         self._deadlines.set(Due.GOAL, math.inf)
-        goal = self._pilot.goal
+        goal = self._pilot.destination
         if goal is not None:
             self._requests.announce(goal)
 
@@ -71,11 +79,18 @@ class RouterFlights(Flights):
     _repair: ConnectionRepair
     _antenna: IWirelessCommunication
 
-    def took_off(self) -> None:
+    def notice_s(self) -> float:
+        """How long before it takes off it tells its neighbours, which lose its routes in flight."""
+        return 0.0 if self._pilot.goal else self._repair.medium.takes_off_after_s
+
+    def departs(self) -> None:
         """The drone leaves its place because of an order: tell the neighbours where it flies."""
+        if self._repair.medium.policy.announces_flights:
+            self._announce_goal(acknowledged_by=sorted(self._control.neighbours.ids()))
+
+    def took_off(self) -> None:
         goal = self._pilot.goal
         if self._repair.medium.policy.announces_flights and goal is not None:
-            self._announce_goal()
             for neighbour in sorted(self._control.neighbours.ids()):
                 heard = self._control.neighbours.place_of(neighbour)
                 if heard is not None and heard.place.distance_m(goal) >= self._repair.range_m:

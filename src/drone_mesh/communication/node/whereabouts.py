@@ -14,6 +14,7 @@ from drone_mesh.communication.control.node_part import receives
 from drone_mesh.communication.control.pilot import Pilot
 from drone_mesh.communication.control.places import Claims, CommonFrame, KnownPlaces
 from drone_mesh.communication.interfaces import BROADCAST, IWirelessCommunication
+from drone_mesh.communication.node.flights import SHORT_FLIGHT
 from drone_mesh.communication.repair.connection_repair import ConnectionRepair
 from drone_mesh.communication.timing import Deadlines
 from drone_mesh.communication.wire import messages
@@ -127,7 +128,7 @@ class Whereabouts:
         """A node that asks for places is at `place` or flies there."""
 
     def _answer(self, asker: int, is_here: bool = False) -> None:
-        goal = self._pilot.goal
+        goal = self._pilot.destination
         place = goal or self._pilot.location()
         if place is None:
             return
@@ -212,8 +213,13 @@ class RouterWhereabouts(Whereabouts):
         self._repair.on_place(node, place)
 
     def _flies_to(self, neighbour: int, goal: Location) -> None:
-        here = self._pilot.goal or self._pilot.location()
-        if here is not None and here.distance_m(goal) >= self._repair.range_m:
+        here, range_m = self._pilot.destination or self._pilot.location(), self._repair.range_m
+        is_out_of_reach = here is not None and here.distance_m(goal) >= range_m
+        # After a longer flight a router has forgotten its routes.
+        is_relay = neighbour == self._control.next_hop() != self._control.gateway
+        if is_out_of_reach or (
+            is_relay and self._control.neighbours.flies_m(neighbour) > SHORT_FLIGHT * range_m
+        ):
             self._control.neighbour_leaves(neighbour)
 
     def _is_taken(self, place: Location) -> None:

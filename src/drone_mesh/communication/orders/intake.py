@@ -94,8 +94,14 @@ class OrderQuery:
         return int(cls.BODY.unpack_from(payload, HEADER_BYTES)[0])
 
 
-class ITakesOff(Protocol):
-    """Who must know of flights."""
+class IDeparts(Protocol):
+    """Who must know of ordered flights."""
+
+    def notice_s(self) -> float:
+        """How long before it takes off a drone tells the others where it flies."""
+
+    def departs(self) -> None:
+        """The drone will leave its place, or turns in flight, because of an order."""
 
     def took_off(self) -> None:
         """The drone leaves its place because of an order."""
@@ -125,7 +131,7 @@ class OrderIntake:
     _report: Reporter
 
     def __post_init__(self) -> None:
-        self.flights: ITakesOff  # set by the node
+        self.flights: IDeparts  # set by the node
         # A gateway sets it to its book: order number, outcome and reason of its own drone.
         self.tell_own: Callable[[int, OrderOutcome, str], None] = lambda *_reply: None
         self._known: deque[_KnownOrder] = deque(maxlen=ORDERS_KEPT)
@@ -153,7 +159,7 @@ class OrderIntake:
         if number:
             self._remember(order)
         try:
-            starts = self._pilot.obey(goal)
+            starts = self._set_out(goal)
         except GoalRefused as error:
             self._reply(order, OrderOutcome.REFUSED, str(error))
             raise
@@ -163,6 +169,36 @@ class OrderIntake:
         self._reply(order, OrderOutcome.ACCEPTED)
         if starts:
             self._report(MeshEventKind.FLIGHT_ORDERED, gateway, order=number, place=goal)
+            self.flights.departs()
+            if self._pilot.departure is None:
+                self.flights.took_off()
+
+    def _set_out(self, goal: Location) -> bool:
+        """Start the flight, now or after its notice; False if the drone already flies there."""
+        self._pilot.check(goal)
+        if goal == self._pilot.destination:
+            return False
+        notice_s = self.flights.notice_s()
+        if notice_s:
+            self._pilot.departure = goal
+            self._deadlines.set(Due.TAKE_OFF, self._deadlines.now_s + notice_s)
+        else:
+            self._pilot.obey(goal)
+        return True
+
+    @due(Due.TAKE_OFF)
+    def on_take_off(self) -> None:
+        """Begin the flight that the drone has given notice of, if nothing has ended it."""
+        self._deadlines.set(Due.TAKE_OFF, math.inf)
+        goal = self._pilot.departure
+        if goal is None:
+            return
+        try:
+            self._pilot.obey(goal)
+        except GoalRefused as error:
+            for order in self._under_way():
+                self._reply(order, OrderOutcome.GIVEN_UP, str(error))
+        else:
             self.flights.took_off()
 
     def on_foreign(self, payload: bytes, passed_by: int) -> None:

@@ -36,7 +36,7 @@ class Node:
             *3 * [lambda *_: None], lambda payload: payload,
         )  # fmt: skip
         self.complaints, self.places = Complaints(9), KnownPlaces()
-        pilot = SimpleNamespace(goal=None, place=lambda: Location(0.0, 0.0, 0.0))
+        pilot = SimpleNamespace(destination=None, place=lambda: Location(0.0, 0.0, 0.0))
         requests = PlaceRequests(9, pilot, self.antenna, courier, Deadlines())
         seals = SimpleNamespace(may_be_gateway=self.proved.__contains__, has_key=has_key)
         self.proofs = Proofs(

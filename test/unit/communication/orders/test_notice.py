@@ -1,0 +1,133 @@
+"""On a shared channel a router gives its neighbours notice before it takes off by order."""
+
+from __future__ import annotations
+
+from rig import Rig, packet
+
+from drone_mesh.communication.timing import QUEUED, Medium
+from drone_mesh.drone.location import Location
+
+PRESENT, LOCATION, ORDER_REPLY = 3, 1, 64
+ACCEPTED, GIVEN_UP = 1, 4
+ORDER = "00 02 06 01 01"  # of gateway 0
+TO_Y_1 = "00 00 80 3f 00 00 00 00 00 00"  # latitude 1, longitude 0, height 0
+TO_Y_2 = "00 00 00 40 00 00 00 00 00 00"
+Y_1, Y_2 = Location(1.0, 0.0, 0.0), Location(2.0, 0.0, 0.0)
+
+
+def notice_rig():
+    """Router 1, connected through 2; it takes off 0.3 s after its announcement."""
+    rig = Rig(medium=Medium(policy=QUEUED, takes_off_after_s=0.3))
+    rig.connect_through(2)
+    return rig
+
+
+def test_a_router_announces_its_goal_twice_before_it_takes_off():
+    """A neighbour at the edge is out of reach soon after, and nobody acknowledges a broadcast."""
+    rig = notice_rig()
+    rig.hear(f"{ORDER} {TO_Y_1}")
+    rig.wait(0.25)
+    told = [sent for sent in rig.broadcasts() if sent[2] != PRESENT]
+    goal = packet("01 01 01 fe fe 00 00 80 3f 00 00 00 00 00 00 00 00 00 80")
+    assert (told, rig.engine.goals) == ([goal, goal], [])
+    rig.wait(0.1)
+    assert rig.engine.goals == [Y_1]
+
+
+GOAL_OUT_OF_REACH = "00 00 20 41 00 00 00 00 00 00"  # latitude 10; the range is 9 m
+
+
+def test_all_neighbours_acknowledge_the_goal_and_those_out_of_its_reach_are_lost_at_the_take_off():
+    """2 stands at (0, 0), 4 at (8, 0), and where 3 stands is not known."""
+    rig = notice_rig()
+    for neighbour, latitude in ((2, "00 00 00 00"), (4, "00 00 00 41")):
+        rig.hear(f"{neighbour:02x} {neighbour:02x} 01 01 01 {latitude}")
+    rig.know_neighbour(3)
+    rig.forget()
+    rig.hear(f"{ORDER} {GOAL_OUT_OF_REACH}")
+    goal = "00 00 20 41 00 00 00 00 00 00 00 00 00 80"
+    assert rig.sent(LOCATION) == [packet(f"01 01 01 {n:02x} fe {goal}") for n in (2, 3, 4)]
+    assert {2, 3, 4} <= set(rig.mesh.get_neighbours())
+    rig.wait(0.35)
+    assert 2 not in rig.mesh.get_neighbours()
+    assert {3, 4} <= set(rig.mesh.get_neighbours())
+
+
+def test_another_order_before_the_take_off_gives_notice_anew():
+    rig = notice_rig()
+    rig.hear(f"{ORDER} {TO_Y_1} 01 00")
+    rig.wait(0.2)
+    rig.hear(f"{ORDER} {TO_Y_2} 02 00")
+    rig.wait(0.25)
+    assert rig.engine.goals == []
+    rig.wait(0.1)
+    assert rig.engine.goals == [Y_2]
+
+
+def test_the_same_order_of_another_gateway_does_not_delay_the_take_off():
+    rig = notice_rig()
+    rig.hear(f"{ORDER} {TO_Y_1} 01 00")
+    rig.wait(0.2)
+    rig.hear(f"09 02 06 01 01 {TO_Y_1} 01 00")
+    rig.wait(0.15)
+    assert rig.engine.goals == [Y_1]
+
+
+def test_a_drone_that_is_asked_before_its_take_off_answers_with_its_goal():
+    rig = notice_rig()
+    rig.hear(f"{ORDER} {TO_Y_1}", "02 02 02 01 01 00 00 00 00 00 00 00 00 01")
+    answer = packet("01 01 01 02 02 00 00 80 3f 00 00 00 00 00 00 00 00 00 80")
+    assert answer in rig.sent(LOCATION)
+
+
+def test_a_drone_in_flight_turns_without_notice():
+    rig = notice_rig()
+    rig.hear(f"{ORDER} {TO_Y_1}")
+    rig.wait(0.4)
+    rig.hear(f"{ORDER} {TO_Y_2}")
+    assert rig.engine.goals == [Y_1, Y_2]
+
+
+def test_a_drone_that_cannot_take_off_after_its_notice_gives_its_order_up():
+    rig = notice_rig()
+    rig.hear(f"{ORDER} {TO_Y_1} 07 00")
+    rig.engine.grounded = "battery"
+    rig.wait(0.4)
+    assert rig.engine.goals == []
+    replies = [(sent[5], sent[7]) for sent in rig.sent(ORDER_REPLY)]
+    assert (replies[0], replies[-1]) == ((7, ACCEPTED), (7, GIVEN_UP))
+
+
+def test_a_router_that_is_stopped_before_its_take_off_does_not_fly_after_its_start():
+    rig = notice_rig()
+    rig.hear(f"{ORDER} {TO_Y_1} 07 00")
+    rig.mesh.stop()
+    rig.mesh.start(rig.now_s)
+    rig.wait(1.0)
+    assert rig.engine.goals == []
+
+
+def departure_of_2(rig, *, stood, goal):
+    """Node 2 stood at one latitude and announces that it flies to another; the range is 9 m."""
+    rig.hear(f"02 02 01 01 01 {stood}", f"02 02 01 01 fe {goal} 00 00 00 00 00 00 00 00 00 80")
+
+
+def test_a_next_hop_that_flies_far_is_none_even_if_its_goal_is_in_reach():
+    """It forgets its routes when it lands."""
+    rig = notice_rig()
+    departure_of_2(rig, stood="00 00 00 c0", goal="00 00 00 3f")  # from -2 to 0.5 m
+    assert 2 not in rig.mesh.get_neighbours()
+
+
+def test_a_next_hop_that_flies_a_short_way_remains_one():
+    rig = notice_rig()
+    departure_of_2(rig, stood="00 00 80 bf", goal="00 00 80 3f")  # from -1 to 1 m
+    assert rig.mesh.get_route_to_gateway() == 2
+
+
+def test_a_neighbour_that_is_no_next_hop_remains_one_while_its_goal_is_in_reach():
+    rig = notice_rig()
+    rig.know_neighbour(3)
+    rig.connect_through(3)
+    departure_of_2(rig, stood="00 00 00 c0", goal="00 00 00 3f")
+    assert 2 in rig.mesh.get_neighbours()
