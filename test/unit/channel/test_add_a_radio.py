@@ -84,6 +84,7 @@ def test_on_an_nrf24_no_time_of_the_mesh_is_stretched(rate, hop_s):
         heard_periods=1.05,
         place_periods=2.5,
         data_pause_s=4 * hop_s,
+        takes_off_after_s=0.3,
         report_frame_s=2.0,
     )
     assert medium.stretched(0.3) == UNDISTURBED.stretched(0.3) == 0.3

@@ -21,7 +21,7 @@ from drone_mesh.communication.heartbeats.delivery import Delivery
 from drone_mesh.communication.heartbeats.detours import AVOIDED_S, Detours, RelayCheck
 from drone_mesh.communication.heartbeats.introduction import Introduction
 from drone_mesh.communication.interfaces import MAX_NODE_ID, NO_ROUTE
-from drone_mesh.communication.neighbours import Neighbours
+from drone_mesh.communication.neighbours import FLIGHT_S, Neighbours
 from drone_mesh.communication.routing.interfaces import IRoutingTechnique
 from drone_mesh.communication.timing import Deadlines, Due, Medium
 
@@ -219,10 +219,16 @@ class GatewayConnection:
 
     # Reports of neighbours and gateways ------------------------------------------------------
 
+    def neighbour_leaves(self, neighbour: int) -> None:
+        """A neighbour flies away: until it is out of reach, it may offer the way that it had."""
+        self._detours.avoid(neighbour, self._deadlines.now_s + FLIGHT_S)
+
     def on_present(self, neighbour: int, hops: int, know_gateway: bool) -> bool:
         """A neighbour introduced itself. Returns whether to send it a heartbeat."""
         if neighbour == self.gateway and hops != 0:
             self.gateway_resigned()
+        if know_gateway and hops and self._detours.passes_by(neighbour, self._deadlines.now_s):
+            return False
         if know_gateway and hops <= self.hops:
             self._introduction.search_is_answered()
         connected = self._states.connected

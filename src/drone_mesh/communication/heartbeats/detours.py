@@ -29,8 +29,8 @@ class Detours:
         self._until_s: dict[int, float] = {}  # by neighbour
 
     def avoid(self, neighbour: int, until_s: float) -> None:
-        """Avoid this neighbour until then, because no answer came through it."""
-        self._until_s[neighbour] = until_s
+        """Avoid this neighbour until then at least: no answer came through it, or it flies away."""
+        self._until_s[neighbour] = max(until_s, self._until_s.get(neighbour, -math.inf))
 
     def avoid_none(self) -> None:
         """Avoid no neighbour any longer, because there is no better one."""

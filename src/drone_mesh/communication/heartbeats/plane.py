@@ -160,6 +160,7 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
 
     def neighbour_leaves(self, neighbour: int) -> None:
         """Look for other routes on a shared medium; elsewhere the next failed packet does so."""
+        self._connection.neighbour_leaves(neighbour)
         self._delivery.neighbour_leaves(neighbour)
 
     # The connection --------------------------------------------------------------------------

@@ -131,3 +131,17 @@ def test_a_neighbour_that_is_no_next_hop_remains_one_while_its_goal_is_in_reach(
     rig.connect_through(3)
     departure_of_2(rig, stood="00 00 00 c0", goal="00 00 00 3f")
     assert 2 in rig.mesh.get_neighbours()
+
+
+def test_a_router_does_not_go_back_to_a_next_hop_that_flies_away_while_another_one_has_a_gateway():
+    """The one that leaves still answers, and offers the way that it had."""
+    rig = notice_rig()
+    rig.know_neighbour(3)
+    rig.hear("03 03 03 01 fe 02 01")  # 3 introduces itself: two hops from its gateway
+    departure_of_2(rig, stood="00 00 00 c0", goal="00 00 20 41")
+    rig.wait(1.5)
+    rig.forget()
+    rig.hear("02 02 03 01 fe 01 01", "02 02 04 01 01 01 00 01")
+    assert [sent for sent in rig.sent() if sent[3] == 2] == []
+    rig.hear("03 03 04 01 01 01 00 02")
+    assert rig.mesh.get_route_to_gateway() == 3
