@@ -208,7 +208,10 @@ class GatewayConnection:
 
     def doubt_next_hop(self) -> None:
         """A neighbour cannot reach the next hop, which may have left unheard: try it at once."""
-        if self._medium.policy.checks_soon and self._states.connected and not self.proven():
+        periods = min(1.0, self._patience())  # however rarely a busy channel is asked otherwise
+        since_s = self._deadlines.now_s - periods * self._check_period_s
+        is_doubted = self._answered_s <= since_s
+        if self._medium.policy.checks_soon and self._states.connected and is_doubted:
             self.send_heartbeat()
 
     def another_next_hop(self, but: int) -> int:
@@ -220,14 +223,18 @@ class GatewayConnection:
     # Reports of neighbours and gateways ------------------------------------------------------
 
     def neighbour_leaves(self, neighbour: int) -> None:
-        """A neighbour flies away: until it is out of reach, it may offer the way that it had."""
-        self._detours.avoid(neighbour, self._deadlines.now_s + FLIGHT_S)
+        """A neighbour flies away, and is in reach for some seconds more."""
+        self._detours.leaves(neighbour, self._deadlines.now_s + FLIGHT_S)
+
+    def passes_by_leaving(self, neighbour: int) -> bool:
+        """Whether a neighbour flies away and another one has a gateway."""
+        return self._detours.passes_by_leaving(neighbour, self._deadlines.now_s)
 
     def on_present(self, neighbour: int, hops: int, know_gateway: bool) -> bool:
         """A neighbour introduced itself. Returns whether to send it a heartbeat."""
         if neighbour == self.gateway and hops != 0:
             self.gateway_resigned()
-        if know_gateway and hops and self._detours.passes_by(neighbour, self._deadlines.now_s):
+        if know_gateway and hops and self.passes_by_leaving(neighbour):
             return False
         if know_gateway and hops <= self.hops:
             self._introduction.search_is_answered()

@@ -27,10 +27,22 @@ class Detours:
     def __init__(self, neighbours: Neighbours) -> None:
         self._neighbours = neighbours
         self._until_s: dict[int, float] = {}  # by neighbour
+        self._leaving_until_s: dict[int, float] = {}
 
     def avoid(self, neighbour: int, until_s: float) -> None:
-        """Avoid this neighbour until then at least: no answer came through it, or it flies away."""
+        """Avoid this neighbour until then at least, because no answer came through it."""
         self._until_s[neighbour] = max(until_s, self._until_s.get(neighbour, -math.inf))
+
+    def leaves(self, neighbour: int, until_s: float) -> None:
+        """Avoid it until then, because it flies away, but still offers the way that it had."""
+        self.avoid(neighbour, until_s)
+        self._leaving_until_s[neighbour] = until_s
+
+    def passes_by_leaving(self, neighbour: int, now_s: float) -> bool:
+        """Whether it flies away and another neighbour has a gateway."""
+        if now_s >= self._leaving_until_s.get(neighbour, -math.inf):
+            return False
+        return self.passes_by(neighbour, now_s)
 
     def avoid_none(self) -> None:
         """Avoid no neighbour any longer, because there is no better one."""

@@ -87,7 +87,7 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
             node.node_id, node.antenna, node.deadlines, node.complaints, self._answer_search
         )
         self._connection = self._connected_by(node, GatewayConnection)
-        self.learn = technique.learn
+        self.learn = self._learn if policy.announces_flights else technique.learn
         learns = policy.answers_prove_relays
         self.forward = self._forward_and_learn if learns else self._forwarding.forward
 
@@ -234,6 +234,12 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
                 self.send_heartbeat(creator)
             elif not self._states.awaiting:
                 self._connection.take_gateway_of(from_, preferred_gateway)
+
+    def _learn(self, creator: int, from_: int, kind: int, payload: bytes) -> bool:
+        """A neighbour that flies away teaches no way: an answer through it may be a late one."""
+        if creator != from_ and self._connection.passes_by_leaving(from_):
+            return kind != _HEARTBEAT
+        return self._technique.learn(creator, from_, kind, payload)
 
     def _forward_and_learn(
         self, payload: bytes, creator: int, from_: int, kind: int, forward: int, now_s: float

@@ -571,6 +571,17 @@ def test_a_router_tries_its_next_hop_at_once_if_a_neighbour_misses_it(
     assert rig.sent(HEARTBEAT) == [through_2] * (tries and not is_proven)
 
 
+def test_on_a_busy_channel_an_answer_older_than_a_check_period_does_not_speak_for_the_next_hop():
+    rig = shared_rig()
+    rig.antenna.periods = 2.5
+    rig.connect_through(2)
+    rig.know_neighbour(3)
+    rig.wait(11.0)
+    rig.forget()
+    rig.hear("03 03 05 01 fe 02")
+    assert rig.sent(HEARTBEAT) == [packet("01 01 04 02 00 01 00")]
+
+
 PRESENT_OF_3 = "03 03 03 01 fe 01 01"  # one hop from its gateway, as node 2 is
 
 

@@ -145,3 +145,23 @@ def test_a_router_does_not_go_back_to_a_next_hop_that_flies_away_while_another_o
     assert [sent for sent in rig.sent() if sent[3] == 2] == []
     rig.hear("03 03 04 01 01 01 00 02")
     assert rig.mesh.get_route_to_gateway() == 3
+
+
+def test_a_late_answer_through_a_next_hop_that_flies_away_teaches_no_way_back_to_it():
+    """A question before its flight was still under way."""
+    rig = notice_rig()
+    rig.know_neighbour(3)
+    rig.hear("03 03 03 01 fe 02 01")  # 3 introduces itself: two hops from its gateway
+    departure_of_2(rig, stood="00 00 00 c0", goal="00 00 20 41")
+    rig.hear("00 03 04 01 01 01 00 02", "00 02 04 01 01 01 00 01")
+    assert rig.mesh.get_route_to_gateway() == 3
+    rig.wait(10.5)  # by now it has landed
+    rig.hear("00 02 04 01 01 01 00 01")
+    assert rig.mesh.get_route_to_gateway() == 2
+
+
+def test_an_answer_through_a_next_hop_that_flies_away_counts_if_no_other_neighbour_has_a_gateway():
+    rig = notice_rig()
+    departure_of_2(rig, stood="00 00 00 c0", goal="00 00 20 41")
+    rig.hear("00 02 04 01 01 01 00 01")
+    assert rig.mesh.get_route_to_gateway() == 2
