@@ -15,6 +15,7 @@ from drone_mesh.communication.beacon.disputes import REMEMBERED_S
 from drone_mesh.communication.beacon.routes import IN_VAIN, PARDONED, STALE
 from drone_mesh.communication.beacon.routes import REMEMBERED_S as ASKED_S
 from drone_mesh.communication.beacon.times import JITTER
+from drone_mesh.communication.beacon.verdicts import SUSPECTED_S
 from drone_mesh.communication.data import packets as data
 from drone_mesh.communication.events import complaints
 from drone_mesh.communication.heartbeats import detours, node_search
@@ -98,6 +99,7 @@ SENTENCES = [
     f"within {AGAIN_S:g} s, or {NEW_S:g} to {NEW_S + AGAIN_S:g} s after the last one",
     f"at most {'eight' if IN_VAIN == 8 else '?'}, for {'ten' if ASKED_S == 600 else '?'} minutes "
     f"(on a shared channel from the {'third' if PARDONED == 2 else '?'} one on)",
+    f"for {SUSPECTED_S:g} s, to neighbours that took a POLL in vain",
     f"more than {damage.LURED_M:g} m from their place, or more than {damage.OFF_ORDER_M:g} m from",
     f"| {STRANGERS} losses in {LIMIT_PERIOD_S:g} s; until the {LIMIT_PERIOD_S:g} s are over",
     f"| {REPEATS} announcements in {LIMIT_PERIOD_S:g} s;",

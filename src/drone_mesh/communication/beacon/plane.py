@@ -373,6 +373,7 @@ class BeaconPlane(IControlPlane):
         routes = self._routes
         routes.alive(from_)
         if creator != from_ and kind != MessageType.SEARCH:  # all repeat it: the first one counts
+            self._verdicts.hears(creator, from_)
             routes.led_to(creator, from_)
         return True
 

@@ -103,15 +103,15 @@ class Verdicts:
         is_up = transit.addressee == routes.gateway
         ways = routes.next_hops(transit.addressee, transit.came_from)
         asks = _asks(transit)
-        if asks:
-            ways = self._answered_first(transit.addressee, ways)
+        if asks or (is_up and self._asked.get(transit.addressee)):
+            ways = self._answered_first(transit.addressee, ways, asks)
         most = None if is_up or len(transit.sent_s) < MOST_WAYS else 1
         for to, shown_s in itertools.islice(ways, most):
             if to == transit.came_from or shown_s <= transit.sent_s.get(to, -math.inf):
                 continue
             failed_s = transit.failed_s.get(to)
             if failed_s is None or routes.neighbours[to].alive_s > failed_s:
-                if asks:
+                if asks and to != transit.addressee:
                     self._asked.setdefault(transit.addressee, {})[to] = now_s
                 return to
         if now_s - transit.seen_s >= HELD_S or transit.kind in NOT_HELD:
@@ -133,11 +133,30 @@ class Verdicts:
         """All held packets ask again now."""
         self.retry_s = self._deadlines.now_s + RETRY_S
 
-    def _answered_first(self, node: int, ways: Iterator[Way]) -> Iterator[Way]:
-        """Last the neighbours that took questions since the node was heard: they may swallow."""
+    def hears(self, node: int, through: int) -> None:
+        """Call before `BeaconRoutes.led_to`: this packet may answer a question to the gateway.
+
+        It clears the neighbour that it came through, or, if it came another way back, the one that
+        took the question.
+        """
+        asked = self._asked.get(node)
+        if not asked or node != self._routes.gateway:
+            return
+        last = through if through in asked else max(asked, key=asked.__getitem__)
+        if last == through or asked[last] > self._routes.led_s(node):
+            del asked[last]
+
+    def _answered_first(self, node: int, ways: Iterator[Way], asks: bool) -> Iterator[Way]:
+        """Last the neighbours that took questions since the node was heard: they may swallow.
+
+        Packets down follow what was heard. Those up would go to the parent that swallows again, so
+        that the gateway was heard clears only the neighbour whose question it has answered.
+        """
         routes = self._routes
         direct = routes.neighbours.get(node)
-        heard_s = max(routes.led_s(node), -math.inf if direct is None else direct.heard_s)
+        heard_s = -math.inf if node == routes.gateway else routes.led_s(node)
+        if direct is not None:
+            heard_s = max(heard_s, direct.heard_s)
         asked = self._asked[node] = {
             to: at_s
             for to, at_s in self._asked.get(node, {}).items()
@@ -145,7 +164,10 @@ class Verdicts:
         }
         for to in asked:
             routes.in_vain(node, to)
-        return iter(sorted(ways, key=lambda way: asked.get(way.neighbour, -math.inf)))
+        # An answer that is on its way is no reason for other packets to take a longer one.
+        before_s = math.inf if asks else routes.led_s(node)
+        late = {to: at_s for to, at_s in asked.items() if at_s < before_s}
+        return iter(sorted(ways, key=lambda way: late.get(way.neighbour, -math.inf)))
 
 
 def _asks(transit: Transit) -> bool:

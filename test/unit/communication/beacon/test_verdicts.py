@@ -27,9 +27,10 @@ class Node:
         searches = Searches(9, self.routes, lambda _k, _c, body: self.searches.append(body), 1e-5)
         self.verdicts = Verdicts(self.routes, searches, self.deadlines)
 
-    def hear(self, neighbour, now_s=0.0, below=(), hops=3, parent=8):
+    def hear(self, neighbour, now_s=0.0, below=(), hops=3, parent=8, number=5):
         self.deadlines.now_s, listed = now_s, Below(0, below)
-        self.routes.heard(neighbour, Beacon(0, 5, hops, parent, NO_ANCESTORS, 1.0, below=listed))
+        beacon = Beacon(0, number, hops, parent, NO_ANCESTORS, 1.0, below=listed)
+        self.routes.heard(neighbour, beacon)
 
     def verdict(self, transit, now_s=0.0):
         self.deadlines.now_s = now_s
@@ -207,6 +208,66 @@ def test_it_is_used_where_there_is_no_other_way():
     del sender.routes.neighbours[RELAY]
     ways = list(sender.routes.next_hops(12, NO_ROUTE))
     assert [way.neighbour for way in ways] == [LIAR]
+
+
+class Router(Node):
+    """Its parent is 2; 3 and 4 are a hop farther from the gateway, 0."""
+
+    def __init__(self):
+        super().__init__()
+        self.now_s = 0.0
+
+    def sends_to(self, kind, after_s=2.0, body=POLL):
+        self.now_s += after_s
+        for neighbour, hops in ((2, 1), (3, 2), (4, 2)):
+            self.hear(neighbour, self.now_s, hops=hops, number=int(self.now_s))
+        self.routes.choose()
+        sent = messages.packet(kind, 9, 9, NO_ROUTE, GATEWAY, body)
+        return self.verdict(Transit(sent, NO_ROUTE, self.now_s), self.now_s)
+
+    def hears_gateway(self, through):
+        self.verdicts.hears(GATEWAY, through)
+        self.routes.led_to(GATEWAY, through)
+
+
+DATA, QUESTION = 128, 193
+
+
+def test_once_the_gateway_has_answered_another_way_all_packets_for_it_go_that_way():
+    """Data went to the parent again, and only the question about it another way: for ever."""
+    router = Router()
+    others = [router.sends_to(QUESTION) for _ in range(3)]
+    assert sorted(others) == [2, 3, 4]
+    for kind in (DATA, MessageType.REQUESTLOCATION, QUESTION, DATA):
+        router.hears_gateway(others[2])
+        assert router.sends_to(kind, after_s=0.1) == others[2]
+    assert router.sends_to(DATA, after_s=SUSPECTED_S) == 2
+
+
+def test_while_the_answer_may_be_on_its_way_the_parent_takes_all_other_packets():
+    """On a busy channel half of the packets would otherwise take a longer way."""
+    router = Router()
+    router.hears_gateway(2)
+    assert [router.sends_to(kind) for kind in (QUESTION, DATA, DATA)] == [2, 2, 2]
+    router.sends_to(QUESTION)
+    assert router.sends_to(DATA) == 2
+
+
+def test_an_answer_that_comes_another_way_back_is_one_to_the_last_question():
+    router = Router()
+    assert router.sends_to(QUESTION) == 2
+    router.hears_gateway(4)
+    assert router.sends_to(QUESTION) == 2
+    before, last = router.sends_to(QUESTION), router.sends_to(QUESTION)
+    router.hears_gateway(5)
+    assert {before, last} == {3, 4}
+    assert router.sends_to(DATA, after_s=0.1) == last
+
+
+def test_what_the_gateway_took_itself_no_relay_swallows():
+    router = Router()
+    router.hear(GATEWAY, hops=0, parent=NO_ROUTE, number=0)
+    assert [router.sends_to(QUESTION, after_s=0.1) for _ in range(3)] == [GATEWAY] * 3
 
 
 HOP_S = 0.0025
