@@ -24,7 +24,7 @@ def passes_m(network, other, until_s):
 def test_a_flight_leads_round_a_drone_that_hovers_on_its_way(routing):
     network = placed([(0, 0), (8, 0), (16, 0), (11.5, 0)], seed=1, routing=routing)
     assert network.run_until(network.all_connected, within_s=30.0)
-    network.order(3, 11.5, 0.0, 4.0)
+    network.order(3, 11.5, 0.0, 4)
     network.run_for(60.0)
     network.power(1, False)
     assert passes_m(network, 3, until_s=network.now_s() + 90.0) >= 1.0
