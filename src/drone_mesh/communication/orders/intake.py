@@ -196,6 +196,7 @@ class OrderIntake:
         try:
             self._pilot.obey(goal)
         except GoalRefused as error:
+            self._complaints.add("order given up", str(error), self._deadlines.now_s)
             for order in self._under_way():
                 self._reply(order, OrderOutcome.GIVEN_UP, str(error))
         else:

@@ -88,7 +88,7 @@ def test_a_drone_in_flight_turns_without_notice():
     assert rig.engine.goals == [Y_1, Y_2]
 
 
-def test_a_drone_that_cannot_take_off_after_its_notice_gives_its_order_up():
+def test_a_drone_that_cannot_take_off_after_its_notice_gives_its_order_up(caplog):
     rig = notice_rig()
     rig.hear(f"{ORDER} {TO_Y_1} 07 00")
     rig.engine.grounded = "battery"
@@ -96,6 +96,7 @@ def test_a_drone_that_cannot_take_off_after_its_notice_gives_its_order_up():
     assert rig.engine.goals == []
     replies = [(sent[5], sent[7]) for sent in rig.sent(ORDER_REPLY)]
     assert (replies[0], replies[-1]) == ((7, ACCEPTED), (7, GIVEN_UP))
+    assert "order given up: drone 1 cannot fly: battery" in caplog.text
 
 
 def test_a_router_that_is_stopped_before_its_take_off_does_not_fly_after_its_start():
