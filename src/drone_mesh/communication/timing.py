@@ -147,7 +147,7 @@ class Medium:
     heard_periods: float = 0.0
     place_periods: float = 0.0
     data_pause_s: float = 0.005  # between bursts of users' packets
-    takes_off_after_s: float = 0.0  # from the announcement of an ordered flight, not acknowledged
+    takes_off_after_s: float = 0.0  # a router tells its neighbours first where it is ordered to
     report_frame_s: float = 0.0  # between two reports of a drone in flight at 1 hop
 
     @classmethod

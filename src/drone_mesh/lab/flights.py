@@ -14,7 +14,7 @@ from drone_mesh.inprocess import Network
 from drone_mesh.lab.network_sample import gateways_of, physical_graph
 
 _FLIGHTS = (MeshEventKind.FLIGHT_DECIDED, MeshEventKind.FLIGHT_ORDERED)
-TOUCH_M = 1e-3  # of sums
+TOUCH_M = 1e-3  # rounding; a way comes no nearer than where it begins
 EVENTS_BACK = 20  # when a flight starts, its event is among this many latest ones
 
 

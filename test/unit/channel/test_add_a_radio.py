@@ -95,3 +95,4 @@ def test_times_grow_with_the_hop_of_a_slower_radio():
     assert medium.stretched(0.5) == pytest.approx(0.5 * 0.1 / 0.0026)
     assert medium.answer_s == pytest.approx(1.0 * 0.1 / 0.0026)
     assert medium.answer_per_hop_s == pytest.approx(10.0)
+    assert medium.takes_off_after_s == pytest.approx(0.3 * 0.1 / 0.0026)

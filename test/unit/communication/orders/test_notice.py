@@ -120,6 +120,14 @@ def test_a_next_hop_that_flies_far_is_none_even_if_its_goal_is_in_reach():
     assert 2 not in rig.mesh.get_neighbours()
 
 
+def test_nobody_can_announce_the_flight_of_another_node():
+    """A captured node could end all links around it."""
+    rig = notice_rig()
+    rig.know_neighbour(3)
+    rig.hear("02 02 01 01 01 00 00 00 c0", f"02 03 01 01 fe {GOAL_OUT_OF_REACH} 00 00 00 80")
+    assert rig.mesh.get_route_to_gateway() == 2
+
+
 def test_a_next_hop_that_flies_a_short_way_remains_one():
     rig = notice_rig()
     departure_of_2(rig, stood="00 00 80 bf", goal="00 00 80 3f")  # from -1 to 1 m

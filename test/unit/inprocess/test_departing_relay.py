@@ -1,0 +1,44 @@
+"""On a shared channel neighbours know where a router flies before it takes off."""
+
+from __future__ import annotations
+
+import pytest
+
+from drone_mesh.communication.events.observer import MeshEventKind
+from drone_mesh.communication.seals.keys import MeshKey
+from drone_mesh.communication.wire import messages
+from drone_mesh.communication.wire.packet_types import MessageType
+from drone_mesh.inprocess import Network
+
+PLACES = {1: (6, 0), 2: (12, 0), 3: (6, 6), 4: (12, 6), 5: (18, 3)}
+
+
+@pytest.mark.parametrize("key", [None, MeshKey(b"the key of a lab")], ids=["no key", "key"])
+def test_neighbours_are_told_one_by_one_if_they_hear_no_broadcast(key):
+    """Broadcasts collide, and nobody repeats them; with a key each is sealed for all."""
+    network = Network(seed=3, radio="shared", key=key)
+    network.add_gateway(0, 0.0, 0.0)
+    for node, (x, y) in PLACES.items():
+        network.add_router(node, x, y)
+    assert network.run_until(network.all_connected, within_s=120.0)
+    network.run_for(60.0)
+    antenna = network.nodes[1].antenna
+    broadcast = antenna.broadcast_message
+
+    def lose_places(payload):
+        if messages.type_of(payload) != MessageType.LOCATION:
+            broadcast(payload)
+
+    antenna.broadcast_message = lose_places
+    network.order(1, -30.0, 0.0)
+    ordered_s = network.now_s()
+    drone = network.nodes[1].drone
+    assert network.run_until(lambda: drone.path is not None, within_s=1.0)
+    lost_by = {
+        event.node
+        for event in network.events
+        if event.kind is MeshEventKind.NEIGHBOUR_LOST
+        and event.peer == 1
+        and event.now_s >= ordered_s
+    }
+    assert lost_by >= {2, 3, 4}
