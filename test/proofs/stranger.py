@@ -47,8 +47,8 @@ class Tap(IMeshNetwork):
     def get_node_id(self) -> int:
         return self._node_id
 
-    def on_delivered(self, neighbour: int, tries: int, now_s: float) -> None:
-        self.tapped.on_delivered(neighbour, tries, now_s)
+    def on_delivered(self, payload: bytes, tries: int, now_s: float) -> None:
+        self.tapped.on_delivered(payload, tries, now_s)
 
     def on_undelivered(self, payload: bytes, tries: int, now_s: float) -> None:
         self.tapped.on_undelivered(payload, tries, now_s)
@@ -203,7 +203,7 @@ class Stranger(IMeshNetwork):
     def get_node_id(self) -> int:
         return self.node_id
 
-    def on_delivered(self, neighbour: int, tries: int, now_s: float) -> None:
+    def on_delivered(self, payload: bytes, tries: int, now_s: float) -> None:
         """Ignored."""
 
     def on_undelivered(self, payload: bytes, tries: int, now_s: float) -> None:

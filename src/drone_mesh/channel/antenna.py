@@ -188,11 +188,11 @@ class PacketAntenna(IWirelessCommunication):
         """How well packets reach each neighbour. Any thread."""
         return self._quality.figures
 
-    def _delivered(self, node: int, frames: int) -> None:
-        self._quality.packet(node, frames, delivered=True)
+    def _delivered(self, payload: bytes, frames: int) -> None:
+        self._quality.packet(receiver(payload), frames, delivered=True)
         mesh = self._mesh
         if mesh is not None and self.powered and not self._silent:
-            self._submit(lambda now_s: mesh.on_delivered(node, frames, now_s))
+            self._submit(lambda now_s: mesh.on_delivered(payload, frames, now_s))
 
     def _given_up(self, payload: bytes, frames: int) -> None:
         if receiver(payload) <= MAX_NODE_ID:

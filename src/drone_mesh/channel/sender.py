@@ -22,13 +22,10 @@ class Sender:
         self,
         radio: PacketRadio,
         runtime: Runtime,
-        on_delivered: Callable[[int, int], None],
+        on_delivered: Callable[[bytes, int], None],
         on_given_up: Callable[[bytes, int], None],
     ) -> None:
-        """Both functions are called in the sending thread, with the number of frames it took.
-
-        `on_delivered` gets the node that received a packet, `on_given_up` a lost packet.
-        """
+        """Both get a packet in the sending thread, with the number of frames it took."""
         self._radio = radio
         self._access = radio.access
         self._runtime = runtime
@@ -148,4 +145,4 @@ class Sender:
             if not self._closed:
                 self._on_given_up(packet.payload, packet.frames)
         elif fate is Fate.DELIVERED and packet.receiver != ALL_NODES and not self._closed:
-            self._on_delivered(packet.receiver, packet.frames)
+            self._on_delivered(packet.payload, packet.frames)

@@ -34,8 +34,8 @@ class IMeshNetwork(abc.ABC):
         """This node's id, 0..253."""
 
     @abc.abstractmethod
-    def on_delivered(self, neighbour: int, tries: int, now_s: float) -> None:
-        """A neighbour received a queued packet after `tries`, the radio's own included."""
+    def on_delivered(self, payload: bytes, tries: int, now_s: float) -> None:
+        """The neighbour in byte 3 received a queued packet after `tries`, the radio's included."""
 
     @abc.abstractmethod
     def on_undelivered(self, payload: bytes, tries: int, now_s: float) -> None:

@@ -240,12 +240,15 @@ class Neighbours:
         """
         known = self.places.get(node)
         if known is None or heard_s >= known.heard_s:
-            stood = not self._goals_s or self._goals_s.pop(node, None) is None
+            told_s = self._goals_s.pop(node, None) if self._goals_s else None
             if self._seen:
                 self._seen.pop(node, None)
             if is_goal:
                 self._goals_s[node] = heard_s
-                if stood:
+                flies_on = told_s is not None and (
+                    heard_s - told_s < FLIGHT_S or known is None or known.place == place
+                )
+                if not flies_on:  # a landing may be unheard
                     self._left[node] = None if known is None else known.place
             self.places[node] = HeardPlace(place, heard_s)
             if known is None or known.place != place:  # most nodes stand
@@ -284,9 +287,9 @@ class Neighbours:
         return self.places[node].place if now_s - told_s < FLIGHT_S else None
 
     def flies_m(self, node: int) -> float:
-        """How far `node` flies from where it stood to the goal that it announced; 0: not known."""
+        """How far `node` flies from where it stood to the goal that it told; infinity: unknown."""
         left = self._left.get(node)
-        return 0.0 if left is None else left.distance_m(self.places[node].place)
+        return math.inf if left is None else left.distance_m(self.places[node].place)
 
     def under_way(self, now_s: float) -> Iterator[tuple[int, Location | None, Location]]:
         """Who told its goal a moment ago, from where it flies (None: unknown), and to where."""

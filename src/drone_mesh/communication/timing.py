@@ -148,6 +148,7 @@ class Medium:
     place_periods: float = 0.0
     data_pause_s: float = 0.005  # between bursts of users' packets
     takes_off_after_s: float = 0.0  # a router tells its neighbours first where it is ordered to
+    takes_off_within_s: float = 0.0  # even if one that may need it has not acknowledged that
     report_frame_s: float = 0.0  # between two reports of a drone in flight at 1 hop
 
     @classmethod
@@ -168,6 +169,7 @@ class Medium:
             place_periods=2.5,
             data_pause_s=4 * hop_s,
             takes_off_after_s=fast.stretched(0.3),
+            takes_off_within_s=fast.stretched(2.0),
             report_frame_s=fast.stretched(2.0),
         )
 

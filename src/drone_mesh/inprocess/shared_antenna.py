@@ -218,7 +218,7 @@ class SharedAntenna(SharedRadio):
         elif fate is Fate.GIVEN_UP:
             self._submit(lambda now_s: mesh.on_undelivered(packet.payload, frames, now_s))
         elif fate is Fate.DELIVERED:
-            self._submit(lambda now_s: mesh.on_delivered(packet.receiver, frames, now_s))
+            self._submit(lambda now_s: mesh.on_delivered(packet.payload, frames, now_s))
         self._plan()
 
     # Receiving -------------------------------------------------------------------------------

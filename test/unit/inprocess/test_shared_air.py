@@ -34,8 +34,8 @@ class Mesh(IMeshNetwork):
     def on_msg(self, payload, now_s):
         self.heard.append((now_s, payload))
 
-    def on_delivered(self, neighbour, tries, now_s):
-        self.delivered.append((neighbour, tries))
+    def on_delivered(self, payload, tries, now_s):
+        self.delivered.append((payload[3], tries))
 
     def on_undelivered(self, payload, tries, now_s):
         assert tries > 1

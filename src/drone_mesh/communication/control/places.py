@@ -206,15 +206,21 @@ class PlaceRequests:
 
         Nobody acknowledges a broadcast: these neighbours are told one by one as well.
         """
-        packet = self._broadcast(goal, is_goal=True)
+        self._broadcast(goal, is_goal=True)
         for neighbour in acknowledged_by:
-            self._antenna.send_message_to(messages.readdressed(packet, neighbour))
+            self.tell_goal(goal, neighbour)
 
-    def _broadcast(self, place: Location, is_goal: bool) -> bytes:
+    def tell_goal(self, goal: Location, neighbour: int) -> None:
+        """Tell one neighbour, which acknowledges it."""
+        packet = self._own_location(goal, is_goal=True)
+        self._antenna.send_message_to(messages.readdressed(packet, neighbour))
+
+    def _broadcast(self, place: Location, is_goal: bool) -> None:
+        self._antenna.broadcast_message(self._own_location(place, is_goal))
+
+    def _own_location(self, place: Location, is_goal: bool) -> bytes:
         now_s = self._deadlines.now_s
-        packet = messages.own_location(place, is_goal, now_s, self._node_id, BROADCAST)
-        self._antenna.broadcast_message(packet)
-        return packet
+        return messages.own_location(place, is_goal, now_s, self._node_id, BROADCAST)
 
     def _request(self, to: int, may_fly_on: bool = False) -> bytes:
         """A request with the place of this node: its destination, if it flies."""

@@ -264,13 +264,22 @@ class MeshnetworkComponent(NodeSnapshots, IMeshNetwork, IControlHost):
         else:
             self._receivers[kind](payload, creator, from_)
 
-    def on_delivered(self, neighbour: int, tries: int, now_s: float) -> None:
+    def on_delivered(self, payload: bytes, tries: int, now_s: float) -> None:
         self._deadlines.now_s = now_s
-        self.control.on_delivered(neighbour, tries)
+        self.control.on_delivered(messages.receiver(payload), tries)
+        if self._tells_own_goal(payload):
+            self._flights.told(messages.receiver(payload))
 
     def on_undelivered(self, payload: bytes, tries: int, now_s: float) -> None:
         self._deadlines.now_s = now_s
         self.control.on_undelivered(payload, tries)
+        if self._tells_own_goal(payload):
+            self._flights.not_told(messages.receiver(payload))
+
+    def _tells_own_goal(self, payload: bytes) -> bool:
+        if payload[messages.TYPE_AT] != _LOCATION:
+            return False
+        return payload[messages.CREATOR_AT] == self._node_id and messages.is_goal(payload)
 
     def on_antenna_power(self, on: bool, now_s: float) -> None:
         """Switched on: introduce the node soon. Switched off: a router disconnects at once."""

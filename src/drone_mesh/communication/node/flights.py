@@ -40,6 +40,16 @@ class Flights:
         """The drone will leave its place because of an order: those who lose it may follow it."""
         self._announce_goal()
 
+    def is_noticed(self) -> bool:
+        """Whether those that it may cut off know where it is about to fly, or had their time."""
+        return True
+
+    def told(self, neighbour: int) -> None:
+        """A neighbour acknowledged the goal that was announced."""
+
+    def not_told(self, neighbour: int) -> None:
+        """A neighbour did not take the goal that was announced."""
+
     def took_off(self) -> None:
         """The drone leaves its place because of an order."""
 
@@ -79,14 +89,38 @@ class RouterFlights(Flights):
     _repair: ConnectionRepair
     _antenna: IWirelessCommunication
 
+    def __post_init__(self) -> None:
+        self._untold: set[int] = set()
+        self._waits_until_s = -math.inf
+
     def notice_s(self) -> float:
         """How long before it takes off it tells its neighbours, which lose its routes in flight."""
         return 0.0 if self._pilot.goal else self._repair.medium.takes_off_after_s
 
     def departs(self) -> None:
-        """The drone leaves its place because of an order: tell the neighbours where it flies."""
-        if self._repair.medium.policy.announces_flights:
-            self._announce_goal(acknowledged_by=sorted(self._control.neighbours.ids()))
+        """The drone leaves its place because of an order: tell the neighbours where it flies.
+
+        Those that may have this router as their next hop acknowledge it.
+        """
+        medium, control = self._repair.medium, self._control
+        if medium.policy.announces_flights:
+            hops_of, others = control.neighbours.hops_of, control.neighbours.ids()
+            self._untold = {node for node in others if hops_of(node) >= control.hops}
+            self._untold.discard(control.next_hop())  # its hops may not be known
+            self._waits_until_s = self._deadlines.now_s + medium.takes_off_within_s
+            self._announce_goal(acknowledged_by=sorted(self._untold))
+
+    def is_noticed(self) -> bool:
+        self._untold &= self._control.neighbours.ids()
+        return not self._untold or self._deadlines.now_s >= self._waits_until_s
+
+    def told(self, neighbour: int) -> None:
+        self._untold.discard(neighbour)
+
+    def not_told(self, neighbour: int) -> None:
+        goal = self._pilot.departure
+        if goal is not None and neighbour in self._untold and not self.is_noticed():
+            self._requests.tell_goal(goal, neighbour)
 
     def took_off(self) -> None:
         goal = self._pilot.goal

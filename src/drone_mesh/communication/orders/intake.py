@@ -30,6 +30,7 @@ from drone_mesh.errors import GoalRefused
 ORDERS_KEPT = 8  # more than the gateways that order one drone
 ARRIVED_WITHIN_M = 1.5  # a MAVLink drone has arrived within 1 m (drone/route.py)
 REPLY_AGAIN_S = 1.0  # how often a reply without a route is retried
+LOOK_AGAIN_S = 0.05  # whether the neighbours know by now
 REPLY_TRIES = 120  # then the gateway queries
 TEXT_BYTES = 10  # of a reason, in one packet
 
@@ -102,6 +103,9 @@ class IDeparts(Protocol):
 
     def departs(self) -> None:
         """The drone will leave its place, or turns in flight, because of an order."""
+
+    def is_noticed(self) -> bool:
+        """Whether those that it may cut off know where it is about to fly, or had their time."""
 
     def took_off(self) -> None:
         """The drone leaves its place because of an order."""
@@ -192,6 +196,9 @@ class OrderIntake:
         self._deadlines.set(Due.TAKE_OFF, math.inf)
         goal = self._pilot.departure
         if goal is None:
+            return
+        if not self.flights.is_noticed():
+            self._deadlines.set(Due.TAKE_OFF, self._deadlines.now_s + LOOK_AGAIN_S)
             return
         try:
             self._pilot.obey(goal)

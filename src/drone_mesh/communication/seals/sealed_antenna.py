@@ -227,10 +227,10 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
                 return
         mesh.on_msg(opened, now_s)
 
-    def on_delivered(self, neighbour: int, tries: int, now_s: float) -> None:
+    def on_delivered(self, payload: bytes, tries: int, now_s: float) -> None:
         """A radio that acknowledged a challenge and never answered it is no neighbour."""
-        if self._mesh is not None and self._seal.knows(neighbour, now_s):
-            self._mesh.on_delivered(neighbour, tries, now_s)
+        if self._mesh is not None and self._seal.knows(payload[TO_AT], now_s):
+            self._mesh.on_delivered(payload[:SEAL_AT] + _NO_SEAL, tries, now_s)
 
     def on_undelivered(self, payload: bytes, tries: int, now_s: float) -> None:
         kind = payload[TYPE_AT]

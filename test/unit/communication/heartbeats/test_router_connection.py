@@ -685,7 +685,7 @@ def test_a_queued_packet_teaches_the_routes_when_the_antenna_reports_its_outcome
     rig.connect_through(2)
     rig.mesh.control.send_heartbeat(0)
     assert routing.etx(2) == 1.0
-    rig.mesh.on_delivered(2, 4, rig.now_s)
+    rig.mesh.on_delivered(packet("01 01 00 02 00"), 4, rig.now_s)
     assert routing.etx(2) > 1.0
 
 
@@ -701,9 +701,10 @@ def test_a_router_that_takes_off_announces_its_goal():
 
 @pytest.mark.parametrize(("latitude", "stays"), [("00 00 00 41", True), ("00 00 10 41", False)])
 def test_a_neighbour_that_flies_out_of_reach_is_no_neighbour_from_its_take_off(latitude, stays):
-    """8 m and 9 m away; the range is 9 m. It has announced its goal to all."""
+    """8 m and 9 m away; the range is 9 m. It stood 7 m away, and has announced its goal to all."""
     rig = shared_rig()
     rig.connect_through(2)
+    rig.hear("02 02 01 01 01 00 00 e0 40")
     rig.hear(f"02 02 01 01 fe {latitude} 00 00 00 00 00 00 00 00 00 80")
     assert (2 in rig.mesh.get_neighbours()) is stays
     assert rig.mesh.get_connected_to_gateway() is stays

@@ -37,7 +37,7 @@ def test_a_router_announces_its_goal_twice_before_it_takes_off():
 GOAL_OUT_OF_REACH = "00 00 20 41 00 00 00 00 00 00"  # latitude 10; the range is 9 m
 
 
-def test_all_neighbours_acknowledge_the_goal_and_those_out_of_its_reach_are_lost_at_the_take_off():
+def test_all_but_the_next_hop_acknowledge_the_goal_and_those_out_of_its_reach_are_then_lost():
     """2 stands at (0, 0), 4 at (8, 0), and where 3 stands is not known."""
     rig = notice_rig()
     for neighbour, latitude in ((2, "00 00 00 00"), (4, "00 00 00 41")):
@@ -46,11 +46,75 @@ def test_all_neighbours_acknowledge_the_goal_and_those_out_of_its_reach_are_lost
     rig.forget()
     rig.hear(f"{ORDER} {GOAL_OUT_OF_REACH}")
     goal = "00 00 20 41 00 00 00 00 00 00 00 00 00 80"
-    assert rig.sent(LOCATION) == [packet(f"01 01 01 {n:02x} fe {goal}") for n in (2, 3, 4)]
+    assert rig.sent(LOCATION) == [packet(f"01 01 01 {n:02x} fe {goal}") for n in (3, 4)]
     assert {2, 3, 4} <= set(rig.mesh.get_neighbours())
     rig.wait(0.35)
     assert 2 not in rig.mesh.get_neighbours()
     assert {3, 4} <= set(rig.mesh.get_neighbours())
+
+
+def patient_rig():
+    """Router 1, one hop from gateway 0; 2, 3 and 4 have one hop, two hops and an unknown number."""
+    rig = Rig(medium=Medium(policy=QUEUED, takes_off_after_s=0.3, takes_off_within_s=2.0))
+    rig.hear("00 00 04 01 01 01 00 00")  # a heartbeat of the gateway itself
+    rig.hear("02 02 03 01 fe 00 01", "03 03 03 01 fe 02 01")
+    rig.know_neighbour(4)
+    rig.forget()
+    return rig
+
+
+GOAL_1 = "fe 00 00 80 3f 00 00 00 00 00 00 00 00 00 80"
+
+
+def told(rig):
+    return [sent[3] for sent in rig.sent(LOCATION)]
+
+
+def test_those_with_fewer_hops_are_not_told_one_by_one_as_it_is_not_their_way_to_the_gateway():
+    rig = patient_rig()
+    rig.hear(f"{ORDER} {TO_Y_1}")
+    assert told(rig) == [3, 4]
+
+
+def test_it_takes_off_once_those_that_it_may_cut_off_have_acknowledged_its_goal():
+    rig = patient_rig()
+    rig.hear(f"{ORDER} {TO_Y_1}")
+    rig.wait(1.0)
+    rig.mesh.on_delivered(packet(f"01 01 01 03 {GOAL_1}"), 1, rig.now_s)
+    rig.wait(0.2)
+    assert rig.engine.goals == []
+    rig.mesh.on_delivered(packet(f"01 01 01 04 {GOAL_1}"), 1, rig.now_s)
+    rig.wait(0.06)
+    assert rig.engine.goals == [Y_1]
+
+
+def test_it_takes_off_without_an_acknowledgement_when_its_time_is_up():
+    rig = patient_rig()
+    rig.hear(f"{ORDER} {TO_Y_1}")
+    rig.wait(1.9)
+    assert rig.engine.goals == []
+    rig.wait(0.2)
+    assert rig.engine.goals == [Y_1]
+
+
+def test_the_goal_of_another_drone_that_it_passed_on_is_no_notice():
+    rig = patient_rig()
+    rig.hear(f"{ORDER} {TO_Y_1}")
+    for neighbour in (3, 4):
+        rig.mesh.on_delivered(packet(f"09 01 01 {neighbour:02x} {GOAL_1}"), 1, rig.now_s)
+    rig.wait(1.0)
+    assert rig.engine.goals == []
+
+
+def test_a_neighbour_that_did_not_take_the_goal_is_told_again_while_it_is_one():
+    rig = patient_rig()
+    rig.hear(f"{ORDER} {TO_Y_1}")
+    rig.sent()
+    lost = packet(f"01 01 01 03 {GOAL_1}")
+    rig.mesh.on_undelivered(lost, 15, rig.now_s)
+    assert rig.sent(LOCATION) == [lost]
+    rig.mesh.on_undelivered(lost, 15, rig.now_s)  # twice in a row: it is lost
+    assert rig.sent(LOCATION) == []
 
 
 def test_another_order_before_the_take_off_gives_notice_anew():
@@ -118,6 +182,32 @@ def test_a_next_hop_that_flies_far_is_none_even_if_its_goal_is_in_reach():
     rig = notice_rig()
     departure_of_2(rig, stood="00 00 00 c0", goal="00 00 00 3f")  # from -2 to 0.5 m
     assert 2 not in rig.mesh.get_neighbours()
+
+
+def test_a_next_hop_counts_as_flying_far_if_nobody_heard_where_it_stood():
+    rig = notice_rig()
+    rig.hear("02 02 01 01 fe 00 00 00 3f 00 00 00 00 00 00 00 00 00 80")
+    assert 2 not in rig.mesh.get_neighbours()
+
+
+def test_a_next_hop_that_landed_unheard_is_left_before_its_next_flight():
+    """It flew from 7 to 8 m, and now leaves for 0.5 m."""
+    rig = notice_rig()
+    departure_of_2(rig, stood="00 00 e0 40", goal="00 00 00 41")
+    rig.connect_through(2)
+    rig.wait(10.0)
+    assert rig.mesh.get_route_to_gateway() == 2
+    rig.hear("02 02 01 01 fe 00 00 00 3f 00 00 00 00 00 00 00 00 00 80")
+    assert 2 not in rig.mesh.get_neighbours()
+
+
+def test_a_next_hop_that_repeats_its_goal_still_comes_from_where_it_stood():
+    """It flew from 7 to 8 m: its links hold."""
+    rig = notice_rig()
+    departure_of_2(rig, stood="00 00 e0 40", goal="00 00 00 41")
+    rig.wait(10.0)
+    rig.hear("02 02 01 01 fe 00 00 00 41 00 00 00 00 00 00 00 00 00 80")
+    assert rig.mesh.get_route_to_gateway() == 2
 
 
 def test_nobody_can_announce_the_flight_of_another_node():

@@ -178,7 +178,8 @@ def test_a_radio_that_only_acknowledges_a_challenge_does_not_become_a_neighbour(
     assert network.run_until(network.all_connected, within_s=30.0)
     node = network.nodes[2]
     assert node.component.get_direction_to(0) == 1
-    node.receiver.on_delivered(0, 1, network.now_s())  # it poses as the gateway
+    delivered = packet("02 02 00 00 00")  # it poses as the gateway
+    node.receiver.on_delivered(delivered, 1, network.now_s())
     assert node.component.get_direction_to(0) == 1
     assert 0 not in node.component.get_neighbours()
 
