@@ -85,6 +85,7 @@ def test_on_an_nrf24_no_time_of_the_mesh_is_stretched(rate, hop_s):
         place_periods=2.5,
         data_pause_s=4 * hop_s,
         takes_off_after_s=0.3,
+        takes_off_within_s=2.0,
         report_frame_s=2.0,
     )
     assert medium.stretched(0.3) == UNDISTURBED.stretched(0.3) == 0.3
@@ -96,3 +97,4 @@ def test_times_grow_with_the_hop_of_a_slower_radio():
     assert medium.answer_s == pytest.approx(1.0 * 0.1 / 0.0026)
     assert medium.answer_per_hop_s == pytest.approx(10.0)
     assert medium.takes_off_after_s == pytest.approx(0.3 * 0.1 / 0.0026)
+    assert medium.takes_off_within_s == pytest.approx(2.0 * 0.1 / 0.0026)
