@@ -183,6 +183,9 @@ class IControlPlane(abc.ABC):
     def neighbour_leaves(self, neighbour: int) -> None:
         """A neighbour or this node flies, and they will be out of reach of each other."""
 
+    def flies_far(self) -> None:
+        """This node sets out by order, and leaves its links behind until it has landed."""
+
     def gateway_sent_place(self) -> None:
         """The preferred gateway itself reported its place."""
 

@@ -28,7 +28,7 @@ class IIntroduced(Protocol):
     """The control plane, as far as an introduction needs it."""
 
     @property
-    def hops(self) -> int: ...
+    def offered_hops(self) -> int: ...
 
     @property
     def connected(self) -> bool: ...
@@ -66,7 +66,7 @@ class Introduction:
         A node without a gateway repeats it, less and less often; off a shared channel only if it
         had one.
         """
-        hops, connected = self._plane.hops, self._plane.connected
+        hops, connected = self._plane.offered_hops, self._plane.connected
         payload = self._extended(messages.present(self._node_id, hops, connected), _PRESENT)
         if self._frame.digest:
             payload = messages.with_frame_digest(payload, self._frame.digest)

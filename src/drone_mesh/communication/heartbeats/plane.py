@@ -55,6 +55,7 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         self._pilot = node.pilot
         self._may_be_gateway = node.seals.may_be_gateway
         self._rng = node.rng
+        self._leads_nobody = False  # this node flies far by order
         medium, policy = self._medium, self._medium.policy
         deliver = QueuedDelivery if policy.queued else ImmediateDelivery
         self._delivery: Delivery = deliver(
@@ -158,6 +159,10 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
     def introduce(self) -> None:
         self._introduction.broadcast()
 
+    def flies_far(self) -> None:
+        """Lead nobody to the gateway: where a lost link is noticed late, a flight is too short."""
+        self._leads_nobody = self._medium.policy.announces_flights
+
     def neighbour_leaves(self, neighbour: int) -> None:
         """Look for other routes on a shared medium; elsewhere the next failed packet does so."""
         self._connection.neighbour_leaves(neighbour)
@@ -174,6 +179,11 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         return self._connection.hops
 
     @property
+    def offered_hops(self) -> int:
+        """The hops through this node, as neighbours are told; NO_ROUTE: it leads nobody."""
+        return NO_ROUTE if self._leads_nobody else self._connection.hops
+
+    @property
     def connected(self) -> bool:
         return self._connection.connected
 
@@ -184,6 +194,8 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         return self._connection.told_of_gateway(gateway)
 
     def end(self, event: RouterEvent) -> None:
+        if event is RouterEvent.LANDED:
+            self._leads_nobody = False
         self._connection.end(event)
 
     def give_up_routes(self) -> None:
@@ -210,7 +222,7 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         if self._connection.on_present(creator, hops, know_gateway):
             if know_gateway:
                 self.send_heartbeat(creator)
-            else:
+            elif not self._leads_nobody:
                 self._introduction.answer_search(creator)
 
     @receives(MessageType.HEARTBEAT)
@@ -231,7 +243,8 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
                 self._host.on_connected()
         elif know_gateway != self._states.connected:
             if not know_gateway:
-                self.send_heartbeat(creator)
+                if not self._leads_nobody:
+                    self.send_heartbeat(creator)
             elif not self._states.awaiting:
                 self._connection.take_gateway_of(from_, preferred_gateway)
 

@@ -133,6 +133,7 @@ class RouterFlights(Flights):
         self._control.neighbours.takes_off(by_order=True)
         if not is_short:
             self._repair.on_ordered_flight()
+            self._control.flies_far()
 
     def _is_short(self) -> bool:
         """Whether most neighbours will remain in reach, so that the router remains a relay."""
