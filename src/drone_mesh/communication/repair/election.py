@@ -6,7 +6,7 @@ docs/repair.md, "Negotiation".
 from __future__ import annotations
 
 import math
-from collections import Counter
+from collections import Counter, deque
 from typing import AbstractSet
 
 from drone_mesh.communication.interfaces import MAX_NODE_ID, NO_ROUTE
@@ -14,6 +14,7 @@ from drone_mesh.communication.wire.messages import MovementNegotiationMessage
 from drone_mesh.drone.location import Location
 
 NO_BID = -1.0  # the score of a node that does not fly
+LOOKS = 0.0  # below all other scores that win: it looks beside a node that its group does not reach
 MAX_SCORE_M = 1e9  # beyond every possible place, and it fits a float32
 TOOK_OFF = 2e9  # sent in place of a score: the winner takes off
 TOOK_OFF_HOME = 3e9  # the same, and it flies to the gateway's place
@@ -126,6 +127,7 @@ def highest_plausible(own: Location | None, gateway: Location | None, range_m: f
     return own.distance_m(gateway) + MAX_NODE_ID * range_m
 
 
+MOST_GOALS = 6  # of flights that are remembered
 MOST_DOUBLINGS = 6  # of the time between two drones that look for a gateway: to half a day
 
 
@@ -133,16 +135,19 @@ class FlightNews:
     """Which drones took off, and where they looked for the gateway."""
 
     drone_flew = False  # one of the group, since the connection was lost
+    flew_s = -math.inf  # when a drone of the group took off, or this one
 
     def __init__(self) -> None:
         self._quiet_until_s = -math.inf
         self._tries: dict[Location, float] = {}  # gateway's place -> when another may fly there
         self._failures: set[tuple[int, Location | None]] = set()  # that were reported
         self._failed_s: dict[int, float] = {}  # node -> when it reported a failed flight there
+        self.goals: deque[Location] = deque(maxlen=MOST_GOALS)  # of others, but the gateway's place
 
-    def took_off(self, quiet_until_s: float) -> None:
-        """A drone takes off: the others wait for its outcome until `quiet_until_s`."""
+    def took_off(self, now_s: float, quiet_until_s: float) -> None:
+        """Another drone takes off: the others wait for its outcome until `quiet_until_s`."""
         self.drone_flew = True
+        self.flew_s = now_s
         self._quiet_until_s = quiet_until_s
 
     def is_quiet(self, now_s: float) -> bool:

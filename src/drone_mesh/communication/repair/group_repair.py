@@ -13,6 +13,7 @@ from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.repair.election import (
     HOME_FAILED,
+    LOOKS,
     NO_BID,
     TOOK_OFF,
     TOOK_OFF_HOME,
@@ -24,7 +25,7 @@ from drone_mesh.communication.repair.election import (
 )
 from drone_mesh.communication.repair.interfaces import RepairActions, Step
 from drone_mesh.communication.repair.lone_repair import LoneRepair
-from drone_mesh.communication.repair.spots import NEAR, PITCH
+from drone_mesh.communication.repair.spots import NEAR, PITCH, may_be_flown_to
 from drone_mesh.drone.location import Location
 
 PLACES_WITHIN_S = 1.0  # docs/repair.md, "Negotiation": how long to wait for places
@@ -33,6 +34,7 @@ TAKE_OFF_WITHIN_S = 5.0  # docs/repair.md, "Negotiation": then the winner is pas
 ROUNDS_WITHOUT_FLIER = 2  # docs/repair.md, "Negotiation": then the second choice counts
 LATER_ROUNDS = 1.0 / 3.0  # of the patience: a step back takes about 5 s
 HOME_FAILED_ROUNDS = 20  # then another drone tries; its radio may hear the gateway
+LOOKS_AFTER = 5  # rounds without a flight; as rarely as a drone that is alone
 OCCUPIED_FOR_S = 300.0  # after the last report: the route to who stood there may be a memory, too
 HOME_AGAIN_S = 60.0  # docs/repair.md, "Negotiation": between flights of a group to a gateway
 
@@ -171,7 +173,21 @@ class GroupRepair(LoneRepair):
             elif is_first_choice or self._rounds_without_flier >= ROUNDS_WITHOUT_FLIER:
                 return step, ""
             is_first_choice = False
-        return None, reason
+        return None if alone else self._next_look(), reason
+
+    def _next_look(self) -> Step | None:
+        """To a node that is not of its group, after it was at the gateway's place in vain.
+
+        Rarely, and in turns with the flights to the gateway, which may only be off.
+        """
+        mesh, news = self.mesh, self._news
+        rounds = LOOKS_AFTER + (0 if news.in_vain() else HOME_FAILED_ROUNDS)
+        is_due = mesh.now_s >= news.flew_s + self._rounds_s(rounds)
+        was_home = any(step.home and mesh.was_at(step) for step in mesh.steps)
+        if not (is_due and was_home) or mesh.own_place() is None:
+            return None
+        looks = self.beside_strangers(news.goals)
+        return next((look for look in looks if self._occupant(look) == NO_ROUTE), None)
 
     def _occupant(self, step: Step) -> int:
         """A reachable node at the goal of `step`, or the owner of that place; else NO_ROUTE.
@@ -254,8 +270,9 @@ class GroupRepair(LoneRepair):
 
     def _negotiate(self) -> None:
         mesh = self.mesh
+        self.group.update(mesh.reachable())
         step, self.reason = self._next_step(alone=False)
-        self.own_bid = NO_BID if step is None else self._score(step)
+        self.own_bid = NO_BID if step is None else LOOKS if step.look else self._score(step)
         self.bids_for = NO_ROUTE if step is None else step.owner
         mesh.report(MeshEventKind.NEGOTIATION_STARTED, detail=f"score {self.own_bid:.2f}")
         mesh.happened(RouterEvent.BID)
@@ -296,7 +313,12 @@ class GroupRepair(LoneRepair):
             self._end_round()
             if step is not None:
                 mesh.bid(TOOK_OFF_HOME if step.home else TOOK_OFF, about=mesh.goal_of(step))
-                self._fly(step)
+                here = mesh.own_place()
+                if step.look and here is not None:
+                    self._news.flew_s = mesh.now_s
+                    self._look(step, here)
+                else:
+                    self._fly(step)
 
     def _on_take_off_of(self, node: int, code: float, from_: int, about: Location | None) -> None:
         """A drone of the group flies: wait for the outcome."""
@@ -305,11 +327,13 @@ class GroupRepair(LoneRepair):
             return
         patience_s = LATER_ROUNDS * mesh.connection_lost_after_s
         quiet_s = max(patience_s - mesh.check_period_s, TAKE_OFF_WITHIN_S)
-        self._news.took_off(mesh.now_s + quiet_s)
+        self._news.took_off(mesh.now_s, mesh.now_s + quiet_s)
         self._rounds_without_flier = 0
         self.reason = f"{node} flies instead"
         if code == TOOK_OFF_HOME:
             self._news.tries(about or mesh.gateway_place, mesh.now_s, HOME_AGAIN_S)
+        elif about is not None and may_be_flown_to(about):
+            self._news.goals.append(about)
         mesh.bid(code, node, but_not_to=from_, about=about)
         if mesh.state in IN_A_ROUND:
             self._end_round()
@@ -318,9 +342,13 @@ class GroupRepair(LoneRepair):
         """A drone found no gateway at the gateway's place: no other of the group flies there."""
         mesh = self.mesh
         where, again_s = about or mesh.gateway_place, TAKE_OFF_WITHIN_S
-        rounds_s = HOME_FAILED_ROUNDS * (mesh.connection_lost_after_s + mesh.check_period_s)
+        rounds_s = self._rounds_s(HOME_FAILED_ROUNDS)
         if not mesh.connected and self._news.failed(node, where, mesh.now_s, rounds_s, again_s):
             mesh.bid(HOME_FAILED, node, but_not_to=from_, about=about)
+
+    def _rounds_s(self, rounds: int) -> float:
+        """How long so many rounds take at most."""
+        return rounds * (self.mesh.connection_lost_after_s + self.mesh.check_period_s)
 
     def _pass_over_winner(self) -> None:
         """The winner did not take off: the next best bid wins."""
@@ -330,6 +358,7 @@ class GroupRepair(LoneRepair):
         self._begin_election()
 
     def _fly(self, step: Step) -> None:
+        self._news.flew_s = self.mesh.now_s
         self.mesh.fly(step)
 
     def _end_round(self) -> None:

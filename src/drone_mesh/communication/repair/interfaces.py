@@ -43,6 +43,7 @@ class Step(NamedTuple):
     place: Location
     owner: int = NO_ROUTE  # the node at that place; NO_ROUTE: none; own id: a return
     home: bool = False  # whether it is the gateway's place
+    look: bool = False  # whether the drone comes back if no gateway answers there
 
 
 class NeighbourView(NamedTuple):
@@ -183,6 +184,10 @@ class RepairActions(abc.ABC):
             for place in self.within_fence(heard.place)
             if node != self.node_id and may_be_flown_to(place)
         ]
+
+    def may_lead_to_gateway(self, place: Location) -> bool:
+        """Whether a gateway may be in reach of a node there, within the bounds for its place."""
+        return self._places.is_possible(place, self.range_m, gateway=True)
 
     def within_fence(self, place: Location | None) -> list[Location]:
         """A known place, or the nearest one to it that the fence allows, if there is one."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import abc
 import math
+from typing import Iterable, Iterator
 
 from drone_mesh.communication.control.router_states import RepairState
 from drone_mesh.communication.events.observer import MeshEventKind
@@ -37,6 +38,7 @@ class LoneRepair(IRepairStrategy):
     _looked = False  # since the connection was lost
     _was_everywhere = False  # alone, it has no further step
     _was_beside_another = False  # of those that it knows, since it began again
+    _left_group = False  # for that look: it comes back unless a gateway answers
     _in_silence = False  # several neighbours fell silent together before it
     _landed_s = -math.inf  # from its latest look around
     _jammed_s = -math.inf  # when its channel was last found to be jammed
@@ -47,6 +49,7 @@ class LoneRepair(IRepairStrategy):
         super().start(mesh)
         self._lost: set[int] = set()  # neighbours that were not heard again
         self._samples: list[bool] | None = None  # of the power in the channel, while it measures
+        self.group: set[int] = set()  # whom it heard or reached, since it has no gateway
         self._visited: set[int] = set()  # the others beside whose places it has looked
 
     def patience(self, silent: bool) -> float:
@@ -60,6 +63,7 @@ class LoneRepair(IRepairStrategy):
         self._stood_at, self._looked, self._samples = None, False, None
         self._was_everywhere = self._was_beside_another = False
         self._visited.clear()
+        self.group.clear()
         self._jammed_s = -math.inf
         self.listens = False
 
@@ -74,6 +78,8 @@ class LoneRepair(IRepairStrategy):
 
     def on_neighbour_found(self, node: int) -> None:
         """A lost neighbour is alive, so the medium was down: fly back to the start."""
+        if not self.mesh.connected and self.mesh.view(node).hops == NO_ROUTE:
+            self.group.add(node)
         if node in self._lost:
             self._lost.discard(node)
             if self._in_silence:
@@ -86,7 +92,8 @@ class LoneRepair(IRepairStrategy):
         """
         if self._stood_at is not None:
             self.listens, self._landed_s = self._in_silence, self.mesh.now_s
-            self.mesh.wait_until(self.mesh.now_s + self.mesh.medium.stretched(LISTENS_S))
+            listens_s = LISTENS_S + (SETTLES_S if self._left_group else 0.0)
+            self.mesh.wait_until(self.mesh.now_s + self.mesh.medium.stretched(listens_s))
 
     def on_emergency_alone(self) -> None:
         """Measure the power in the channel; then fly, unless it is being jammed."""
@@ -105,10 +112,12 @@ class LoneRepair(IRepairStrategy):
             self._measure()
         elif self._stood_at is not None:
             mesh = self.mesh
-            if not mesh.neighbours():
+            settled_s = self._landed_s + mesh.medium.stretched(LISTENS_S + SETTLES_S)
+            if self._left_group and mesh.now_s < settled_s:
+                mesh.wait_until(settled_s)
+            elif self._left_group or not mesh.neighbours():
                 self._back()
             elif self.listens:
-                settled_s = self._landed_s + mesh.medium.stretched(LISTENS_S + SETTLES_S)
                 self.listens = mesh.now_s < settled_s
                 if self.listens:
                     mesh.wait_until(settled_s)
@@ -137,6 +146,18 @@ class LoneRepair(IRepairStrategy):
         self._was_beside_another = False
         return None
 
+    def beside_strangers(self, looked: Iterable[Location]) -> Iterator[Step]:
+        """To nodes that are not of its group, and to where others of that looked: each place once.
+
+        The link of another one may have failed; this one's may work.
+        """
+        mesh = self.mesh
+        places = [Step(place) for goal in looked for place in mesh.within_fence(goal)]
+        for step in [*mesh.places_of_others(), *places]:
+            is_new = step.owner not in self.group and not mesh.was_at(step)
+            if is_new and mesh.may_lead_to_gateway(step.place):
+                yield step._replace(look=True)
+
     def _hears_others(self) -> bool:
         return bool(self.mesh.neighbours().keys() - {self._dead})
 
@@ -163,7 +184,7 @@ class LoneRepair(IRepairStrategy):
 
     def _look(self, step: Step, here: Location) -> None:
         """Fly a step, and remember the way back."""
-        self._in_silence = self.mesh.silent
+        self._in_silence, self._left_group = self.mesh.silent, step.look
         self.mesh.fly(step)
         self._stood_at, self._looked = here, True
 

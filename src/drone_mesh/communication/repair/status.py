@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from drone_mesh.communication.control.router_states import RepairState
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.repair.election import NO_BID
+from drone_mesh.communication.repair.election import LOOKS, NO_BID
 from drone_mesh.drone.location import Location
 
 
@@ -56,6 +56,8 @@ class RepairStatus(NamedTuple):
     def _bids(self) -> str:
         if self.bid < 0:
             return f"does not bid: {self.reason}" if self.reason else "does not bid"
+        if self.bid == LOOKS and self.place_of == NO_ROUTE:
+            return f"bids {LOOKS:g} to look where another drone did"
         is_quantity = self.bid > 1 and self.bid_unit
         score = f"{self.bid:.1f} {self.bid_unit}" if is_quantity else f"{self.bid:.3g}"
         return f"bids {score} for {self._place()}"

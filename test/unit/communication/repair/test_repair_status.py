@@ -42,6 +42,14 @@ OCCUPIED = "the place of 2 is occupied by 3"
             "negotiating, bids 1.11 for the place of 2",
         ),
         (
+            RepairStatus(RepairState.NEGOTIATING, bid=0.0, place_of=6),
+            "negotiating, bids 0 for the place of 6",
+        ),
+        (
+            RepairStatus(RepairState.NEGOTIATING, bid=0.0),
+            "negotiating, bids 0 to look where another drone did",
+        ),
+        (
             RepairStatus(RepairState.NEGOTIATING, OCCUPIED),
             f"negotiating, does not bid: {OCCUPIED}",
         ),

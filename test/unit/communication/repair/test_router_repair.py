@@ -1165,6 +1165,54 @@ def test_twenty_rounds_after_another_drone_was_at_the_gateway_in_vain_it_tries_i
     assert rig.engine.goals == [A_LEG_FROM_12]
 
 
+AT_LATITUDE_20 = "01 00 00 00 00 a0 41 00 00 00 00 00 00"  # of which a bid tells
+
+
+def goals_after_the_gateway(rig, score, *told):
+    """When and where it flies after it was at the gateway's place; 3 sends this bid all the time.
+
+    Before it flies there, it hears the packets `told`.
+    """
+    rig.antenna.dead = {2, 6, 7}
+    left_s, goals = [], rig.engine.goals
+    while rig.now_s < 3000.0:
+        rig.wait(1.0)
+        if len(goals) > len(left_s):
+            left_s.append(rig.now_s)
+            rig.engine.place = goals[-1]
+        if len(goals) == 1:
+            rig.hear(*told)
+            told = ()
+        if rig.now_s % 2 < 1:
+            rig.hear(bid(3, score))
+    assert [goal.latitude for goal in goals[:2]] == pytest.approx([8.0, 5.0], abs=0.1)
+    return [(at_s - left_s[1], goal) for at_s, goal in zip(left_s[2:], goals[2:])]
+
+
+@pytest.mark.parametrize(("score", "rounds"), [(-1.0, 25), (HOME_FAILED, 5)])
+def test_after_the_gateways_place_it_looks_once_beside_a_node_out_of_reach_and_comes_back(
+    score, rounds
+):
+    """Sooner if another drone was there in vain, too; 60 m away no gateway can be in reach."""
+    rig = group_rig(3)
+    rig.hear(place(6, 20.0), place(7, 60.0))
+    stood = Location(pytest.approx(5.1, abs=0.1), pytest.approx(-0.3, abs=0.1), 0.0)
+    (out_s, goal), (back_s, back) = goals_after_the_gateway(rig, score)
+    assert out_s == pytest.approx(rounds * 40.0, abs=15.0)
+    assert goal.distance_m(Location(20.0, 0.0, 0.0)) == pytest.approx(1.1)
+    assert (back, back_s - out_s < 10.0) == (stood, True)
+
+
+def test_it_looks_also_where_another_drone_did_whose_link_may_have_failed():
+    looked = goals_after_the_gateway(group_rig(3), HOME_FAILED, bid(3, TOOK_OFF) + AT_LATITUDE_20)
+    assert [round(goal.latitude) for _at_s, goal in looked] == [19, 5]
+
+
+def test_it_does_not_look_beside_a_drone_that_it_heard_without_a_gateway():
+    """On a flight it forgets its routes: that one is of its group, far from the gateway."""
+    assert goals_after_the_gateway(group_rig(3), HOME_FAILED, place(6, 20.0)) == []
+
+
 def test_an_announcement_is_passed_on_with_the_place_that_it_is_about():
     rig = group_rig(3, 4)
     rig.wait_until(EMERGENCY_S - 1.0)
