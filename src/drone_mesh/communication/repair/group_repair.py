@@ -71,7 +71,9 @@ class GroupRepair(LoneRepair):
         before they do does not start.
         """
         mesh = self.mesh
-        if mesh.neighbours():
+        if self.is_away:
+            self.on_time_alone()
+        elif mesh.neighbours():
             is_brief = mesh.bids_within_s < TAKE_OFF_WITHIN_S
             if not (is_brief and self._news.is_quiet(mesh.now_s)):
                 self._ask_for_places()
@@ -248,6 +250,8 @@ class GroupRepair(LoneRepair):
         """A node of the group bids for the flight or took off; `from_` sent or relayed that."""
         if score in (TOOK_OFF, TOOK_OFF_HOME):
             self._on_take_off_of(node, score, from_, about)
+            return
+        if self.is_away:
             return
         mesh = self.mesh
         if score == HOME_FAILED:

@@ -113,9 +113,9 @@ class LoneRepair(IRepairStrategy):
         elif self._stood_at is not None:
             mesh = self.mesh
             settled_s = self._landed_s + mesh.medium.stretched(LISTENS_S + SETTLES_S)
-            if self._left_group and mesh.now_s < settled_s:
+            if self.is_away and mesh.now_s < settled_s:
                 mesh.wait_until(settled_s)
-            elif self._left_group or not mesh.neighbours():
+            elif self.is_away or not mesh.neighbours():
                 self._back()
             elif self.listens:
                 self.listens = mesh.now_s < settled_s
@@ -145,6 +145,11 @@ class LoneRepair(IRepairStrategy):
         self._visited.clear()
         self._was_beside_another = False
         return None
+
+    @property
+    def is_away(self) -> bool:
+        """Whether it looks around away from its group, and takes no part in elections."""
+        return self._left_group and self._stood_at is not None
 
     def beside_strangers(self, looked: Iterable[Location]) -> Iterator[Step]:
         """To nodes that are not of its group, and to where others of that looked: each place once.

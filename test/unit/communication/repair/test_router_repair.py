@@ -1208,6 +1208,25 @@ def test_it_looks_also_where_another_drone_did_whose_link_may_have_failed():
     assert [round(goal.latitude) for _at_s, goal in looked] == [19, 5]
 
 
+def test_away_from_its_group_it_does_not_pass_on_who_was_at_the_gateway_in_vain():
+    """Another group there would wait for so much longer before one of it flies to the gateway."""
+    rig = group_rig(3)
+    rig.hear(place(6, 20.0))
+    rig.antenna.dead = {2, 6}
+    goals = rig.engine.goals
+    while rig.now_s < 3000.0 and len(goals) < 3:
+        rig.wait(1.0)
+        rig.engine.place = goals[-1] if goals else rig.engine.place
+        rig.hear(bid(3, HOME_FAILED))
+    rig.wait(1.0)
+    rig.engine.place = goals[-1]
+    rig.wait(3.0)
+    rig.forget()
+    rig.hear(bid(8, -1.0), "04 09 07 01 01 28 6b 6e 4f", bid(9, 7.0))
+    rig.wait(1.0)
+    assert (rig.sent(BID), len(goals)) == ([], 3)
+
+
 def test_it_does_not_look_beside_a_drone_that_it_heard_without_a_gateway():
     """On a flight it forgets its routes: that one is of its group, far from the gateway."""
     assert goals_after_the_gateway(group_rig(3), HOME_FAILED, place(6, 20.0)) == []
