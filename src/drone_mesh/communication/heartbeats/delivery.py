@@ -28,10 +28,15 @@ from drone_mesh.communication.wire.messages import CREATOR_AT, FORWARD_AT, TO_AT
 
 DATA_PERSISTENCE = 3  # users' packets are many, so a chain of losses is more likely
 LEAST_LOOP = 3  # links: no node sends a packet straight back to where it came from
+MOST_TIMES = 3  # that one neighbour sends a packet: a lost acknowledgement makes it two
 SENT_KEPT_S = 60.0  # on a channel that is too full a packet is under way for half a minute
 
-Passage = Tuple[int, int, float, int]
-"""Of a packet: the neighbour that it came from, its next hop, the time and its hop count."""
+Passage = Tuple[int, int, float, int, int]
+"""Of a packet: the neighbour that it came from, its next hop, the time, its hop count, how often.
+
+Of users' data the fourth is how often it took another way, and the last is counted on a shared
+channel only: elsewhere its sender repeats it within milliseconds.
+"""
 
 
 class CirculationGuard:
@@ -55,23 +60,30 @@ class CirculationGuard:
         return None if passage is None or now_s - passage[2] >= self._window_s else passage
 
     def passed(
-        self, identity: Hashable, came_from: int, went_to: int, now_s: float, hops: int = 0
+        self,
+        identity: Hashable,
+        came_from: int,
+        went_to: int,
+        now_s: float,
+        hops: int = 0,
+        times: int = 1,
     ) -> None:
-        """Record the first passage of a packet that was forwarded."""
+        """Record the first passage of a packet that was forwarded, or the latest one."""
         if now_s >= self._turn_s:
             self._turn_s = now_s + self._window_s
             self._passages, self._earlier = {}, self._passages
-        self._passages[identity] = (came_from, went_to, now_s, hops)
+        self._passages[identity] = (came_from, went_to, now_s, hops, times)
 
 
 def came_round(first: Passage, creator: int, came_from: int, hops: int | None = None) -> int | None:
     """The next hop of the packet's first passage, if it now comes round from another neighbour.
 
-    What comes straight from its creator was sent again. A heartbeat counts its hops: one with only
-    a few more of them was sent again, too, another way.
+    What comes straight from its creator was sent again, and what comes from the same neighbour, up
+    to MOST_TIMES. A heartbeat counts its hops: one with only a few more of them was sent again,
+    too, another way.
     """
-    first_from, went_to, _at_s, first_hops = first
-    if came_from in (creator, first_from):
+    first_from, went_to, _at_s, first_hops, times = first
+    if came_from == creator or (came_from == first_from and times < MOST_TIMES):
         return None
     if hops is not None and hops < first_hops + LEAST_LOOP:
         return None

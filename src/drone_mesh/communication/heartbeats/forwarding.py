@@ -45,6 +45,7 @@ class Forwarding:
         self._told = RateLimit(CREATORS_TOLD)
         self._circulates_s = self._medium.stretched(CIRCULATION_S)
         self._circulation = CirculationGuard(self._circulates_s)
+        self._counts = self._medium.policy.queued
         self._held: list[tuple[float, bytes]] = []  # until when, packet: the oldest first
         self._held_s = self._medium.stretched(HELD_S)
 
@@ -105,6 +106,9 @@ class Forwarding:
             if self._delivery.send(forwarded, to, 0, from_):  # keywords cost more
                 if first is None:
                     self._circulation.passed(identity, from_, to, now_s, hops or 0)
+                elif self._counts and messages.is_data(payload):
+                    came_from, _to, _at_s, turns, times = first
+                    self._circulation.passed(identity, came_from, to, now_s, turns, times + 1)
                 return
             lost = to
         self.stranded(payload, now_s)
@@ -125,14 +129,14 @@ class Forwarding:
     def _another_way(self, payload: bytes, first: Passage | None, from_: int, now_s: float) -> bool:
         """Users' data has come back from `from_`: the way that it took is wrong.
 
-        It takes another one. Without one it goes back to the neighbour that took this node for the
-        way, and then to the one that it first came from. So each node on a wrong way learns that,
+        It takes another one. Without one it goes back: to that neighbour, if it took this node for
+        the way, else to the one that it first came from. So each node on a wrong way learns that,
         as in a depth-first search. False: it ends here.
         """
         if first is None or not messages.is_data(payload) or first[3] >= MOST_TURNS:
             return False
         creator, _from, _kind, _to, forward = messages.header(payload)
-        came_from, went_to, _at_s, turns = first
+        came_from, went_to, _at_s, turns, _times = first
         self._routing.circulated(forward, went_to)
         directions = self._routing.directions(forward, came_from, creator)
         to = directions[0] if directions else NO_ROUTE
@@ -141,17 +145,29 @@ class Forwarding:
         if to in (NO_ROUTE, came_from, from_, went_to):
             if self._seeks(payload, now_s):
                 return True
-            to = from_ if turns == 0 and from_ != went_to else came_from
+            if from_ not in (came_from, went_to) and went_to != came_from:
+                return self._pass_on(payload, came_from, from_, now_s, turns + 1, went_to)
+            to = came_from
         return to != self._node_id and self._pass_on(payload, came_from, to, now_s, turns + 1)
 
     def _pass_on(
-        self, payload: bytes, came_from: int, to: int, now_s: float, turns: int = 0
+        self,
+        payload: bytes,
+        came_from: int,
+        to: int,
+        now_s: float,
+        turns: int = 0,
+        went_to: int | None = None,
     ) -> bool:
-        """Send users' data to a neighbour. False: it did not take it."""
+        """Send users' data to a neighbour. False: it did not take it.
+
+        `went_to`: the next hop that it already took, if `to` only gets it back.
+        """
         forwarded = messages.next_hop(payload, self._node_id, to)
         if forwarded is None or not self._delivery.send(forwarded, to, 0, came_from):
             return False
-        self._circulation.passed(messages.identity(payload), came_from, to, now_s, turns)
+        used = to if went_to is None else went_to
+        self._circulation.passed(messages.identity(payload), came_from, used, now_s, turns)
         return True
 
     def _seeks(self, payload: bytes, now_s: float) -> bool:
@@ -183,9 +199,10 @@ class Forwarding:
         """
         sent = self._delivery.own_passage(payload)
         if sent is not None:
-            _from, went_to, sent_s, _hops = sent
+            _from, went_to, sent_s, _hops, _times = sent
             own = self._circulation.first_passage(messages.identity(payload), now_s)
-            if self._another_way(payload, own or (self._node_id, went_to, sent_s, 0), from_, now_s):
+            first = own or (self._node_id, went_to, sent_s, 0, 1)
+            if self._another_way(payload, first, from_, now_s):
                 return
             if now_s - sent_s < self._circulates_s:
                 self._drop_circulating(payload, went_to, now_s)

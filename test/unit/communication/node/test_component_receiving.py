@@ -9,6 +9,7 @@ import pytest
 from rig import Rig, packet
 
 from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.timing import QUEUED, Medium
 
 NAN = "00 00 c0 7f"
 INFINITY = "00 00 80 7f"
@@ -453,6 +454,49 @@ def test_data_that_comes_round_goes_back_on_its_way_to_where_it_came_from_first_
         rig.hear(f"05 {neighbour:02x} 80 01 09 00 ab cd")
         back_to.append([sent[3] for sent in rig.sent(0x80)])
     assert back_to == [[2], [4], [3], [3], []]
+
+
+def test_data_that_came_round_goes_back_to_the_neighbour_that_it_came_from_each_time():
+    """So the nodes of each loop learn, not those of the first one only."""
+    rig = below_the_gateway()
+    rig.know_neighbour(4, 6)
+    rig.routing.other_can_communicate_with_node(4, 9)
+    sent_to = []
+    for neighbour in (3, 4, 6):  # 4 does not lead to 9, and the way up comes back through 6
+        rig.forget()
+        rig.hear(f"05 {neighbour:02x} 80 01 09 00 ab cd")
+        sent_to += [sent[3] for sent in rig.sent(0x80)]
+    assert sent_to == [4, 2, 6]
+
+
+def test_data_that_a_neighbour_sends_again_and_again_on_a_shared_channel_circulates():
+    """A loop that none of its nodes remembers to have entered: the last entry was too long ago."""
+    rig = Rig(medium=Medium(policy=QUEUED))
+    rig.connect_through(2)
+    rig.know_neighbour(3, 4)
+    rig.routing.other_can_communicate_with_node(4, 9)
+    sent_to = []
+    for _ in range(6):
+        rig.forget()
+        rig.hear(DATA_FOR_9)
+        sent_to += [sent[3] for sent in rig.sent(0x80)]
+        rig.wait(0.4)
+    assert sent_to == [4, 4, 4, 2, 2, 2]
+    assert rig.routing.get_direction_to_node(9) == NO_ROUTE
+
+
+def test_data_that_is_sent_again_after_half_a_second_does_not_circulate():
+    rig = Rig(medium=Medium(policy=QUEUED))
+    rig.connect_through(2)
+    rig.know_neighbour(3, 4)
+    rig.routing.other_can_communicate_with_node(4, 9)
+    sent_to = []
+    for _ in range(6):
+        rig.forget()
+        rig.hear(DATA_FOR_9)
+        sent_to += [sent[3] for sent in rig.sent(0x80)]
+        rig.wait(0.6)
+    assert sent_to == [4] * 6
 
 
 def test_if_the_hop_down_does_not_take_it_the_gateway_gets_it():
