@@ -22,9 +22,12 @@ module has those rules, without chips, threads and clocks. The driver and the fa
    ends with a packet (place_in_train). A pause does not end it: the sender was interrupted, and a
    relay that forwarded its packets now would not hear the rest of the train. Packets in a back-off
    for the sender of the train are sent right after it, because that node listens then.
-6. Each receiver has its own queue, so that waiting for one does not delay the others. A receiver
-   that did not acknowledge a packet, and was not heard since, gets fewer tries for the next one; so
-   does one that has been silent for longer than nodes of a mesh at rest are.
+6. Each receiver has its own queue, so that waiting for one does not delay the others, and another
+   one for users' packets, because a packet of the mesh may fail for seconds. If packets of both may
+   be sent, that of the mesh goes first, so users' packets never hold it up for longer than a try.
+   They wait only for an answer to a challenge, which lets their receiver open them. A receiver that
+   did not acknowledge a packet, and was not heard since, gets fewer tries for the next one; so does
+   one that has been silent for longer than nodes of a mesh at rest are.
 7. Where tries are limited, as every node is heard each second, a packet whose sender begins anew
    when it is lost is tried once, and a challenge at a random moment: all who hear a newcomer
    challenge it, and among drones that fly there is always one.
@@ -156,7 +159,7 @@ class MediumAccess:
 
         Bytes that already wait for the same receiver are not queued twice.
         """
-        if self._queue.has(receiver, payload):
+        if self._queue.has(receiver, priority, payload):
             return True
         if len(self._queue) >= self.rules.queue_length:
             return False

@@ -1,14 +1,17 @@
-"""PacketQueue: the packets that wait for the radio, in one line per receiver."""
+"""PacketQueue: the packets that wait for the radio, in lines."""
 
 from __future__ import annotations
 
 import math
 from collections import deque
-from typing import Final
+from typing import Final, Tuple
 
+from drone_mesh.communication.wire.messages import opens_others
 from drone_mesh.communication.wire.packet_types import Priority
 
 ALL_NODES: Final = -1  # receiver of a broadcast
+
+_Line = Tuple[int, Priority]  # receiver, priority
 
 
 class OutgoingPacket:
@@ -45,69 +48,81 @@ class OutgoingPacket:
 
 
 class PacketQueue:
-    """Packets by receiver, so that waiting for one receiver does not delay the others."""
+    """Packets in lines, one per receiver and priority, each with pauses of its own.
+
+    So waiting for one receiver does not delay the others, nor a packet of the mesh that keeps
+    failing the users' data behind it (IEEE 802.11e: a queue and a back-off per access category).
+    """
 
     def __init__(self) -> None:
-        self._lines: dict[int, deque[OutgoingPacket]] = {}  # by receiver; none is empty
+        self._lines: dict[_Line, deque[OutgoingPacket]] = {}  # none is empty
+        self._opening: dict[int, int] = {}  # by receiver: answers to challenges that wait
         self._length = 0
         self.data = 0  # packets of priority DATA
 
     def __len__(self) -> int:
         return self._length
 
-    def has(self, receiver: int, payload: bytes) -> bool:
+    def has(self, receiver: int, priority: Priority, payload: bytes) -> bool:
         """Whether these bytes already wait for that receiver."""
-        line = self._lines.get(receiver)
+        line = self._lines.get((receiver, priority))
         return line is not None and any(waiting.payload == payload for waiting in line)
 
     def add(self, packet: OutgoingPacket) -> None:
-        """Add a packet to its receiver's line; control goes before data that was not tried yet."""
-        line = self._lines.setdefault(packet.receiver, deque())
-        if packet.priority is Priority.DATA:
-            self.data += 1
-            line.append(packet)
-        else:
-            line.insert(_before_untried_data(line), packet)
+        """Add a packet at the end of its line."""
+        receiver, priority = packet.receiver, packet.priority
+        self._lines.setdefault((receiver, priority), deque()).append(packet)
         self._length += 1
+        if priority is Priority.DATA:
+            self.data += 1
+        elif opens_others(packet.payload):
+            self._opening[receiver] = self._opening.get(receiver, 0) + 1
 
     def remove(self, packet: OutgoingPacket) -> None:
         """Remove a packet, if it is still there."""
-        line = self._lines.get(packet.receiver)
+        receiver, priority = packet.receiver, packet.priority
+        line = self._lines.get((receiver, priority))
         if line is None or packet not in line:
             return  # all packets were given up meanwhile
         line.remove(packet)
         self._length -= 1
-        self.data -= packet.priority is Priority.DATA
+        if priority is Priority.DATA:
+            self.data -= 1
+        elif opens_others(packet.payload):
+            self._opening[receiver] -= 1
         if not line:
-            del self._lines[packet.receiver]
+            del self._lines[receiver, priority]
 
     def clear(self) -> None:
         self._lines.clear()
+        self._opening.clear()
         self._length = self.data = 0
 
     def hurry(self, receiver: int, now_s: float) -> None:
-        """End the wait of the first packet for this receiver."""
-        line = self._lines.get(receiver)
-        if line is not None:
-            line[0].not_before_s = min(line[0].not_before_s, now_s)
+        """End the wait of the first packets for this receiver."""
+        for priority in Priority:
+            line = self._lines.get((receiver, priority))
+            if line is not None:
+                line[0].not_before_s = min(line[0].not_before_s, now_s)
 
     def first_s(self) -> float:
         """When the first packet of a line may be tried; infinity if there is none."""
-        return min((line[0].not_before_s for line in self._lines.values()), default=math.inf)
+        return min((first.not_before_s for first in self._firsts()), default=math.inf)
 
     def ready(self, now_s: float) -> list[OutgoingPacket]:
         """The first packets of all lines that may be tried now."""
-        return [line[0] for line in self._lines.values() if line[0].not_before_s <= now_s]
+        return [first for first in self._firsts() if first.not_before_s <= now_s]
 
     def after(self, packet: OutgoingPacket) -> OutgoingPacket | None:
-        """The first other packet for the same receiver."""
-        line = self._lines.get(packet.receiver, ())
-        return next((other for other in line if other is not packet), None)
+        """The first other packet of the same line, if it may follow."""
+        line = self._lines.get((packet.receiver, packet.priority), ())
+        after = next((other for other in line if other is not packet), None)
+        return None if after is None or self._is_held(after) else after
 
+    def _firsts(self) -> list[OutgoingPacket]:
+        """The first packets of all lines that are not held."""
+        return [line[0] for line in self._lines.values() if not self._is_held(line[0])]
 
-def _before_untried_data(line: deque[OutgoingPacket]) -> int:
-    """The place in a line for a packet of the mesh: before all data that was not tried yet."""
-    place = len(line)
-    while place and line[place - 1].priority is Priority.DATA and not line[place - 1].tries:
-        place -= 1
-    return place
+    def _is_held(self, packet: OutgoingPacket) -> bool:
+        """Whether it is users' data that its receiver may be unable to open yet."""
+        return packet.priority is Priority.DATA and self._opening.get(packet.receiver, 0) > 0

@@ -175,6 +175,53 @@ def test_control_packets_go_before_data():
     assert access.due(1.0).receiver == 8
 
 
+def test_users_data_does_not_wait_while_a_packet_of_the_mesh_for_the_same_node_pauses():
+    access = MediumAccess(RULES, random.Random(1))
+    access.offer(7, packet(1), 0.0)
+    now_s = 0.0
+    for _ in range(8):
+        now_s = max(now_s, access.next_try_s)
+        assert access.tried(access.due(now_s), False, now_s) is Fate.WAITS
+    access.offer(7, packet(2), now_s, Priority.DATA)
+    assert access.next_try_s < now_s + 10 * CYCLE_S
+    assert access.due(access.next_try_s).payload == packet(2)
+
+
+def test_a_packet_of_the_mesh_does_not_wait_while_users_data_for_the_same_node_pauses():
+    access = MediumAccess(RULES, random.Random(1))
+    access.offer(7, packet(1), 0.0, Priority.DATA)
+    now_s = 0.0
+    for _ in range(8):
+        now_s = max(now_s, access.next_try_s)
+        assert access.tried(access.due(now_s), False, now_s) is Fate.WAITS
+    access.offer(7, packet(2), now_s)
+    assert access.next_try_s < now_s + 10 * CYCLE_S
+    assert access.due(access.next_try_s).payload == packet(2)
+
+
+def test_if_both_may_go_to_the_same_node_the_packet_of_the_mesh_goes_first():
+    access = MediumAccess(RULES, random.Random(1))
+    access.offer(7, packet(1), 0.0, Priority.DATA)
+    access.offer(7, packet(2), 1.0)
+    assert access.due(1.0).payload == packet(2)
+
+
+def test_users_data_waits_for_an_answer_to_a_challenge_which_opens_it():
+    answer = bytes((3, 3, 127, 7, 7)).ljust(32, b"\0")
+    access = MediumAccess(RULES, random.Random(1))
+    access.offer(7, answer, 0.0)
+    access.tried(access.due(0.0), False, 0.0)
+    access.offer(7, packet(2), 0.0, Priority.DATA)
+    access.offer(8, packet(3), 0.0, Priority.DATA)
+    now_s = access.next_try_s
+    assert access.due(now_s).payload == packet(3)  # another node needs no answer
+    access.tried(access.due(now_s), True, now_s)
+    now_s = access.next_try_s
+    assert access.due(now_s).payload == answer
+    access.tried(access.due(now_s), True, now_s)
+    assert access.due(access.next_try_s).payload == packet(2)
+
+
 def test_a_burst_is_paced():
     access = MediumAccess(RULES, random.Random(1))
     for receiver in range(100):

@@ -208,6 +208,7 @@ _NEW_LOCATION: Final = _whole(LocationMessage.BODY.format[1:])
 _PRESENT: Final = int(MessageType.PRESENT)
 _NEW_PRESENT: Final = _whole(IntroduceMessage.BODY.format[1:])
 _HEARTBEAT: Final = int(MessageType.HEARTBEAT)
+_SEAL_ANSWER: Final = int(MessageType.SEAL_ANSWER)
 _HEARTBEAT_HOPS: Final = HEADER_BYTES + 2  # offset of the hop count
 _NEW_HEARTBEAT: Final = _whole(HeartbeatMessage.BODY.format[1:])
 # A packet without the sender and receiver of its hop. Byte 7 counts: the hops of a HEARTBEAT, the
@@ -305,6 +306,11 @@ def is_jittered(payload: bytes) -> bool:
 def goes_once(payload: bytes) -> bool:
     """Whether the radio tries a packet of this type only once."""
     return ABOUT[payload[TYPE_AT]].once
+
+
+def opens_others(payload: bytes) -> bool:
+    """Whether its receiver may be unable to open later packets of its sender before it."""
+    return payload[TYPE_AT] == _SEAL_ANSWER
 
 
 def is_answered(payload: bytes) -> bool:
