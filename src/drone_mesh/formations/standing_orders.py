@@ -120,7 +120,8 @@ class StandingOrders:
             if event.kind == MeshEventKind.ORDER_REFUSED.value:
                 part.stay(PartState.REFUSED, event.detail)
             elif event.kind == MeshEventKind.NO_ROUTE.value:
-                part.sent_to = None
+                if event.order:  # a relay without a route names none, and the gateway tries on
+                    part.sent_to = None
             elif event.kind == MeshEventKind.ORDER_SENT.value and not part.is_ordered(event.place):
                 part.replace()
 

@@ -117,6 +117,28 @@ def test_a_drone_that_may_still_set_out_is_not_met_by_another_one():
     assert orders.update(state(9.0, gateway(), arrived, across)) == [(5, Location(-3.0, 3.0, 0.0))]
 
 
+@pytest.mark.parametrize(
+    ("event", "may_set_out"),
+    [
+        (EventRecord(1.5, 3, "no route", (4,)), True),
+        (EventRecord(1.5, 0, "no route", (4,), "", 3, EAST), False),
+    ],
+)
+def test_a_drone_is_under_way_until_its_gateway_has_no_route_whatever_a_relay_says(
+    event, may_set_out
+):
+    """A relay names no order; on a shared channel the gateway finds the drone and repeats it."""
+    orders = StandingOrders()
+    there, across = drone(4), drone(5, at=Location(3.0, 3.0, 0.0))
+    orders.give("layout 7", {4: EAST}, now_s=0.0)
+    assert orders.update(state(1.0, gateway(), there, across)) == [(4, EAST)]
+    orders.on_event(event)
+    west = Location(-3.0, 3.0, 0.0)  # crosses the other path
+    orders.give("layout 8", {5: west}, now_s=2.0)
+    ordered = orders.update(state(3.0, gateway(), there, across))
+    assert ordered == ([] if may_set_out else [(5, west)])
+
+
 def test_a_drone_that_has_arrived_once_is_not_ordered_back_after_a_repair():
     orders = StandingOrders()
     orders.give("layout 7", {4: EAST, 5: NORTH}, now_s=0.0)
