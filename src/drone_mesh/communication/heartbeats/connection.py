@@ -234,8 +234,7 @@ class GatewayConnection:
         """A neighbour introduced itself. Returns whether to send it a heartbeat."""
         if neighbour == self.gateway and hops != 0:
             self.gateway_resigned()
-        leads_nobody = hops == NO_ROUTE or (hops and self.passes_by_leaving(neighbour))
-        if know_gateway and leads_nobody:
+        if know_gateway and hops and self.passes_by_leaving(neighbour):
             return False
         if know_gateway and hops <= self.hops:
             self._introduction.search_is_answered()

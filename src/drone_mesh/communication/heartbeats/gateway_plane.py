@@ -46,10 +46,6 @@ class GatewayHeartbeats(HeartbeatPlane):
         """Hops to the gateway that it uses; 0 to itself."""
         return self._connection.hops if self.connected else NO_ROUTE
 
-    @property
-    def offered_hops(self) -> int:
-        return self.hops
-
     def on_internet(self, works: bool) -> None:
         """Be a gateway, or a router that says so to all who take it for one."""
         self._to_another.end(RouterEvent.ROUTE_LOST)

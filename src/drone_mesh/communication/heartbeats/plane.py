@@ -55,7 +55,7 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         self._pilot = node.pilot
         self._may_be_gateway = node.seals.may_be_gateway
         self._rng = node.rng
-        self._leads_nobody = False  # this node flies far by order
+        self._is_passing = False  # this node flies far by order
         medium, policy = self._medium, self._medium.policy
         deliver = QueuedDelivery if policy.queued else ImmediateDelivery
         self._delivery: Delivery = deliver(
@@ -160,8 +160,8 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         self._introduction.broadcast()
 
     def flies_far(self) -> None:
-        """Lead nobody to the gateway: where a lost link is noticed late, a flight is too short."""
-        self._leads_nobody = self._medium.policy.announces_flights
+        """Be no shorter way for others: where a lost link is noticed late, it is soon none."""
+        self._is_passing = self._medium.policy.announces_flights
 
     def neighbour_leaves(self, neighbour: int) -> None:
         """Look for other routes on a shared medium; elsewhere the next failed packet does so."""
@@ -180,8 +180,8 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
 
     @property
     def offered_hops(self) -> int:
-        """The hops through this node, as neighbours are told; NO_ROUTE: it leads nobody."""
-        return NO_ROUTE if self._leads_nobody else self._connection.hops
+        """What neighbours are told; NO_ROUTE: this node is a way only for those without one."""
+        return NO_ROUTE if self._is_passing else self.hops
 
     @property
     def connected(self) -> bool:
@@ -195,7 +195,7 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
 
     def end(self, event: RouterEvent) -> None:
         if event is RouterEvent.LANDED:
-            self._leads_nobody = False
+            self._is_passing = False
         self._connection.end(event)
 
     def give_up_routes(self) -> None:
@@ -222,7 +222,7 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         if self._connection.on_present(creator, hops, know_gateway):
             if know_gateway:
                 self.send_heartbeat(creator)
-            elif not self._leads_nobody:
+            else:
                 self._introduction.answer_search(creator)
 
     @receives(MessageType.HEARTBEAT)
@@ -243,8 +243,7 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
                 self._host.on_connected()
         elif know_gateway != self._states.connected:
             if not know_gateway:
-                if not self._leads_nobody:
-                    self.send_heartbeat(creator)
+                self.send_heartbeat(creator)
             elif not self._states.awaiting:
                 self._connection.take_gateway_of(from_, preferred_gateway)
 

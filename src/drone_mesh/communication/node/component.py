@@ -268,7 +268,7 @@ class MeshnetworkComponent(NodeSnapshots, IMeshNetwork, IControlHost):
         self._deadlines.now_s = now_s
         self.control.on_delivered(messages.receiver(payload), tries)
         if self._tells_own_goal(payload):
-            self._flights.told(messages.receiver(payload))
+            self._flights.told(messages.receiver(payload), messages.place_in(payload))
 
     def on_undelivered(self, payload: bytes, tries: int, now_s: float) -> None:
         self._deadlines.now_s = now_s

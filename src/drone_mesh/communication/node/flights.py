@@ -16,6 +16,7 @@ from drone_mesh.communication.interfaces import IWirelessCommunication
 from drone_mesh.communication.orders.intake import OrderIntake
 from drone_mesh.communication.repair.connection_repair import ConnectionRepair
 from drone_mesh.communication.timing import Deadlines, Due
+from drone_mesh.drone.location import Location
 
 GOAL_AGAIN_S = 0.15  # broadcasts are not acknowledged
 SHORT_FLIGHT = 0.25  # of the range: the discs before and after share 84 % of their area
@@ -44,8 +45,8 @@ class Flights:
         """Whether those that it may cut off know where it is about to fly, or had their time."""
         return True
 
-    def told(self, neighbour: int) -> None:
-        """A neighbour acknowledged the goal that was announced."""
+    def told(self, neighbour: int, goal: Location) -> None:
+        """A neighbour acknowledged that the drone flies there."""
 
     def not_told(self, neighbour: int) -> None:
         """A neighbour did not take the goal that was announced."""
@@ -114,8 +115,9 @@ class RouterFlights(Flights):
         self._untold &= self._control.neighbours.ids()
         return not self._untold or self._deadlines.now_s >= self._waits_until_s
 
-    def told(self, neighbour: int) -> None:
-        self._untold.discard(neighbour)
+    def told(self, neighbour: int, goal: Location) -> None:
+        if goal == self._pilot.departure:  # and not that of an order that was replaced
+            self._untold.discard(neighbour)
 
     def not_told(self, neighbour: int) -> None:
         goal = self._pilot.departure

@@ -127,7 +127,7 @@ class IntroduceMessage(_TypedMessage):
     TYPE: ClassVar[MessageType] = MessageType.PRESENT
     BODY: ClassVar[struct.Struct] = MessageType.PRESENT.about.layout
 
-    hops_until_gateway: int  # 255 while not known
+    hops_until_gateway: int  # 255: not known, or it flies past
     know_gateway: bool  # whether its creator is connected
 
 

@@ -106,6 +106,16 @@ def test_the_goal_of_another_drone_that_it_passed_on_is_no_notice():
     assert rig.engine.goals == []
 
 
+def test_an_acknowledged_goal_of_an_order_that_was_replaced_is_no_notice_of_the_new_one():
+    rig = patient_rig()
+    rig.hear(f"{ORDER} {TO_Y_1} 01 00")
+    rig.hear(f"{ORDER} {TO_Y_2} 02 00")
+    for neighbour in (3, 4):
+        rig.mesh.on_delivered(packet(f"01 01 01 {neighbour:02x} {GOAL_1}"), 1, rig.now_s)
+    rig.wait(1.0)
+    assert rig.engine.goals == []
+
+
 def test_a_neighbour_that_did_not_take_the_goal_is_told_again_while_it_is_one():
     rig = patient_rig()
     rig.hear(f"{ORDER} {TO_Y_1}")
