@@ -126,6 +126,15 @@ def test_the_old_drone_leaves_when_the_new_one_beside_it_has_been_connected_for_
     assert mesh.sent(2) == {1: POST}
 
 
+def test_a_full_spare_stays_in_reserve_while_all_can_be_relieved_in_time():
+    mesh = Mesh()
+    assert mesh.sent() == {}
+    mesh.hover(mesh.holder, 46.0)
+    assert mesh.sent() == {}
+    mesh.hover(mesh.holder, 44.0)  # two reliefs of 111 s each, with the swap
+    assert mesh.sent().keys() == {2}
+
+
 def test_a_drone_that_nobody_can_relieve_goes_home_in_time_and_its_post_is_filled_later():
     mesh = Mesh()
     mesh.spare.battery = 50.0
