@@ -300,6 +300,22 @@ def test_a_gateway_that_comes_back_late_finds_all_that_flew_to_it(seed):
     assert run_until(network, network.all_connected, within_s=240.0)
 
 
+@pytest.mark.parametrize("routing", ["child_table_tree", "beacon"])
+def test_the_only_drone_that_can_fly_looks_again_for_a_gateway_that_was_off_for_minutes(routing):
+    network = Network(routing=routing)
+    network.add_gateway(0, 0.0, 0.0)
+    network.add_router(1, 7.0, 0.0)
+    network.add_router(2, 14.0, 0.0)
+    network.add_router(3, 20.0, 0.0, why_not_fly="stands on a roof")
+    network.run_for(60.0)
+    network.power(1, False)
+    network.power(0, False)
+    network.run_for(300.0)  # it was at both places in vain, and is back
+    assert network.location(2).distance_m(network.location(0)) > 9.0
+    network.power(0, True)
+    assert network.run_until(lambda: network.connected(2), within_s=900.0)
+
+
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize(("gone_s", "within_s"), [(12.0, 20.0), (40.0, 45.0)])
 def test_after_an_outage_of_the_medium_all_are_connected_again(gone_s, within_s, seed):

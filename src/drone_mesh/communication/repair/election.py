@@ -136,6 +136,7 @@ class FlightNews:
 
     drone_flew = False  # one of the group, since the connection was lost
     flew_s = -math.inf  # when a drone of the group took off, or this one
+    home_s = -math.inf  # the same for flights to the gateway's place
 
     def __init__(self) -> None:
         self._quiet_until_s = -math.inf

@@ -33,7 +33,7 @@ SETTLE_S = 0.5  # a bid takes some milliseconds per hop; enough for 50 hops
 TAKE_OFF_WITHIN_S = 5.0  # docs/repair.md, "Negotiation": then the winner is passed over
 ROUNDS_WITHOUT_FLIER = 2  # docs/repair.md, "Negotiation": then the second choice counts
 LATER_ROUNDS = 1.0 / 3.0  # of the patience: a step back takes about 5 s
-HOME_FAILED_ROUNDS = 20  # then another drone tries; its radio may hear the gateway
+HOME_FAILED_ROUNDS = 20  # then a drone tries again; another radio may hear the gateway
 LOOKS_AFTER = 5  # rounds without a flight; as rarely as a drone that is alone
 OCCUPIED_FOR_S = 300.0  # after the last report: the route to who stood there may be a memory, too
 HOME_AGAIN_S = 60.0  # docs/repair.md, "Negotiation": between flights of a group to a gateway
@@ -161,7 +161,8 @@ class GroupRepair(LoneRepair):
         for step in steps:
             if step.owner == NO_ROUTE and len(steps) > 1 and not (alone and self._was_everywhere):
                 continue
-            if mesh.was_at(step):
+            is_due_again = step.home and not alone and self._is_home_due_again(step, near_m)
+            if mesh.was_at(step) and not is_due_again:
                 if is_first_choice:
                     reason = f"flew to the place of {step.owner} without success"
                     if step.owner == NO_ROUTE:
@@ -176,6 +177,15 @@ class GroupRepair(LoneRepair):
                 return step, ""
             is_first_choice = False
         return None if alone else self._next_look(), reason
+
+    def _is_home_due_again(self, home: Step, near_m: float) -> bool:
+        """Whether nobody has looked for the gateway for long, which may only have been off.
+
+        The others may be unable to fly there. Who stands near would hear it.
+        """
+        mesh, here = self.mesh, self.mesh.own_place()
+        is_far = here is not None and home.place.distance_m(here) > near_m
+        return is_far and mesh.now_s >= self._news.home_s + self._rounds_s(HOME_FAILED_ROUNDS)
 
     def _next_look(self) -> Step | None:
         """To a node that is not of its group, after it was at the gateway's place in vain.
@@ -335,6 +345,7 @@ class GroupRepair(LoneRepair):
         self._rounds_without_flier = 0
         self.reason = f"{node} flies instead"
         if code == TOOK_OFF_HOME:
+            self._news.home_s = mesh.now_s
             self._news.tries(about or mesh.gateway_place, mesh.now_s, HOME_AGAIN_S)
         elif about is not None and may_be_flown_to(about):
             self._news.goals.append(about)
@@ -363,6 +374,8 @@ class GroupRepair(LoneRepair):
 
     def _fly(self, step: Step) -> None:
         self._news.flew_s = self.mesh.now_s
+        if step.home:
+            self._news.home_s = self.mesh.now_s
         self.mesh.fly(step)
 
     def _end_round(self) -> None:
