@@ -166,7 +166,7 @@ class MqttInternet(IInternetConnection):
             {
                 "event": event.kind.value,
                 "peer": peer,
-                "detail": event.detail,
+                "detail": event.detail or None,
                 "order": event.order or None,
                 "place": event.place,
             },

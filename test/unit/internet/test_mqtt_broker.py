@@ -375,7 +375,7 @@ def test_what_happens_to_a_node_is_published(gateway, client):
     assert event == {
         "event": "neighbour lost",
         "peer": 1,
-        "detail": "",
+        "detail": None,
         "order": None,
         "place": None,
     }

@@ -145,6 +145,7 @@ class OrderBook:
         """
         order.seeking = order.searches < MOST_SEARCHES and self._may_find(order.drone)
         if not order.seeking:
+            order.waiting = order.copies > 0 and order.searches > 0
             if order.copies and order.due_s == math.inf:
                 self._wait(order, REPEAT_AFTER_S[order.unanswered])
             return order.copies > 0

@@ -29,7 +29,11 @@ def cut_off(run: RunRecord) -> float:
     return len(run.after_fault.near) - len(run.after_fault.hops_from(sorted(run.gateways)))
 
 
-@metric("drones", "drones that faults switched off during the run")
+@metric(
+    "drones",
+    "drones that faults switched off during the run; "
+    "not those of which an incident only silences the antenna",
+)
 def victims(run: RunRecord) -> float:
     deadly = ("kill", "gateway_off", "battery empty", "death")
     return len({n for item in run.happened if item.action in deadly for n in item.nodes})
