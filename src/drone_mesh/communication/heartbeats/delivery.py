@@ -96,6 +96,9 @@ class IWayFinder(Protocol):
     def on_neighbour_lost(self, node: int) -> None:
         """A neighbour did not take a packet; the routes are already updated."""
 
+    def on_route_lost(self) -> None:
+        """A route turned out to be wrong, and is removed."""
+
     def another_next_hop(self, node: int, but: int) -> int:
         """A neighbour to try for `node`, not `but`, beside those that the routes know."""
 

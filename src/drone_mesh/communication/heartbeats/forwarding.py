@@ -120,6 +120,7 @@ class Forwarding:
         """
         if is_listed and from_ != forward:
             self._routing.other_cant_communicate_with_node(from_, forward)
+            self._ways.on_route_lost()
             directions = self._routing.directions(forward, from_, creator)
             if directions and directions[0] != from_:
                 return directions[0]
@@ -137,7 +138,7 @@ class Forwarding:
             return False
         creator, _from, _kind, _to, forward = messages.header(payload)
         came_from, went_to, _at_s, turns, _times = first
-        self._routing.circulated(forward, went_to)
+        self._is_wrong(forward, went_to)
         directions = self._routing.directions(forward, came_from, creator)
         to = directions[0] if directions else NO_ROUTE
         if to in (NO_ROUTE, came_from, from_, went_to):
@@ -221,8 +222,13 @@ class Forwarding:
         forward = messages.addressee(payload)
         # No line: while drones fly, loops come and go.
         self._complaints.counts["dropped a packet that circulates"] += 1
-        self._routing.circulated(forward, used)
+        self._is_wrong(forward, used)
         self.stranded(payload, now_s)
+
+    def _is_wrong(self, node: int, used: int) -> None:
+        """A packet for `node` that went to `used` came back; that may have been the only way up."""
+        self._routing.circulated(node, used)
+        self._ways.on_route_lost()
 
     def not_taken(self, payload: bytes, now_s: float) -> None:
         """The next hop did not take a queued packet, and there is no detour."""

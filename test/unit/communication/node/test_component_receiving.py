@@ -9,7 +9,7 @@ import pytest
 from rig import Rig, packet
 
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.timing import QUEUED, Medium
+from drone_mesh.communication.timing import QUEUED, UNDISTURBED, Medium
 
 NAN = "00 00 c0 7f"
 INFINITY = "00 00 80 7f"
@@ -340,6 +340,29 @@ def test_a_packet_that_differs_or_was_sent_again_is_forwarded(first, second):
     assert len([sent for sent in rig.sent() if sent[2] != 5]) == 2
     assert rig.routing.get_direction_to_node(9) == 3
     assert not any("circulates" in reason for reason in rig.mesh.complaints.counts)
+
+
+TWICE = ("05 03 40 01 00 21 00 01", "05 04 40 01 00 21 00 01")  # a reply of 5 to gateway 0
+
+
+@pytest.mark.parametrize("medium", [UNDISTURBED, Medium(policy=QUEUED)])
+def test_a_router_whose_only_way_up_seems_to_lead_in_a_circle_looks_for_another_one_at_once(medium):
+    rig = Rig(medium=medium)
+    rig.connect_through(2)
+    rig.know_neighbour(3, 4)
+    rig.hear(*TWICE)
+    assert rig.mesh.get_route_to_gateway() == NO_ROUTE
+    assert not rig.mesh.get_connected_to_gateway()
+    assert [present[6] for present in rig.broadcasts() if present[2] == 3] == [0]
+
+
+def test_on_a_shared_channel_it_tries_a_neighbour_that_said_that_it_has_a_gateway():
+    rig = Rig(medium=Medium(policy=QUEUED))
+    rig.connect_through(2)
+    rig.hear("04 04 00 01 01", "03 03 03 01 fe 01 01")
+    rig.hear(*TWICE)
+    assert rig.mesh.get_route_to_gateway() == 3
+    assert [sent[3] for sent in rig.sent(4) if sent[4] == 0] == [3]
 
 
 def test_the_same_packet_from_another_neighbour_is_forwarded_after_half_a_second():
