@@ -315,7 +315,8 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         self._host.on_neighbour_lost(node)
 
     def on_route_lost(self) -> None:  # noqa: D102
-        self._connection.on_route_lost()
+        if self._technique.TAKES_SHORTCUTS:  # others soon learn another route from their neighbours
+            self._connection.on_route_lost()
 
     def another_next_hop(self, node: int, but: int) -> int:  # noqa: D102
         return self._connection.another_next_hop(but) if node == self.gateway else NO_ROUTE
