@@ -227,12 +227,13 @@ class Relief:
                     return True
 
         at_rest = [d for d in held.keys() & known.keys() if not len(known[d].path)]
-        waits_s = {d: self._reserves.flight_s(d, place_of(known[d])) for d in at_rest}
-        waits_s = {d: WAIT_S + CARRIES_S + flight_s for d, flight_s in waits_s.items()}
+        flights_s = {d: self._reserves.flight_s(d, place_of(known[d])) for d in at_rest}
         due = [d for d in at_rest if held[d].turn is None]
-        left_s = {d: self._reserves.left_s(known[d]) - waits_s[d] for d in due}
-        # One wait, not two: reckoned too long, no spare would ever stay full in reserve.
-        away_s = 2.0 * sum(waits_s.values()) / max(1, len(waits_s)) - WAIT_S + self._rules.swap_s
+        waits_s = WAIT_S + CARRIES_S
+        left_s = {d: self._reserves.left_s(known[d]) - flights_s[d] - waits_s for d in due}
+        # Out and home, with one wait: reckoned too long, no spare would ever stay full in reserve.
+        flight_s = sum(flights_s.values()) / max(1, len(flights_s))
+        away_s = WAIT_S + 2.0 * (CARRIES_S + flight_s) + self._rules.swap_s
         view = ReliefView(
             left_s=dict(sorted(left_s.items(), key=lambda item: (item[1], item[0]))),
             ready=ready,
