@@ -38,6 +38,7 @@ class AlarmBook:
     def __init__(self) -> None:
         self._alarms: dict[tuple[int | None, str], Alarm] = {}  # by node and text, oldest first
         self._was_connected: set[int] = set()
+        self._flew: set[int] = set()  # in the latest state: after a landing they connect anew
 
     def update(self, mesh: MeshStatus) -> None:
         """Compare with a state of the mesh: alarms begin and end."""
@@ -50,6 +51,7 @@ class AlarmBook:
             now.update((node.id, text) for text in self._troubles(node))
             if node.connected:
                 self._was_connected.add(node.id)
+        self._flew = {node.id for node in mesh.nodes if len(node.path)}
         ids = {node.id for node in mesh.nodes}
         for key in now:
             if key not in self._alarms or self._alarms[key].until_s < math.inf:
@@ -133,6 +135,7 @@ class AlarmBook:
         """A new run has begun."""
         self._alarms.clear()
         self._was_connected.clear()
+        self._flew.clear()
 
     def _of_orders(self, drone: int) -> list[tuple[int | None, str]]:
         return [key for key in self._alarms if key[0] == drone and _of_order(key[1])]
@@ -158,7 +161,7 @@ class AlarmBook:
         if node.outside_fence:
             found.append(node.outside_fence)
         is_lost = condition is Condition.DISCONNECTED and node.role == Role.ROUTER
-        if is_lost and node.id in self._was_connected:
+        if is_lost and node.id in self._was_connected - self._flew:
             found.append("lost the gateway")
         return found
 

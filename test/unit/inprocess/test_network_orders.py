@@ -64,11 +64,13 @@ def test_contact_with_a_drone_that_flew_out_of_reach_is_lost():
     assert ends(network) == [(3, "lost contact", "at 0 s: it fell silent on its way")]
 
 
-def test_a_relay_that_dies_under_an_order_ends_it_without_a_route():
+def test_a_relay_that_dies_under_an_order_ends_it_without_a_route_after_three_searches():
     network = line()
     network.power(2, False)
     assert network.order(3, 18.0, 3.0)  # relay 1 took it
-    network.run_for(1.0)
+    network.run_for(2.9)
+    assert ends(network) == [(3, "sent", "")]
+    network.run_for(0.2)
     assert ends(network) == [(3, "no route", "")]
 
 

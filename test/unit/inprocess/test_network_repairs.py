@@ -21,6 +21,7 @@ from scenarios import (
     run_until,
 )
 
+from drone_mesh.communication.interfaces import OrderState
 from drone_mesh.communication.seals.keys import MeshKey
 from drone_mesh.inprocess import Network
 from drone_mesh.mobility import Area, Mobility, tracks_of
@@ -38,20 +39,39 @@ def stands_beside(network, node, x, y):
     return 1.0 <= math.dist(horizontally(network, node), (x, y)) < 1.2
 
 
-def diamond(seed=0):
+def diamond(radio="disc", seed=0):
     """Gateway 0, router 3 behind routers 1 and 2, and router 4 behind it."""
-    network = placed([(0.0, 0.0), (5.0, 4.0), (5.0, -4.0), (10.0, 0.0), (18.0, 0.0)], seed=seed)
+    network = placed(
+        [(0.0, 0.0), (5.0, 4.0), (5.0, -4.0), (10.0, 0.0), (18.0, 0.0)], seed=seed, radio=radio
+    )
     network.run_for(20.0)
     assert [network.hops(node) for node in range(1, 5)] == [1, 1, 2, 3]
     return network
 
 
+def last_order(network):
+    return network.nodes[0].component.get_orders()[-1].state
+
+
 # Detours and partitions ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("radio", ["disc", "shared"])
+def test_a_relay_that_is_ordered_away_tells_those_behind_it_to_take_another_way_first(radio):
+    network = diamond(radio)
+    relay = network.nodes[3].component.get_route_to_gateway()
+    x, y = horizontally(network, relay)
+    assert network.order(relay, x, 10.0 * y)
+    for _second in range(30):
+        network.run_for(1.0)
+        for node in (3, 4):
+            hop = network.nodes[node].component.get_route_to_gateway()
+            assert hop in network.air.in_range(node), f"node {node} goes through {hop}"
 
 
 @pytest.mark.parametrize("seed", range(2))
 def test_packets_take_a_detour_when_a_relay_dies(seed):
-    network = diamond(seed)
+    network = diamond(seed=seed)
     relay = network.nodes[3].component.get_route_to_gateway()
     network.power(relay, False)
     network.run_for(30.0)
@@ -92,10 +112,14 @@ def test_all_nodes_learn_that_a_node_is_missing_and_that_it_is_back():
     network.run_for(20.0)
     network.power(4, False)
     network.run_for(20.0)
-    assert not network.order(4, x=24.0, y=1.0)
+    network.order(4, x=24.0, y=1.0)
+    network.run_for(4.0)
+    assert last_order(network) is OrderState.NO_ROUTE
     network.power(4, True)
     network.run_for(12.0)
-    assert network.order(4, x=24.0, y=1.0)
+    network.order(4, x=24.0, y=2.0)
+    network.run_for(0.1)
+    assert last_order(network) is OrderState.ACCEPTED
 
 
 @pytest.mark.parametrize(("key", "asks_s"), [(None, 0.6), (MeshKey(bytes(range(16))), 2.0)])

@@ -314,7 +314,7 @@ def test_orders_are_counted_with_those_that_arrived() -> None:
 
 
 def test_each_departure_is_that_of_one_order() -> None:
-    away = {"between": [0, 1], "for_s": 2}
+    away = {"between": [0, 1], "for_s": 5}
     faults = [
         {"at_s": 9, "cut_link": away},
         {"at_s": 10, "order": {"id": 1, "to": [6, 0]}},  # lost

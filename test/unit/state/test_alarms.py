@@ -42,6 +42,16 @@ def test_a_node_that_never_had_a_gateway_has_lost_none():
     assert said(book) == []
 
 
+def test_a_drone_that_has_just_landed_has_a_moment_to_connect_again():
+    book = AlarmBook()
+    book.update(state(1.0, well(1)))
+    book.update(state(2.0, NodeStatus(1, path=[1.0, 2.0, 3.0])))
+    book.update(state(3.0, lost(1)))
+    assert said(book) == []
+    book.update(state(4.0, lost(1)))
+    assert said(book) == [("lost the gateway", [1], False, False)]
+
+
 def test_an_alarm_that_is_over_stays_until_it_is_acknowledged():
     book = AlarmBook()
     book.update(state(1.0, well(1)))

@@ -242,9 +242,6 @@ class Delivery(IDelivery):
         """`neighbour` sent a packet for `missing` that this node could only send straight back."""
         self.report_missing(missing, first=neighbour)
 
-    def neighbour_leaves(self, neighbour: int) -> None:  # noqa: B027 (the next packet fails)
-        """A neighbour or this node flies, and they will be out of reach of each other."""
-
     def neighbour_lost(self, node: int, came_from: int = NO_ROUTE) -> None:
         """A neighbour is out of reach, or about to be: find other routes.
 

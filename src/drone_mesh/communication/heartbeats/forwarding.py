@@ -93,7 +93,7 @@ class Forwarding:
                     self._pass_on(payload, from_, from_, now_s)
                     return
             if to in (NO_ROUTE, from_):
-                self.stranded(payload, now_s)
+                self.stranded(payload)
                 if to == from_:
                     self._delivery.came_back(forward, from_)
                 elif lost != forward:  # otherwise the neighbours know already
@@ -111,7 +111,7 @@ class Forwarding:
                     self._circulation.passed(identity, came_from, to, now_s, turns, times + 1)
                 return
             lost = to
-        self.stranded(payload, now_s)
+        self.stranded(payload)
 
     def _hop_of_data(self, forward: int, from_: int, creator: int, is_listed: bool) -> int:
         """The next hop of users' data for a node without a route; NO_ROUTE: none, or back.
@@ -223,7 +223,7 @@ class Forwarding:
         # No line: while drones fly, loops come and go.
         self._complaints.counts["dropped a packet that circulates"] += 1
         self._is_wrong(forward, used)
-        self.stranded(payload, now_s)
+        self.stranded(payload)
 
     def _is_wrong(self, node: int, used: int) -> None:
         """A packet for `node` that went to `used` came back; that may have been the only way up."""
@@ -234,18 +234,14 @@ class Forwarding:
         """The next hop did not take a queued packet, and there is no detour."""
         first = self._circulation.first_passage(messages.identity(payload), now_s)
         if not self._another_way(payload, first, messages.receiver(payload), now_s):
-            self.stranded(payload, now_s)
+            self.stranded(payload)
 
-    def stranded(self, payload: bytes, now_s: float) -> None:
+    def stranded(self, payload: bytes) -> None:
         """A packet has no next hop. Report an order, also to the gateway that sent it."""
         creator, _from, kind, _to, forward = messages.header(payload)
         if kind != MessageType.MOVE_TO_LOCATION:
             return
-        reason = f"no route to drone {forward}"
-        if self._medium.policy.search_within_s:
-            self._complaints.counts[reason] += 1  # its gateway looks for the drone
-        else:
-            self._complaints.add(reason, "an order for it ends here", now_s)
+        self._complaints.counts[f"no route to drone {forward}"] += 1  # its gateway looks for it
         self._report(MeshEventKind.NO_ROUTE, forward)
         self._send_missing(creator, forward)
 

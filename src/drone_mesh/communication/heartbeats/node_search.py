@@ -1,10 +1,9 @@
 """NodeSearch: a gateway searches for a node without a known route.
 
-On a shared channel, for its orders: a relay that loses a neighbour loses the routes to all nodes
-behind it, and learns new ones only from packets of those nodes. On a busy channel such a node may
-be silent for 25 s, so the gateway requests a packet from it (docs/shared-channel.md).
-On every medium, for users' data: the node may use another gateway (docs/protocol.md, "Users' data
-for unknown nodes").
+For its orders: a relay that loses a neighbour loses the routes to all nodes behind it, and learns
+new ones only from packets of those nodes, which may be silent for minutes (docs/protocol.md,
+"Searching for a drone"). For users' data: the node may use another gateway ("Users' data for
+unknown nodes").
 """
 
 from __future__ import annotations

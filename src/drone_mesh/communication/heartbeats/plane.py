@@ -88,7 +88,7 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
             node.node_id, node.antenna, node.deadlines, node.complaints, self._answer_search
         )
         self._connection = self._connected_by(node, GatewayConnection)
-        self.learn = self._learn if policy.announces_flights else technique.learn
+        self.learn = self._learn
         learns = policy.answers_prove_relays
         self.forward = self._forward_and_learn if learns else self._forwarding.forward
 
@@ -161,12 +161,12 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
 
     def flies_far(self) -> None:
         """Be no shorter way for others: where a lost link is noticed late, it is soon none."""
-        self._is_passing = self._medium.policy.announces_flights
+        self._is_passing = True
 
     def neighbour_leaves(self, neighbour: int) -> None:
-        """Look for other routes on a shared medium; elsewhere the next failed packet does so."""
+        """Look for other routes while the old ones still work."""
         self._connection.neighbour_leaves(neighbour)
-        self._delivery.neighbour_leaves(neighbour)
+        self._delivery.neighbour_lost(neighbour)
 
     # The connection --------------------------------------------------------------------------
 

@@ -71,6 +71,3 @@ class QueuedDelivery(Delivery):
         me = self._node_id
         packet = messages.MissingMessage(me, me, neighbour, neighbour, missing)
         self.send(packet.to_payload(), neighbour)
-
-    def neighbour_leaves(self, neighbour: int) -> None:
-        self.neighbour_lost(neighbour)

@@ -104,12 +104,11 @@ class RouterFlights(Flights):
         Those that may have this router as their next hop acknowledge it.
         """
         medium, control = self._repair.medium, self._control
-        if medium.policy.announces_flights:
-            hops_of, others = control.neighbours.hops_of, control.neighbours.ids()
-            self._untold = {node for node in others if hops_of(node) >= control.hops}
-            self._untold.discard(control.next_hop())  # its hops may not be known
-            self._waits_until_s = self._deadlines.now_s + medium.takes_off_within_s
-            self._announce_goal(acknowledged_by=sorted(self._untold))
+        hops_of, others = control.neighbours.hops_of, control.neighbours.ids()
+        self._untold = {node for node in others if hops_of(node) >= control.hops}
+        self._untold.discard(control.next_hop())  # its hops may not be known
+        self._waits_until_s = self._deadlines.now_s + medium.takes_off_within_s
+        self._announce_goal(acknowledged_by=sorted(self._untold))
 
     def is_noticed(self) -> bool:
         self._untold &= self._control.neighbours.ids()
@@ -126,7 +125,7 @@ class RouterFlights(Flights):
 
     def took_off(self) -> None:
         goal = self._pilot.goal
-        if self._repair.medium.policy.announces_flights and goal is not None:
+        if goal is not None:
             for neighbour in sorted(self._control.neighbours.ids()):
                 heard = self._control.neighbours.place_of(neighbour)
                 if heard is not None and heard.place.distance_m(goal) >= self._repair.range_m:

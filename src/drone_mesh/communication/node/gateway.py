@@ -32,6 +32,8 @@ from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused
 
+SEARCH_WITHIN_S = 3600.0  # a busy relay may send nothing of its own for a quarter of an hour
+
 
 class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
     """A node that answers heartbeats and sends orders from outside into the mesh."""
@@ -166,6 +168,5 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         the gateway for minutes.
         """
         _hops, heard_s = self._heartbeats.get(node, (NO_ROUTE, -math.inf))
-        medium = self._antenna.medium
         ago_s = self._deadlines.now_s - heard_s
-        return ago_s < medium.stretched(medium.policy.search_within_s)
+        return ago_s < self._antenna.medium.stretched(SEARCH_WITHIN_S)

@@ -1,4 +1,4 @@
-"""On a shared channel a gateway searches for a drone that it has an order for and no route to."""
+"""A gateway searches for a drone that it has an order for and no route to."""
 
 from __future__ import annotations
 
@@ -38,8 +38,9 @@ def router_rig():
     return rig
 
 
-def test_a_drone_that_a_relay_lost_is_searched_for_and_gets_its_order_when_it_answers():
-    rig = gateway_rig()
+@pytest.mark.parametrize("medium", [SHARED, UNDISTURBED])
+def test_a_drone_that_a_relay_lost_is_searched_for_and_gets_its_order_when_it_answers(medium):
+    rig = gateway_rig(medium)
     rig.hear(LOST_BEHIND_2)
     assert packet("01 01 44 fe fe 05 20 00") in rig.broadcasts()
     assert rig.sent(ORDER) == []
@@ -180,13 +181,6 @@ def test_searches_do_not_follow_each_other_at_once_and_the_second_drone_waits_fo
     assert [p[5] for p in searches(rig)] == [5]
     rig.wait(0.7)
     assert [p[5] for p in searches(rig)] == [6]
-
-
-def test_on_a_medium_without_contention_nothing_is_searched_for():
-    rig = gateway_rig(UNDISTURBED)
-    rig.hear(LOST_BEHIND_2)
-    assert rig.broadcasts() == []
-    assert rig.kinds()[-1] == "NO_ROUTE"
 
 
 def test_a_search_is_passed_on_once_by_each_node():

@@ -1,4 +1,4 @@
-"""On a shared channel a router gives its neighbours notice before it takes off by order."""
+"""A router gives its neighbours notice before it takes off by order."""
 
 from __future__ import annotations
 
@@ -31,6 +31,15 @@ def test_a_router_announces_its_goal_twice_before_it_takes_off():
     goal = packet("01 01 01 fe fe 00 00 80 3f 00 00 00 00 00 00 00 00 00 80")
     assert (told, rig.engine.goals) == ([goal, goal], [])
     rig.wait(0.1)
+    assert rig.engine.goals == [Y_1]
+
+
+def test_where_others_learn_at_once_it_takes_off_at_once():
+    rig = Rig()
+    rig.connect_through(2)
+    rig.hear(f"{ORDER} {TO_Y_1}")
+    goal = packet("01 01 01 fe fe 00 00 80 3f 00 00 00 00 00 00 00 00 00 80")
+    assert goal in rig.broadcasts()
     assert rig.engine.goals == [Y_1]
 
 
