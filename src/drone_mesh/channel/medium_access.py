@@ -28,9 +28,9 @@ module has those rules, without chips, threads and clocks. The driver and the fa
    They wait only for an answer to a challenge, which lets their receiver open them. A receiver that
    did not acknowledge a packet, and was not heard since, gets fewer tries for the next one; so does
    one that has been silent for longer than nodes of a mesh at rest are.
-7. Where tries are limited, as every node is heard each second, a packet whose sender begins anew
-   when it is lost is tried once, and a challenge at a random moment: all who hear a newcomer
-   challenge it, and among drones that fly there is always one.
+7. Where tries are limited, as every node is heard each second, and on a full channel, a packet
+   whose sender begins anew when it is lost is tried once, and a challenge at a random moment: all
+   who hear a newcomer challenge it, and among drones that fly there is always one.
 """
 
 from __future__ import annotations
@@ -166,10 +166,9 @@ class MediumAccess:
         if priority is Priority.DATA and self.data_room() <= 0:
             return False
         rules, not_before_s = self.rules, now_s
-        once = once and rules.is_limited
         if receiver == ALL_NODES:
             not_before_s += self._rng.random() * rules.broadcast_jitter_s * jittered
-        elif once:
+        elif once and self._is_full:
             not_before_s += self._rng.random() * rules.once_jitter_s * jittered
         elif now_s - self._broadcast_heard_s[priority] < rules.answer_jitter_s:
             not_before_s += self._rng.random() * rules.answer_jitter_s
@@ -259,7 +258,7 @@ class MediumAccess:
             self._queue.remove(packet)
             return Fate.DELIVERED
         if (
-            packet.once
+            (packet.once and self._is_full)
             or packet.tries >= self._most_tries(receiver, now_s)
             or now_s - packet.queued_s > rules.lifetime_s
         ):
@@ -308,6 +307,11 @@ class MediumAccess:
 
     def clear(self) -> None:
         self._queue.clear()
+
+    @property
+    def _is_full(self) -> bool:
+        """Whether others will soon be heard, or are in the way: then fewer tries do more."""
+        return self.rules.is_limited or self.contention >= self.rules.busy_at
 
     def _learn(self, first_try_failed: bool) -> None:
         failed = _MOST_CONTENTION if first_try_failed else 0.0

@@ -298,6 +298,14 @@ def test_where_tries_are_limited_such_a_packet_is_tried_at_a_random_moment():
     assert 0.9 * RULES.once_jitter_s < max(waits) <= RULES.once_jitter_s
 
 
+def test_on_a_full_channel_too_it_is_tried_once_and_at_a_random_moment():
+    access = MediumAccess(RULES, random.Random(1))
+    access.contention = RULES.busy_at
+    access.offer(7, PACKET, 0.0, once=True)
+    assert 0.0 < access.next_try_s < RULES.once_jitter_s
+    assert access.tried(access.due(RULES.once_jitter_s), False, 1.0) is Fate.GIVEN_UP
+
+
 def test_elsewhere_it_is_tried_at_once_and_as_often_as_any():
     access = MediumAccess(RULES, random.Random(1))
     access.offer(7, PACKET, 1.0, once=True)

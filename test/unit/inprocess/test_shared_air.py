@@ -10,12 +10,14 @@ import pytest
 from scenarios import events, flown, layout
 
 from drone_mesh.communication.interfaces import IMeshNetwork
+from drone_mesh.communication.seals.keys import MeshKey
 from drone_mesh.drone.engines import GroundEngine
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.clock import VirtualClock
 from drone_mesh.inprocess.shared_antenna import SharedChannel
+from drone_mesh.mobility import Area, Mobility, tracks_of
 from drone_mesh.nrf24.emulator.links import IdealDisc, LogDistance, ScriptedLoss
 from drone_mesh.nrf24.emulator.space import Fading
 from drone_mesh.nrf24.settings import DataRate, RadioSettings
@@ -304,3 +306,18 @@ def test_who_is_too_far_away_to_be_asked_is_out_of_reach(rate, scaled):
                 assert few == all_asked
                 reached += len(few)
     assert 0 < reached < 60 * 59 * 8
+
+
+def test_challenges_do_not_fill_the_channel_of_a_mesh_in_motion():
+    """Each of fifty drones challenges all whom it meets, ten at any time."""
+    side_m, rng = 36.0, random.Random(1)
+    network = Network(seed=1, radio="shared", key=MeshKey(bytes(range(16))))
+    network.add_gateway(0, side_m / 2, side_m / 2)
+    places = {0: (side_m / 2, side_m / 2, 0.0)}
+    for node in range(1, 50):
+        places[node] = rng.random() * side_m, rng.random() * side_m, 0.0
+        network.add_router(node, *places[node][:2])
+    mobility = Mobility("random_waypoint", speed_m_s=(0.3, 0.3))
+    network.fly(tracks_of(mobility, places, {0}, Area(0.0, 0.0, side_m, side_m), seed=1))
+    network.run_for(20.0)
+    assert sum(map(network.connected, range(1, 50))) > 30

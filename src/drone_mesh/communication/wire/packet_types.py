@@ -125,7 +125,10 @@ class MessageType(enum.IntEnum):
     LOCATION = 1, PacketType(PacketKind.POSITION, _NODE, _LOCATION, "LocationMessage")
     REQUESTLOCATION = 2, PacketType(PacketKind.POSITION, _NODE)
     # Introduces its creator to every node in range
-    PRESENT = 3, PacketType(PacketKind.INTRODUCTION, _CONTROL, _PRESENT, "IntroduceMessage")
+    PRESENT = (
+        3,
+        PacketType(PacketKind.INTRODUCTION, _CONTROL, _PRESENT, "IntroduceMessage", once=True),
+    )
     # Proof of a path; counts its hops
     HEARTBEAT = 4, PacketType(PacketKind.HEARTBEAT, _CONTROL, _HEARTBEAT, "HeartbeatMessage")
     # Its creator can no longer reach a node
