@@ -18,11 +18,11 @@ KEY = MeshKey(bytes(range(16)))
 
 def start(routing: str, key: MeshKey | None) -> tuple[Network, Network]:
     """A mesh with router 2, and another mesh of one drone beside it, to be added."""
-    mesh = Network(2, radio="chips", rate="1M", routing=routing, key=key)
+    mesh = Network(4, radio="chips", rate="1M", routing=routing, key=key)
     mesh.add_gateway(0, 0.0, 0.0)
     mesh.add_router(1, 6.0, 0.0)
     mesh.add_router(2, 12.0, 0.0)
-    twin = Network(3, radio=mesh.air, routing=routing, key=key)
+    twin = Network(5, radio=mesh.air, routing=routing, key=key)
     return mesh, twin
 
 

@@ -22,6 +22,8 @@ from drone_mesh.nrf24.emulator.links import IdealDisc, LogDistance, ScriptedLoss
 from drone_mesh.nrf24.emulator.space import Fading
 from drone_mesh.nrf24.settings import DataRate, RadioSettings
 
+HEARTBEAT = 4
+
 
 class Mesh(IMeshNetwork):
     """Keeps what the antenna hands it."""
@@ -77,7 +79,7 @@ class Rig:
 
 
 def packet(sender, to, filling=0x55):
-    return bytes((sender, sender, 3, to, to)) + bytes((filling,)) * 27
+    return bytes((sender, sender, HEARTBEAT, to, to)) + bytes((filling,)) * 27
 
 
 def test_a_packet_takes_two_frames_and_the_time_of_the_radio():
