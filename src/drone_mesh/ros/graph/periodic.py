@@ -52,8 +52,8 @@ class Periodic(abc.ABC):
         while not (self._stopped.wait(self._period_s) or rospy.is_shutdown()):
             try:
                 self._work()
-            except rospy.ROSException:  # a topic was closed: the node shuts down
-                if not rospy.is_shutdown():
+            except rospy.ROSException:  # topics close before is_shutdown says so
+                if not rospy.core.is_shutdown_requested():
                     raise
 
 
