@@ -310,7 +310,7 @@ class MediumAccess:
 
     @property
     def _is_full(self) -> bool:
-        """Whether others will soon be heard, or are in the way: then fewer tries do more."""
+        """Whether first tries often fail, or the mesh limits the tries."""
         return self.rules.is_limited or self.contention >= self.rules.busy_at
 
     def _learn(self, first_try_failed: bool) -> None:

@@ -214,7 +214,8 @@ def test_after_a_short_flight_it_looks_for_others_and_loses_those_left_behind():
     rig.antenna.dead = {3}
     fly(rig, Location(1.9, 0.0, 0.0))
     fly(rig, Location(2.0, 0.0, 0.0))
-    assert rig.broadcasts()[-1] == packet("01 01 03 fe fe 02 01")
+    goal = packet("01 01 01 fe fe 00 00 00 40 00 00 00 00 00 00 00 00 00 80")
+    assert rig.broadcasts() == [goal, goal, packet("01 01 03 fe fe 02 01")]
     assert rig.routing.get_set_of_children() == {2}
     assert rig.sent(MISSING) == [packet("01 01 05 02 02 03")]
 
