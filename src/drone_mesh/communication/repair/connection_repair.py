@@ -386,7 +386,7 @@ class ConnectionRepair(RepairActions):
         place, landing = at_whole_metres(step.place), self._landing(step)
         known = [place, *self._taken.all(), *self._tried_spots]
         if self.silent:
-            return own_spot(place, self.node_id, self.clearance_m, known, self._taken.allows)
+            return own_spot(place, self.node_id, self._options, known, self._taken.allows)
         rivals = self._rivals(step)
         if rivals:
             return spot_beside_rivals(

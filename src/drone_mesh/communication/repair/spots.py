@@ -75,17 +75,29 @@ class Landing(NamedTuple):
 def own_spot(
     place: Location,
     node: int,
-    clearance_m: float,
-    occupied: Iterable[Location] = (),
+    options: RepairOptions,
+    occupied: Sequence[Location] = (),
     allows: Allows = everywhere,
+    landing: Landing | None = None,
+    block: int = BLOCK,
 ) -> Location:
-    """The allowed spot nearest to `place` that belongs to `node` alone and is clear of `occupied`.
+    """The best allowed spot near `place` that belongs to `node` alone and is clear of `occupied`.
 
-    Space is a lattice of spots that are clear of each other, divided among the ids 0..255 in blocks
-    of 8 x 8 x 4. So drones that cannot hear each other never land at the same spot.
+    The nearest, or for a `landing` the one that keeps most links. Space is a lattice of spots that
+    are clear of each other, divided among the ids 0..255 in blocks of 8 x 8 x 4. So drones that
+    cannot hear each other never land at the same spot. If a fence leaves a drone none in reach of
+    the place, its blocks are smaller: farther away it would find nobody.
     """
-    spots = sorted(_own_spots(place, node, clearance_m, BLOCK), key=place.distance_m)
-    return _first_clear(spots, clearance_m, occupied, allows)
+    links = landing.links if landing else ()
+    spots = sorted(
+        _own_spots(place, node, options.clearance_m, block),
+        key=lambda spot: (_too_long(spot, links, options), place.distance_m(spot)),
+    )
+    best = _first_clear(spots, options.clearance_m, occupied, allows)
+    near = [s for s in spots if place.distance_m(s) <= WITHIN_REACH * options.range_m]
+    if block == min(BLOCKS) or (best in near and allows(best)) or all(map(allows, near)):
+        return best
+    return own_spot(place, node, options, occupied, allows, landing, block // 2)
 
 
 def spot_beside_rivals(
@@ -94,7 +106,7 @@ def spot_beside_rivals(
     rivals: Iterable[int],
     landing: Landing,
     options: RepairOptions,
-    occupied: Iterable[Location],
+    occupied: Sequence[Location],
     allows: Allows = everywhere,
 ) -> Location:
     """A spot near `place` that belongs to `node` and to none of `rivals`, and keeps most links.
@@ -105,11 +117,7 @@ def spot_beside_rivals(
     """
     others = [_class_of(other, block) for block in BLOCKS for other in rivals]
     block = next((b for b in BLOCKS if _class_of(node, b) not in others), BLOCK)
-    spots = sorted(
-        _own_spots(place, node, options.clearance_m, block),
-        key=lambda spot: (_too_long(spot, landing.links, options), place.distance_m(spot)),
-    )
-    return _first_clear(spots, options.clearance_m, occupied, allows)
+    return own_spot(place, node, options, occupied, allows, landing, block)
 
 
 def _class_of(node: int, block: int) -> tuple[int, ...]:
@@ -134,9 +142,8 @@ def _own_spots(place: Location, node: int, clearance_m: float, block: int) -> li
 
 
 def _first_clear(
-    spots: Sequence[Location], clearance_m: float, occupied: Iterable[Location], allows: Allows
+    spots: Sequence[Location], clearance_m: float, occupied: Sequence[Location], allows: Allows
 ) -> Location:
-    occupied = list(occupied)
     free = (spot for spot in spots if allows(spot) and _is_clear_of(spot, occupied, clearance_m))
     return next(free, spots[0])
 

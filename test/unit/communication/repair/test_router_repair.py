@@ -1324,15 +1324,29 @@ def test_it_flies_to_a_spot_near_the_place_that_belongs_to_it_alone():
     rig.wait_until(EMERGENCY_S + 0.1)
     (goal,) = rig.engine.goals
     assert 1.0 <= goal.distance_m(NEIGHBOUR_PLACE) < 7.0
-    assert goal == own_spot(NEIGHBOUR_PLACE, 1, 1.0, [NEIGHBOUR_PLACE, Location(4.0, 0.0, 0.0)])
+    assert goal == own_spot(
+        NEIGHBOUR_PLACE, 1, RepairOptions(), [NEIGHBOUR_PLACE, Location(4.0, 0.0, 0.0)]
+    )
 
 
 @pytest.mark.parametrize("x_m", [-2003.7, -2.9, 0.0, 8.3, 4100.2])
 def test_the_spots_of_all_ids_are_near_a_place_and_clear_of_each_other(x_m):
     place = Location(x_m, x_m - 40.0, 0.0)
-    spots = [own_spot(place, node, 1.0) for node in range(64)]
+    spots = [own_spot(place, node, RepairOptions()) for node in range(64)]
     assert max(spot.distance_m(place) for spot in spots) < 6.3
     assert all(one.distance_m(other) >= 1.0 for one, other in itertools.combinations(spots, 2))
+
+
+@pytest.mark.parametrize("node", range(64))
+def test_where_a_fence_leaves_a_drone_no_spot_of_its_own_it_takes_one_in_reach(node):
+    place = Location(8.7, 0.4, 0.0)
+
+    def allows(spot):
+        return spot.longitude < 3.0 or spot.distance_m(place) > 9.0
+
+    goal = own_spot(place, node, RepairOptions(range_m=9.0), [place], allows)
+    assert allows(goal)
+    assert 1.0 <= goal.distance_m(place) < 9.0
 
 
 def beside_rivals(place, node, rivals, links=()):
@@ -1351,7 +1365,7 @@ def test_drones_that_cannot_hear_each_other_take_different_spots_beside_a_lost_o
             beside_rivals(place, node, {*ids, *more} - {node})
             for more in ([], [5, 30, 101], [node + 128])
         ]
-        + [own_spot(place, node, 1.0, [place])]
+        + [own_spot(place, node, RepairOptions(), [place])]
         for node in ids
     )
     assert all(spot.distance_m(place) >= 1.0 for spots in (first, *others) for spot in spots)

@@ -44,7 +44,7 @@ def test_a_spot_beside_one_drone_is_clear_of_the_rounded_place_of_another():
     for spot in (
         taken.at_or_beside(gone, landing),
         spot_beside_rivals(Location(0.0, 1.2, 0.0), 1, [2], landing, options, others),
-        own_spot(east, 1, 1.0, [*others, Location(0.0, 2.15, 0.0)]),  # its own spot: 1.1
+        own_spot(east, 1, options, [*others, Location(0.0, 2.15, 0.0)]),  # its own spot: 1.1
     ):
         assert spot.distance_m(told._replace(longitude=2.05)) >= 1.0
 
