@@ -123,9 +123,18 @@ class EveryInterfaceTest(unittest.TestCase):
     def wait_at(self, node: int, x: float, y: float) -> None:
         self.mesh.wait(f"drone {node} at ({x}, {y})", 90, lambda: self.stands_at(node, x, y))
 
+    def wait_connected(self) -> None:
+        """Return when the state shows it, too, by which the drone manager goes."""
+
+        def are_connected() -> bool:
+            nodes = self.heard["/mesh/state"][-1].nodes
+            return self.mesh.connected() and all(node.connected for node in nodes if node.id)
+
+        self.mesh.wait("all connected after it", 60, are_connected)
+
     def wait_over(self, number: int) -> Any:
         over = self.wait_heard("/DroneManager/layouts", id=number, over=True)
-        self.mesh.wait("all connected after it", 60, self.mesh.connected)
+        self.wait_connected()
         return over
 
     # The mesh at rest --------------------------------------------------------------------------
@@ -261,7 +270,7 @@ class EveryInterfaceTest(unittest.TestCase):
             arrived = self.wait_heard("/mesh/events", code=msg.MeshEvent.ORDER_ARRIVED)
             self.assertEqual(arrived.peers, bytes([1]))
             place = {"latitude": 0.0, "longitude": 0.0, "height": 0}
-            self.mesh.wait("all connected after it", 60, self.mesh.connected)
+            self.wait_connected()
         name = "/DroneManager/orderFlight"
         taken = {"id": 1, "latitude": 6.0, "longitude": 6.0, "height": 0}
         with self.assertRaisesRegex(rospy.ServiceException, "drone 4"):
@@ -305,7 +314,7 @@ class EveryInterfaceTest(unittest.TestCase):
         ):
             self.ask(name, srv.Casus, caseID=case)
             self.wait_at(drone, *place)
-            self.mesh.wait("all connected after it", 60, self.mesh.connected)
+            self.wait_connected()
         places = [msg.Location(*STARTS[drone][::-1], 0) for drone in LAYOUT]
         name = "/DroneManager/orderFormation"
         formation = {"name": "back", "drones": bytes(LAYOUT), "places": places}
@@ -355,7 +364,7 @@ class EveryInterfaceTest(unittest.TestCase):
             self.assertEqual(
                 client.get_state(), GoalStatus.SUCCEEDED, client.get_goal_status_text()
             )
-            self.mesh.wait("all connected after it", 60, self.mesh.connected)
+            self.wait_connected()
         self.assertEqual(client.get_result().outcome, msg.FlyResult.ARRIVED)
         self.wait_at(3, -1.0, 7.0)
         for drone in LAYOUT:
@@ -401,7 +410,7 @@ class EveryInterfaceTest(unittest.TestCase):
             again = self.ask(name, srv.SetFence, **{**change, "areas": told})
             self.assertEqual(again.message, words)
             self.wait_heard("/DroneManager/fence", data=told)
-        self.mesh.wait("all connected after it", 60, self.mesh.connected)
+        self.wait_connected()
         self.assertTrue(fly(*STARTS[1]).success)
         self.wait_at(1, *STARTS[1])
 
