@@ -19,6 +19,7 @@ from scenarios import (
 )
 
 from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.seals.keys import MeshKey
 from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError
@@ -66,6 +67,13 @@ def test_a_gateway_that_starts_last_connects_all():
     assert events(network, "CONNECTED") == []
     assert network.run_until(network.all_connected, within_s=1.25)
     assert_hops_are_paths(network, above_shortest=0)
+
+
+def test_no_drone_flies_while_a_hundred_with_a_key_connect_through_one_channel():
+    network = Network(3, radio="shared", key=MeshKey(bytes(range(16))))
+    network.add_fleet(gateways=1, routers=99, gridsize=10, spacing=6.0)
+    assert network.run_until(network.all_connected, within_s=60.0)
+    assert events(network, "EMERGENCY", "FLIGHT_DECIDED") == []
 
 
 @pytest.mark.parametrize("seed", range(2))

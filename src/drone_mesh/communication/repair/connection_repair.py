@@ -39,6 +39,8 @@ from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.drone.location import Location
 
 MOVING_PATIENCE = 3.0  # while drones move by themselves, a lost link may come back
+NOT_YET_CONNECTED = "it may still be connected for the first time"
+JOINING_PATIENCE = 5.0  # 100 nodes with a key take a minute to connect through one channel
 
 
 @dataclass(eq=False)
@@ -68,6 +70,7 @@ class ConnectionRepair(RepairActions):
         self._emergency_s = math.inf  # when the time is up, as far as known
         self._checked_s: float | None = None  # when the first check during an election was due
         self._was_silent = False
+        self._joins_until_s = math.inf  # once it was connected, or waited too long: in the past
         self._flight: RepairFlight | None = None
         self._flies_to_place_of = NO_ROUTE
         self._landed_unheard = False  # away from where it stood, and it has heard no node since
@@ -102,6 +105,7 @@ class ConnectionRepair(RepairActions):
             self._strategy.on_connected_check()
 
     def on_connected(self) -> None:
+        self._joins_until_s = -math.inf
         self._last.begin_anew()
         self._clear()
         self._tried_goals.clear()
@@ -257,7 +261,9 @@ class ConnectionRepair(RepairActions):
         self._set_out(flight)
 
     def why_not_fly(self) -> str:  # noqa: D102
-        return self._last.why_not_repair() or super().why_not_fly()
+        joins = self.now_s < self._joins_until_s - ROUNDING_S
+        why_not = self._last.why_not_repair() or super().why_not_fly()
+        return why_not or (NOT_YET_CONNECTED if joins else "")
 
     def _end_work(self) -> None:
         """Set out for the last time, unless somebody is in the way: a check asks again, then."""
@@ -440,7 +446,11 @@ class ConnectionRepair(RepairActions):
         motion = self._neighbours.motion
         if motion.moved_since(self._lost_since_s - motion.within_s):
             patience = max(patience, MOVING_PATIENCE)
-        self._emergency_s = self._lost_since_s + self.connection_lost_after_s * patience
+        emergency_s = self._lost_since_s + self.connection_lost_after_s * patience
+        if self._joins_until_s == math.inf:
+            longest_s = self.connection_lost_after_s * JOINING_PATIENCE
+            self._joins_until_s = self._lost_since_s + longest_s
+        self._emergency_s = max(emergency_s, self._joins_until_s)
 
     def _notice_loss(self, due_s: float) -> None:
         self._lost_since_s = due_s

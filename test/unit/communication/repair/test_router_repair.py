@@ -20,6 +20,7 @@ from drone_mesh.communication.repair.strategies import (
     create_repair_strategy,
 )
 from drone_mesh.communication.timing import MeshTiming
+from drone_mesh.communication.wire.messages import GatewayPlace
 from drone_mesh.drone.location import Location
 
 LOCATION, REQUEST, PRESENT, HEARTBEAT, MISSING, BID, LAST_PLACE = 1, 2, 3, 4, 5, 7, 69
@@ -34,6 +35,7 @@ FROM_12 = "00 00 40 41 00 00 00 00 01 00"  # the place of the node that asks: la
 
 
 EMERGENCY_S = 45.0
+FIRST_EMERGENCY_S = 155.0  # of a router that was never connected
 BIDS_S = EMERGENCY_S + 1.1  # the neighbours had their time to say where they are
 TO_DECISION_S = 0.5  # from then on; bids of nodes farther away may still come
 
@@ -503,9 +505,26 @@ def test_a_drone_that_cannot_fly_for_a_repair_stays_and_says_why(hindrance, why)
 
 def test_a_router_that_knows_no_place_at_all_stays():
     rig = Rig()
-    rig.wait_until(200.0)
+    rig.wait_until(400.0)
     assert rig.engine.goals == []
     assert rig.kinds().count("EMERGENCY") > 1
+
+
+@pytest.mark.parametrize("bids", [(), (bid(3, 1.0),)])
+def test_a_router_does_not_fly_while_it_may_still_be_connected_for_the_first_time(bids):
+    """Others tell it where the gateway is before it has a route there itself."""
+    rig = Rig()
+    rig.engine.place = Location(60.0, 0.0, 0.0)
+    rig.know_neighbour(3)
+    where = GatewayPlace(0, Location(4.0, 0.0, 0.0), age_s=1.0)
+    rig.hear(place(3, 54.0), where.to_payload(3, 1).hex())
+    assert rig.mesh.places.gateway == where.place
+    rig.wait_until(FIRST_EMERGENCY_S - 1.0)
+    rig.hear(*bids)
+    rig.wait_until(FIRST_EMERGENCY_S - 0.1)
+    assert rig.engine.goals == []
+    rig.wait_until(FIRST_EMERGENCY_S + 60.0)
+    assert len(rig.engine.goals) == 1
 
 
 @pytest.mark.parametrize(
@@ -737,7 +756,7 @@ def test_scores_are_compared_as_they_are_on_the_air():
 def test_no_router_flies_without_a_bid():
     rig = Rig()
     rig.know_neighbour(3)
-    rig.wait_until(36.1)
+    rig.wait_until(FIRST_EMERGENCY_S + 1.1)
     decide(rig, bid(3, -1.0))
     assert rig.engine.goals == []
     assert rig.events[-1].peer == NO_ROUTE
@@ -767,7 +786,7 @@ def grounded():
 @pytest.mark.parametrize(
     ("make_rig", "at_s", "why"),
     [
-        (without_gateway, 36.1, "knows no place to fly to"),
+        (without_gateway, FIRST_EMERGENCY_S + 1.1, "knows no place to fly to"),
         (without_place, BIDS_S, "does not know where it is"),
         (grounded, BIDS_S, "cannot fly: the battery is empty"),
     ],
