@@ -198,6 +198,7 @@ ATTACKS: Mapping[str, Attack] = {
     "a counter far ahead": claims.far_counter,
     "packets in receivers' own names": claims.own_names,
     "nonces in drones' names": claims.claimed_nonces,
+    "false departures": claims.false_departures,
     "beacons of a black hole": claims.beacon_black_hole,
     "beacons with numbers ahead": claims.beacons_ahead,
     "beacons that list all drones": claims.beacons_of_all,

@@ -176,6 +176,15 @@ def wormhole(stranger: Stranger) -> None:
     air.carries = None
 
 
+def false_departures(stranger: Stranger) -> None:
+    """Say once a second, in the name of each neighbour, that it is about to fly far away."""
+    for _ in stranger.every(1.0, CLAIMING_S):
+        for node, name in itertools.permutations(stranger.in_range(), 2):
+            now_s = stranger.network.now_s()
+            notice = messages.own_location(ELSEWHERE, True, now_s, name, node)
+            stranger.say(MessageType.LOCATION, name, node, BROADCAST, messages.body(notice))
+
+
 def beacons_in_names(stranger: Stranger) -> None:
     """Say in beacons of each neighbour that it has no gateway and will be silent for long."""
     lost = Beacon(NO_ROUTE, 0, NO_ROUTE, NO_ROUTE, NO_ANCESTORS, 12.0).to_body(BEACON_ROOM)
