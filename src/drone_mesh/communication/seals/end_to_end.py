@@ -31,6 +31,7 @@ from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.errors import PacketError
 
 NEW_NONCE_AFTER_S = 5.0  # with the next heartbeat to a gateway
+UNUSED_NONCE_S = 30.0  # while nobody has proved anything for it: on a full channel answers are slow
 # Of a gateway: a restarted router cannot know which sequence numbers it has used, and some hear a
 # gateway's nonce once a minute only.
 NEW_GATEWAY_NONCE_AFTER_S = 60.0
@@ -169,7 +170,10 @@ class EndToEnd:
         if kind == _HEARTBEAT:
             gateway = messages.preferred_gateway(payload)
             is_gateway = gateway == self._node_id
-            lasts_s = NEW_GATEWAY_NONCE_AFTER_S if is_gateway else NEW_NONCE_AFTER_S
+            newest = self._nonces[0]
+            lasts_s = NEW_NONCE_AFTER_S if newest.windows else UNUSED_NONCE_S
+            if is_gateway:
+                lasts_s = NEW_GATEWAY_NONCE_AFTER_S
             if (is_gateway or forward == gateway) and now_s - self._changed_s >= lasts_s:
                 if len(self._nonces) == NONCES:
                     self._expired.append(self._nonces[-1].value)

@@ -110,10 +110,10 @@ def test_an_order_outlives_only_the_next_two_nonces(pair):
     gateway, drone = pair
     kept = [gateway.seal(ORDER, now_s) for now_s in (0.0, 1.0, 2.0)]
     heartbeat = packet("05 05 04 00 00 01 00 00")
-    for now_s in (10.0, 20.0):
+    for now_s in (30.0, 60.0):
         drone.seal(heartbeat, now_s)
     assert drone.open(kept[0])
-    drone.seal(heartbeat, 30.0)
+    drone.seal(heartbeat, 90.0)
     with pytest.raises(NotProven):
         drone.open(kept[1])
 
@@ -124,11 +124,21 @@ def test_an_order_that_was_long_on_its_way_is_late_and_not_forged(pair):
     late = gateway.seal(ORDER, 0.0)
     heartbeat = packet("05 05 04 00 00 01 00 00")
     for turn in range(6):
-        drone.seal(heartbeat, 10.0 + 10.0 * turn)
+        drone.seal(heartbeat, 30.0 + 30.0 * turn)
         if turn >= 2:
             with pytest.raises(Expired if turn < 5 else NotProven) as error:
                 drone.open(late)
     assert not isinstance(error.value, Expired)
+
+
+def test_the_answer_to_a_heartbeat_counts_however_many_followed_within_half_a_minute(pair):
+    """On a full channel it comes later than the next heartbeats leave."""
+    gateway, drone = pair
+    gateway.open(relayed(drone.seal(BEAT, 10.0), to=0))
+    slow = relayed(gateway.seal(ANSWER, 12.0))
+    for now_s in range(14, 40, 4):
+        drone.seal(BEAT, float(now_s))
+    assert drone.open(slow) == relayed(ANSWER)
 
 
 def test_tries_and_copies_of_a_packet_count_as_one(pair):
