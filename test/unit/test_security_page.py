@@ -57,7 +57,7 @@ SENTENCES = [
     f"to the challenger within {antenna.REPEATED_S:g} s",
     f"at most {seal.ANSWERS} of one neighbour and {seal.MOST_ANSWERS} of all in {PAUSE_S:g} s",
     f"remembers the last {seal.NONCES_KEPT} nonces",
-    f"at most every {end_to_end.NEW_NONCE_AFTER_S:g} s",
+    f"at most every {end_to_end.NEW_NONCE_AFTER_S:g} s, or {end_to_end.UNUSED_NONCE_S:g} s while",
     f"Its last {WORDS[end_to_end.NONCES]} nonces are valid",
     f"(one of the {WORDS[end_to_end.EXPIRED]} before the last {WORDS[end_to_end.NONCES]})",
     f"in the {message_seal.ACK_TAG_BYTES} bytes that are left",
@@ -79,7 +79,7 @@ SENTENCES = [
     f"orders {len(claims.ORDERED)} drones away by {claims.ORDERED_M:g} m",
     f"are {claims.ELSEWHERE.longitude * math.sqrt(2) / 1000:.1f} km away; "
     f"then the gateway is off for {claims.OUTAGE_S:g} s",
-    f"a gateway draws one every {end_to_end.NEW_GATEWAY_NONCE_AFTER_S:g} s",
+    f"A gateway draws one every {end_to_end.NEW_GATEWAY_NONCE_AFTER_S:g} s",
     f"and {claims.LIE_M:g} m nearer to it than it is; those *with numbers ahead* are "
     f"{claims.AHEAD} ahead",
     f"promises the next one in {claims.LONGEST_S:g} s, and none for {claims.SILENT_TURNS / 2:g} s",

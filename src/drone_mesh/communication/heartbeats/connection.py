@@ -28,6 +28,7 @@ from drone_mesh.communication.timing import Deadlines, Due, Medium
 _HOPS_UNTIL_KNOWN = 10  # the number of hops for which to wait for the first answer
 RESIGNED_PERIODS = 2.5  # a gateway without internet that is silent for longer is lost
 NONCE_PERIODS = 5.0  # a gateway's nonce is valid for two minutes after it was told
+LONGER = 1.5  # wait after each answer that did not come: more heartbeats would only delay them more
 MAX_AGE_PERIODS = 3  # docs/repair.md, "Places to step back to": of the gateway's place
 
 
@@ -84,6 +85,7 @@ class GatewayConnection:
         )
         self.swallowing = self._relay_check.swallowing
         self._unanswered = 0  # heartbeats in a row
+        self._missed = 0  # answers in a row, while it was not connected
         self._asked_neighbour_s = -math.inf  # for its gateway
         self._moved = False  # since the gateway was last asked for its place
         self._resigned_s = -math.inf  # when the preferred gateway said that it is none now
@@ -178,6 +180,7 @@ class GatewayConnection:
             self.send_heartbeat()
             return
         self._unanswered = 0
+        self._missed += not was_connected
         self._states.happened(RouterEvent.ANSWER_MISSED)
         self._show()
         if was_connected:
@@ -266,7 +269,7 @@ class GatewayConnection:
         self.hops = min(hops, NO_ROUTE)
         self._answered_s = now_s
         self._resigned_s = -math.inf
-        self._unanswered = 0
+        self._unanswered = self._missed = 0
         self._tried = NO_ROUTE
         self._show()
         if is_new:
@@ -375,6 +378,9 @@ class GatewayConnection:
         if self._states.connected:  # else another try costs less than the wait for a lost one
             patient_s = window_s * (1.0 + self._patience())  # it waits in the queues of relays
             window_s = max(window_s, min(patient_s, self._check_period_s))
+        elif medium.policy.asks_in_turn:
+            longer_s = window_s * LONGER**self._missed
+            window_s = max(window_s, min(longer_s, self._check_period_s))
         return window_s
 
     def _asks_a_neighbour(self) -> bool:

@@ -536,6 +536,21 @@ def shared_rig(**numbers):
     return Rig(medium=replace(shared, **numbers))
 
 
+def test_a_router_that_gets_no_answer_asks_after_half_as_long_again_and_a_period_at_most():
+    """A late answer has cost as much as one in time: asking sooner fills the channel."""
+    rig = shared_rig()
+    asked_s = []
+    while len(asked_s) < 9:
+        rig.hear("02 02 04 01 01 01 00 00")  # a neighbour names its gateway
+        if any(packet[4] == 0 for packet in rig.sent(HEARTBEAT)):
+            asked_s.append(rig.now_s)
+        rig.forget()
+        rig.wait(0.05)
+    gaps_s = [later - before for before, later in zip(asked_s, asked_s[1:])]
+    expected_s = [1.5, 2.25, 3.375, 5.0625, 7.59375, 10.0, 10.0, 10.0]
+    assert gaps_s == [pytest.approx(gap_s, abs=0.15) for gap_s in expected_s]
+
+
 def test_a_packet_that_would_go_straight_back_concerns_only_the_neighbour_that_sent_it():
     """For all others the route through this node still works."""
     rig = shared_rig()
