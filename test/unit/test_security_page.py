@@ -181,9 +181,9 @@ With 4 bytes it prints 27.8
 With a key there are up to 9 % more of them: 39,668 instead of 36,412 in 120 s with 100 nodes on
 the disc, 3,198 instead of 3,158 with 25 nodes on the shared channel
 
-16 nodes 6 m apart are connected after 5.0, 5.3 and 5.5 s (three seeds) instead of 2.8, 2.0 and
-2.4 s, 49 nodes after 18, 18 and 19 s instead of 11, 9 and 11 s, and the fleet of the default run,
-18 nodes 1 m apart, after 10 to 16.5 s (16 seeds). On the disc, 25 and 100 nodes
+16 nodes 6 m apart are connected after 4.9, 4.6 and 5.8 s (three seeds) instead of 2.8, 2.0 and
+2.4 s, 49 nodes after 20, 17 and 18 s instead of 11, 9 and 10 s, and the fleet of the default run,
+18 nodes 1 m apart, after 9 to 20 s (16 seeds). On the disc, 25 and 100 nodes
 """
 MEASURED = [" ".join(part.split()) for part in _MEASURED.split("\n\n")]
 
