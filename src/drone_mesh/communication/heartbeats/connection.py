@@ -85,7 +85,7 @@ class GatewayConnection:
         )
         self.swallowing = self._relay_check.swallowing
         self._unanswered = 0  # heartbeats in a row
-        self._missed = 0  # answers in a row, while it was not connected
+        self._missed = 0  # answers in a row to heartbeats that left, while it was not connected
         self._asked_neighbour_s = -math.inf  # for its gateway
         self._moved = False  # since the gateway was last asked for its place
         self._resigned_s = -math.inf  # when the preferred gateway said that it is none now
@@ -180,7 +180,7 @@ class GatewayConnection:
             self.send_heartbeat()
             return
         self._unanswered = 0
-        self._missed += not was_connected
+        self._missed += self._heartbeat_sent_s > -math.inf and not was_connected
         self._states.happened(RouterEvent.ANSWER_MISSED)
         self._show()
         if was_connected:
@@ -375,7 +375,7 @@ class GatewayConnection:
         medium = self._medium
         hops = self.hops if self.hops != NO_ROUTE else _HOPS_UNTIL_KNOWN
         window_s = medium.answer_s + medium.answer_per_hop_s * hops
-        if self._states.connected:  # else another try costs less than the wait for a lost one
+        if self._states.connected:
             patient_s = window_s * (1.0 + self._patience())  # it waits in the queues of relays
             window_s = max(window_s, min(patient_s, self._check_period_s))
         elif medium.policy.asks_in_turn:

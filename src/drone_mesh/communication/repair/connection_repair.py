@@ -391,12 +391,12 @@ class ConnectionRepair(RepairActions):
             return above_ground(step.place)
         place, landing = at_whole_metres(step.place), self._landing(step)
         known = [place, *self._taken.all(), *self._tried_spots]
+        rivals, allows = self._rivals(step), self._taken.allows
         if self.silent:
-            return own_spot(place, self.node_id, self._options, known, self._taken.allows)
-        rivals = self._rivals(step)
+            return own_spot(place, self.node_id, self._options, known, allows, rivals)
         if rivals:
             return spot_beside_rivals(
-                place, self.node_id, rivals, landing, self._options, known, self._taken.allows
+                place, self.node_id, rivals, landing, self._options, known, allows
             )
         return self._taken.at_or_beside(place, landing, self._tried_spots)
 

@@ -78,26 +78,16 @@ def own_spot(
     options: RepairOptions,
     occupied: Sequence[Location] = (),
     allows: Allows = everywhere,
-    landing: Landing | None = None,
-    block: int = BLOCK,
+    rivals: Iterable[int] = (),
 ) -> Location:
-    """The best allowed spot near `place` that belongs to `node` alone and is clear of `occupied`.
+    """The allowed spot nearest to `place` that belongs to `node` alone and is clear of `occupied`.
 
-    The nearest, or for a `landing` the one that keeps most links. Space is a lattice of spots that
-    are clear of each other, divided among the ids 0..255 in blocks of 8 x 8 x 4. So drones that
-    cannot hear each other never land at the same spot. If a fence leaves a drone none in reach of
-    the place, its blocks are smaller: farther away it would find nobody.
+    Space is a lattice of spots that are clear of each other, divided among the ids 0..255 in blocks
+    of 8 x 8 x 4. So drones that cannot hear each other never land at the same spot. If a fence
+    leaves a drone none in reach of the place, where it would find nobody, it takes one of a smaller
+    block that none of `rivals` takes, if they know of `node`, too.
     """
-    links = landing.links if landing else ()
-    spots = sorted(
-        _own_spots(place, node, options.clearance_m, block),
-        key=lambda spot: (_too_long(spot, links, options), place.distance_m(spot)),
-    )
-    best = _first_clear(spots, options.clearance_m, occupied, allows)
-    near = [s for s in spots if place.distance_m(s) <= WITHIN_REACH * options.range_m]
-    if block == min(BLOCKS) or (best in near and allows(best)) or all(map(allows, near)):
-        return best
-    return own_spot(place, node, options, occupied, allows, landing, block // 2)
+    return _own_spot(place, node, rivals, BLOCK, Landing(place), options, occupied, allows)
 
 
 def spot_beside_rivals(
@@ -115,9 +105,56 @@ def spot_beside_rivals(
     spots of an id in large blocks are among its spots in smaller ones, so drones that choose
     different blocks have different spots, too.
     """
+    rivals = list(rivals)
     others = [_class_of(other, block) for block in BLOCKS for other in rivals]
     block = next((b for b in BLOCKS if _class_of(node, b) not in others), BLOCK)
-    return own_spot(place, node, options, occupied, allows, landing, block)
+    return _own_spot(place, node, rivals, block, landing, options, occupied, allows)
+
+
+def _own_spot(
+    place: Location,
+    node: int,
+    rivals: Iterable[int],
+    block: int,
+    landing: Landing,
+    options: RepairOptions,
+    occupied: Sequence[Location],
+    allows: Allows,
+) -> Location:
+    spots = sorted(
+        _own_spots(place, node, options.clearance_m, block),
+        key=lambda spot: (_too_long(spot, landing.links, options), place.distance_m(spot)),
+    )
+    best = _first_clear(spots, options.clearance_m, occupied, allows)
+    reach_m = WITHIN_REACH * options.range_m
+    near = [spot for spot in spots if place.distance_m(spot) <= reach_m]
+    if (best in near and allows(best)) or all(map(allows, near)):
+        return best
+    for smaller in (size for size in reversed(BLOCKS) if size < block):
+        shared = _shared_spots(place, node, rivals, options.clearance_m, smaller)
+        near = [spot for spot in shared if place.distance_m(spot) <= reach_m and allows(spot)]
+        for spot in near:
+            if _is_clear_of(spot, occupied, options.clearance_m):
+                return spot
+    return best
+
+
+def _shared_spots(
+    place: Location, node: int, rivals: Iterable[int], clearance_m: float, block: int
+) -> list[Location]:
+    """The spots of these blocks that none of `rivals` takes, the nearest first.
+
+    Those of larger blocks belong to one of the drones alone; the others are dealt out in turn.
+    """
+    group = _class_of(node, block)
+    sharers = sorted({node, *(r for r in rivals if _class_of(r, block) == group)})
+    kept = [s for one in sharers for s in _own_spots(place, one, clearance_m, 2 * block)]
+    spots = [
+        spot
+        for spot in _own_spots(place, node, clearance_m, block)
+        if _is_clear_of(spot, kept, clearance_m)
+    ]
+    return sorted(spots, key=place.distance_m)[sharers.index(node) :: len(sharers)]
 
 
 def _class_of(node: int, block: int) -> tuple[int, ...]:

@@ -551,6 +551,21 @@ def test_a_router_that_gets_no_answer_asks_after_half_as_long_again_and_a_period
     assert gaps_s == [pytest.approx(gap_s, abs=0.15) for gap_s in expected_s]
 
 
+def test_neighbours_that_are_gone_do_not_make_a_router_wait_longer_for_one_that_is_there():
+    rig = shared_rig()
+    rig.antenna.dead = {2, 3, 4}
+    for gone in (2, 3, 4):
+        rig.hear(f"0{gone} 0{gone} 04 01 01 01 00 00")  # names its gateway, and takes no packet
+    rig.antenna.dead = set()
+    rig.forget()
+    rig.hear("05 05 04 01 01 01 00 00")
+    assert [sent[3] for sent in rig.sent(HEARTBEAT)] == [5]
+    rig.wait(1.6)  # its answer is lost
+    rig.forget()
+    rig.hear("05 05 04 01 01 01 00 00")
+    assert [sent[3] for sent in rig.sent(HEARTBEAT)] == [5]
+
+
 def test_a_packet_that_would_go_straight_back_concerns_only_the_neighbour_that_sent_it():
     """For all others the route through this node still works."""
     rig = shared_rig()

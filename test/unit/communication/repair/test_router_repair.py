@@ -1368,6 +1368,28 @@ def test_where_a_fence_leaves_a_drone_no_spot_of_its_own_it_takes_one_in_reach(n
     assert 1.0 <= goal.distance_m(place) < 9.0
 
 
+@pytest.mark.parametrize("east_m", [0.5, 1.0, 2.0, 3.0])
+@pytest.mark.parametrize("group", [(1, 5), (9, 13), (1, 5, 9), (2, 4, 6, 8), (1, 3, 17, 33)])
+def test_drones_that_a_fence_leaves_few_spots_take_different_ones(east_m, group):
+    place, options = Location(8.7, 0.4, 0.0), RepairOptions(range_m=9.0)
+
+    def allows(spot):
+        return spot.longitude < east_m or spot.distance_m(place) > 9.0
+
+    for silent in (True, False):
+        goals = []
+        for node in group:
+            rivals = sorted({*group} - {node})
+            if silent:
+                goals.append(own_spot(place, node, options, [place], allows, rivals))
+            else:
+                landing = Landing(place)
+                goals.append(
+                    spot_beside_rivals(place, node, rivals, landing, options, [place], allows)
+                )
+        assert all(one.distance_m(two) >= 1.0 for one, two in itertools.combinations(goals, 2))
+
+
 def beside_rivals(place, node, rivals, links=()):
     """Where `node` lands beside a lost node at `place` that may still be there."""
     landing = Landing(Location(0.0, 0.0, 0.0), links)

@@ -206,6 +206,16 @@ def test_a_nonce_that_somebody_claims_in_the_drones_name_silences_no_order(pair)
             assert drone.open(relayed(gateway.seal(ORDER, now_s + 1.0)))
 
 
+def test_a_nonce_that_was_answered_is_replaced_after_five_seconds(pair):
+    gateway, drone = pair
+    beats(gateway, drone, 10.0)
+    kept = gateway.seal(ORDER, 11.0)
+    for now_s in (15.0, 20.0, 25.0):
+        beats(gateway, drone, now_s)
+    with pytest.raises(Expired):
+        drone.open(relayed(kept))
+
+
 def test_the_proof_of_a_heartbeat_covers_its_nonce(pair):
     gateway, drone = pair
     beats(gateway, drone, 0.0)
