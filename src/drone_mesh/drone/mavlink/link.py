@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import logging
 import select
 import socket
+import termios
 import time
 from typing import Protocol
 
@@ -34,7 +36,7 @@ class Line(Protocol):
         """Send these bytes."""
 
     def forget_peer(self) -> None:
-        """Accept the next peer that sends, if the line can have several."""
+        """Accept another peer, if the line can have one."""
 
     def close(self) -> None:
         """Close the connection."""
@@ -53,6 +55,8 @@ class SerialLine:
             if error.errno == errno.EAGAIN:
                 raise OSError("another program uses the port; is a node running?") from error
             raise
+        except termios.error as error:  # it vanished meanwhile; this one is no OSError
+            raise OSError(*error.args) from error
 
     def receive(self, timeout_s: float) -> bytes:
         self._port.timeout = timeout_s
@@ -97,17 +101,22 @@ class TcpLine:
 
 
 class UdpLine:
-    """UDP: with `listens` the address is local and any peer may begin, else it is the peer's."""
+    """UDP: with `listens` the address is local and any peer may begin, else it is the peer's.
+
+    The name of a peer is looked up only here and after a silence: a name server that does not
+    answer would keep the drone from its targets.
+    """
 
     def __init__(self, host: str, port: int, listens: bool) -> None:
         """Raises OSError for an address that is not available."""
+        self._host = host
         self._listens = listens
-        self._peer = None if listens else (host, port)
+        self._peer: tuple[str, int] | None = None
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             self._socket.bind((host, port) if listens else ("", 0))
             if not listens:
-                socket.gethostbyname(host)
+                self._peer = socket.gethostbyname(host), port
         except OSError:
             self._socket.close()
             raise
@@ -122,7 +131,7 @@ class UdpLine:
         data, peer = self._socket.recvfrom(MOST_BYTES)
         if self._peer is None:
             self._peer = peer  # the first to send; no other peer can take over the drone
-        return data if peer == self._peer or self._is_peer(peer) else b""
+        return data if peer == self._peer else b""
 
     def send(self, data: bytes) -> None:
         if self._peer is not None:
@@ -131,13 +140,12 @@ class UdpLine:
     def forget_peer(self) -> None:
         if self._listens:
             self._peer = None
+        elif self._peer is not None:
+            with contextlib.suppress(OSError):  # its name may have another address now
+                self._peer = socket.gethostbyname(self._host), self._peer[1]
 
     def close(self) -> None:
         self._socket.close()
-
-    def _is_peer(self, sender: tuple[str, int]) -> bool:
-        peer = self._peer
-        return peer is not None and (socket.gethostbyname(peer[0]), peer[1]) == sender
 
 
 def parse_address(text: str) -> tuple[str, str, int]:
