@@ -13,6 +13,7 @@ import math
 import ssl
 import sys
 import threading
+import time
 from concurrent.futures import Future
 from pathlib import Path
 from typing import Any, Callable
@@ -44,6 +45,7 @@ STATE_PERIOD_S = 5.0
 RETRY_S = 0.5  # pause after the mesh's queue was full
 RETAINED = "retained messages are not sent: each new connection would send them again"
 _DELAYS_S = (1, 30)  # shortest and longest pause between attempts to connect
+SHORT_S, SHORT_ONES = 60.0, 3  # after so many short connections in a row the pause is the longest
 
 _log = logging.getLogger(__name__)
 
@@ -52,11 +54,14 @@ class _Unacknowledged:
     """A message from the broker that is not acknowledged yet."""
 
     def __init__(self, message: mqtt.MQTTMessage) -> None:
-        self._content = message.topic, message.payload
+        self.message = message
         self.is_over = False  # delivered in the mesh, refused or given up
 
-    def is_of(self, message: mqtt.MQTTMessage) -> bool:
-        return self._content == (message.topic, message.payload)
+    def comes_again_as(self, message: mqtt.MQTTMessage) -> bool:
+        """Whether the broker repeats it. A restored one may use its packet id for another."""
+        known = self.message
+        is_same = known.topic == message.topic and known.payload == message.payload
+        return message.dup and is_same
 
 
 class MqttInternet(IInternetConnection):
@@ -99,9 +104,10 @@ class MqttInternet(IInternetConnection):
         # Messages whose acknowledgement the broker has not received, by packet id. Under the lock.
         self._unacknowledged: dict[int, _Unacknowledged] = {}
         self._dropped = 0
+        self._client_id = f"drone_mesh-{broker.mesh}-{self._node}"
         self._client = mqtt.Client(
             CallbackAPIVersion.VERSION2,
-            client_id=f"drone_mesh-{broker.mesh}-{self._node}",
+            client_id=self._client_id,
             clean_session=False,  # the broker keeps messages while this program is offline
             manual_ack=True,
         )
@@ -124,6 +130,8 @@ class MqttInternet(IInternetConnection):
         self._client.on_message = self._on_message
         self._threads: list[threading.Thread] = []
         self._complained = False
+        self._connected_s = -math.inf
+        self._short_ones = 0  # connections in a row
 
     def connect(self, commands: IGatewayCommands) -> None:
         """Connect as soon as the broker answers; returns at once."""
@@ -226,14 +234,13 @@ class MqttInternet(IInternetConnection):
     def _receive(self, message: mqtt.MQTTMessage) -> None:
         with self._lock:
             known = self._unacknowledged.get(message.mid)
-            # A restored broker may reuse the packet id for another message.
-            is_again = message.dup and known is not None and known.is_of(message)
-            if not is_again:
+            is_new = known is None or not known.comes_again_as(message)
+            if is_new:
                 self._unacknowledged[message.mid] = _Unacknowledged(message)
-        if not is_again:
+        if is_new:
             self._hand_in(message)
         elif known is not None and known.is_over:  # the connection broke before it was acknowledged
-            self._acknowledge(message)
+            self._acknowledge(known.message)
 
     def _hand_in(self, message: mqtt.MQTTMessage) -> None:
         destination = self._topics.destination(message.topic)
@@ -264,8 +271,9 @@ class MqttInternet(IInternetConnection):
     def _acknowledge(self, message: mqtt.MQTTMessage) -> None:
         with self._lock:
             known = self._unacknowledged.get(message.mid)
-            if known is not None and known.is_of(message):
-                known.is_over = True
+            if known is None or known.message is not message:
+                return  # the broker has lost that session: its packet id is another message's now
+            known.is_over = True
         if self._client.ack(message.mid, message.qos) == mqtt.MQTT_ERR_SUCCESS:
             with self._lock:
                 self._unacknowledged.pop(message.mid, None)
@@ -296,6 +304,7 @@ class MqttInternet(IInternetConnection):
             self._complain(f"refuses the connection: {reason}")
             return
         self._complained = False
+        self._connected_s = time.monotonic()
         self._internet_works(True)
         _log.info("MQTT: connected to %s, mesh %s", self._broker.url, self._broker.mesh)
         if self._sends:
@@ -318,8 +327,16 @@ class MqttInternet(IInternetConnection):
         reason: ReasonCode,
         _properties: Properties | None,
     ) -> None:
-        if not self._stopped.is_set() and reason.is_failure:
-            self._complain("broke the connection")
+        if self._stopped.is_set() or not reason.is_failure:
+            return
+        is_short = time.monotonic() - self._connected_s < SHORT_S
+        self._short_ones = self._short_ones + 1 if is_short else 0
+        what, delay_s = "broke the connection", _DELAYS_S[0]
+        if self._short_ones >= SHORT_ONES:  # as a broker does with two that have one id
+            what += f" soon again (does another program use the client id {self._client_id}?)"
+            delay_s = _DELAYS_S[1]
+        self._client.reconnect_delay_set(delay_s, _DELAYS_S[1])
+        self._complain(what)
 
     def _complain(self, what: str) -> None:
         """Log one line per outage."""

@@ -16,6 +16,7 @@ import paho.mqtt.client as mqtt
 import pytest
 from paho.mqtt.enums import CallbackAPIVersion
 
+from drone_mesh.communication.data.outgoing import LIFETIME_S
 from drone_mesh.communication.events.observer import MeshEvent, MeshEventKind
 from drone_mesh.communication.node.gateway import MeshnetworkGateway
 from drone_mesh.drone.location import Location
@@ -308,6 +309,28 @@ def test_a_retained_message_is_sent_by_no_new_connection_and_an_event_says_why(
     assert [message.payload for message in gateway.network.received[1]] == [b"blink"]
 
 
+def test_two_gateways_with_one_client_id_do_not_throw_each_other_out_for_ever(
+    broker, gateway, caplog
+):
+    def throws_it_out():
+        other = mqtt.Client(CallbackAPIVersion.VERSION2, "drone_mesh-field-0")
+        other.connect("127.0.0.1", broker.port)
+        other.loop_start()
+        gateway.wait_for("it is out", lambda: not gateway.internet._client.is_connected())
+        other.disconnect()
+        other.loop_stop()
+
+    for _ in range(3):
+        gateway.wait_for("a connection", gateway.internet._client.is_connected)
+        throws_it_out()
+    time.sleep(4.0)
+    assert not gateway.internet._client.is_connected()
+    lines = [record.getMessage() for record in caplog.records if "the broker" in record.message]
+    assert len(lines) == 3
+    assert "does another program use the client id drone_mesh-field-0?" in lines[-1]
+    assert not any("client id" in line for line in lines[:-1])
+
+
 class BrokenBroker:
     """It answers CONNECT and SUBSCRIBE; then it sends `broken`, once, and each time `good`."""
 
@@ -366,6 +389,76 @@ def test_nothing_that_a_broken_broker_sends_ends_the_connection_for_good(broken)
     finally:
         gateway.close()
     assert not [thread for thread in threading.enumerate() if "MQTT" in thread.name]
+
+
+class ForgetfulBroker:
+    """It loses its sessions with each connection, and numbers its messages from 1 again."""
+
+    def __init__(self):
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self.port = self._listener.getsockname()[1]
+        self.acknowledged = 0
+
+    def connect(self, payload):
+        """Await the gateway, and publish this for node 1."""
+        connection, _address = self._listener.accept()
+        connection.settimeout(PATIENCE_S)
+        while True:
+            request = connection.recv(65536)
+            if request[0] == 0x10:
+                connection.sendall(bytes.fromhex("20 02 00 00"))
+            elif request[0] == 0x82:
+                connection.sendall(b"\x90\x04" + request[2:4] + b"\x01\x01")
+                break
+        connection.sendall(publish_packet(b"drone_mesh/field/1/tx", payload, 1))
+        threading.Thread(target=self._read, args=(connection,), daemon=True).start()
+        return connection
+
+    def _read(self, connection):
+        data = b""
+        while True:
+            try:
+                more = connection.recv(65536)
+            except OSError:
+                return
+            if not more:
+                return
+            data += more
+            self.acknowledged = data.count(bytes.fromhex("40 02 00 01"))
+
+
+@pytest.mark.parametrize("new", [b"new", b"old"])
+def test_a_message_of_a_lost_session_does_not_acknowledge_the_one_that_has_its_number_now(new):
+    broker = ForgetfulBroker()
+    gateway = Gateway(Broker("127.0.0.1", broker.port, False, "field"))
+    component, now = gateway.network.nodes[0].component, gateway.network.clock
+    gateway.submit(lambda _now_s: gateway.network.power(1, False))
+
+    def queued():
+        return component.data.figures().messages_queued
+
+    def run_until(end_s):
+        while now.now_s < end_s:
+            gateway.submit(lambda _now_s: None)
+            time.sleep(0.001)
+
+    try:
+        first = broker.connect(b"old")
+        gateway.wait_for("the old message", lambda: queued() == 1)
+        ends_s = now.now_s + LIFETIME_S
+        run_until(now.now_s + 60.0)
+        first.shutdown(socket.SHUT_RDWR)
+        second = broker.connect(new)
+        gateway.wait_for("the new message", lambda: queued() == 2)
+        run_until(ends_s + 5.0)
+        gateway.wait_for("the end of the old one", lambda: queued() == 1)
+        time.sleep(0.5)
+        assert broker.acknowledged == 0
+        run_until(ends_s + 80.0)
+        gateway.wait_for("the end of the new one", lambda: broker.acknowledged == 1)
+        second.close()
+    finally:
+        gateway.close()
 
 
 def test_what_happens_to_a_node_is_published(gateway, client):
