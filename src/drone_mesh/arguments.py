@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 import math
 import re
-from typing import Callable
+from typing import Any, Callable
 
 MOST = 10**9  # for numbers without a bound of their own
 
@@ -42,6 +42,17 @@ def finite(text: str) -> float:
     if not abs(number) <= MOST:
         raise ValueError(f"{text[:40]!r} is not a number")
     return number
+
+
+class ArgumentParser(argparse.ArgumentParser):
+    """Takes what begins as a negative number for a value, as newer versions of argparse do.
+
+    The others take `-1e3`, and places such as `-33.9,151.2,3`, for options.
+    """
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self._negative_number_matcher = re.compile(r"-\.?[0-9]")
 
 
 def whole(lowest: int, highest: int) -> Callable[[str], int]:

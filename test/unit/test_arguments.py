@@ -6,7 +6,7 @@ import argparse
 
 import pytest
 
-from drone_mesh.arguments import decimal, finite, whole
+from drone_mesh.arguments import ArgumentParser, decimal, finite, whole
 
 
 @pytest.mark.parametrize(("text", "number"), [("0", 0), ("-3", -3), ("007", 7), ("12", 12)])
@@ -40,3 +40,14 @@ def test_numbers_in_files_are_decimal_as_other_programs_write_them(text, number)
 def test_what_only_python_takes_for_a_number_is_none(text):
     with pytest.raises(ValueError, match="is not a number"):
         finite(text)
+
+
+@pytest.mark.parametrize("text", ["-3", "-.5", "-1e3", "-33.86,151.21,3"])
+def test_what_begins_as_a_negative_number_is_a_value_and_no_option(text):
+    parser = ArgumentParser()
+    parser.add_argument("--origin")
+    parser.add_argument("x")
+    parsed = parser.parse_args(["--origin", text, text])
+    assert (parsed.origin, parsed.x) == (text, text)
+    with pytest.raises(SystemExit):
+        parser.parse_args([text, "-x"])

@@ -33,6 +33,7 @@ from drone_mesh.state.model import EventRecord
 from drone_mesh.state.orders import CLOCKS_DIFFER_S, OrderProgress
 from drone_mesh.web.access import Allowance
 
+STREAM_PERIOD_S = 1.0  # least time between two orders from a stream of targets
 SAY_PERIOD_S = 10.0  # of why a stream of targets is not followed
 
 OrderDrone = Callable[[int, Location, Callable[[str], None]], None]
@@ -245,8 +246,8 @@ class Desk:
 
     def _give(self, vehicle: Vehicle, message: Message, station: object) -> None:
         node, now_s, latest = vehicle.node, self._fleet.now_s, self._orders.get(vehicle.node)
-        is_stream = message.get_type().startswith("SET_POSITION")  # one a second is enough
-        if is_stream and latest is not None and latest.given_s == now_s:
+        is_stream = message.get_type().startswith("SET_POSITION")
+        if is_stream and latest is not None and now_s < latest.given_s + STREAM_PERIOD_S:
             return
         acknowledge = self._acknowledge(node, message, station)
         try:

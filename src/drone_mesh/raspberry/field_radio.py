@@ -12,7 +12,7 @@ from drone_mesh.nrf24.errors import RadioError
 from drone_mesh.nrf24.link import ChipLink
 from drone_mesh.nrf24.pins import CePin, SpiDevice
 from drone_mesh.nrf24.registers import Command, Register
-from drone_mesh.nrf24.settings import RadioSettings
+from drone_mesh.nrf24.settings import BroadcastMode, RadioSettings
 from drone_mesh.nrf24.transceiver import Transceiver
 
 TEST_TYPE = 255  # type of the field tools' packets; no node processes it
@@ -93,7 +93,10 @@ class FieldRadio:
     def raise_flag(self) -> None:
         """Send a packet and leave its flag set, and so the IRQ pin low, until `set_up`."""
         self._chip.become_transmitter(self.settings.broadcast_address)
-        self.link.command(Command.W_TX_PAYLOAD_NO_ACK, bytes(PAYLOAD_BYTES))
+        # A chip without "+" knows no packets without acknowledgement; it raises MAX_RT soon after.
+        plain = self.settings.broadcast_mode is BroadcastMode.SHOCKBURST
+        command = Command.W_TX_PAYLOAD if plain else Command.W_TX_PAYLOAD_NO_ACK
+        self.link.command(command, bytes(PAYLOAD_BYTES))
         self._ce.value = True
         self.runtime.sleep(2 * self.settings.broadcast_s)
         self._ce.value = False

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import argparse
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Mapping, Sequence
 
-from drone_mesh.arguments import decimal, whole
+from drone_mesh.arguments import ArgumentParser, decimal, whole
 from drone_mesh.channel.antenna import DEBUG_PERIOD_S
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.communication.node.node_configuration import ROUTING_TECHNIQUES, NodeConfiguration
@@ -21,7 +21,7 @@ from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError, MeshError, naming_argument
 from drone_mesh.ground_station.settings import NO_STATIONS, GroundStationSettings
 from drone_mesh.internet.http_settings import HttpSettings
-from drone_mesh.nrf24.settings import DATA_RATES, BroadcastMode, RadioSettings, TxPower
+from drone_mesh.nrf24.settings import RadioSettings, TxPower
 from drone_mesh.raspberry.connection_options import (
     AirOptions,
     MqttOptions,
@@ -37,8 +37,9 @@ from drone_mesh.raspberry.connection_options import (
 from drone_mesh.raspberry.flight_options import add_flight_options, flight_options
 from drone_mesh.raspberry.wiring_options import (
     Hardware,
-    add_channel_options,
+    add_common_options,
     add_wiring_options,
+    common_settings,
     wired_hardware,
 )
 from drone_mesh.settings import settings_of, with_settings
@@ -46,8 +47,6 @@ from drone_mesh.settings import settings_of, with_settings
 MOST_EMULATED = 17  # as in the field case, and what one machine can emulate
 CHECK_DRONE = "check-drone"  # the last argument of raspberry_router
 LOG_LEVELS = ("debug", "info", "warning", "error")
-
-_BROADCASTS = {mode.value: mode for mode in BroadcastMode}
 
 OUTDOORS = with_settings(
     NodeConfiguration,
@@ -142,14 +141,14 @@ def parse_gateway(
 
 
 def _parser(program: str, description: str) -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = ArgumentParser(
         program,
         description=description,
         epilog="All nodes of a mesh need the same channel, rate, CRC and broadcast mode.",
     )
     add_wiring_options(parser)
     radio = parser.add_argument_group("radio")
-    add_channel_options(radio)
+    add_common_options(radio)
     radio.add_argument(
         "--power",
         type=int,
@@ -157,21 +156,6 @@ def _parser(program: str, description: str) -> argparse.ArgumentParser:
         default=TxPower.DBM_0.value,
         help="transmit power in dBm, before the amplifier if the module has one; the limit in "
         "Europe is 100 mW (20 dBm) after the amplifier (default: %(default)s)",
-    )
-    radio.add_argument(
-        "--crc",
-        type=int,
-        choices=(8, 16),
-        default=8 * RadioSettings.crc_bytes,
-        help="length of the CRC in bits; 8 if a node runs the software of 2019 "
-        "(default: %(default)s)",
-    )
-    radio.add_argument(
-        "--broadcast",
-        choices=_BROADCASTS,
-        default=BroadcastMode.NO_ACK.value,
-        help="broadcast mode; shockburst if a node has a clone of the chip or a chip without '+' "
-        "(default: %(default)s)",
     )
     mesh = parser.add_argument_group("mesh")
     add_node_settings(mesh)
@@ -276,13 +260,7 @@ def _options(
         return Options(
             node_id=parsed.id or 0,
             hardware=wired_hardware(parsed),
-            radio=RadioSettings(
-                channel=parsed.channel,
-                data_rate=DATA_RATES[parsed.rate],
-                power=TxPower(parsed.power),
-                crc_bytes=parsed.crc // 8,
-                broadcast_mode=_BROADCASTS[parsed.broadcast],
-            ),
+            radio=replace(common_settings(parsed), power=TxPower(parsed.power)),
             mesh=_node_configuration(parsed),
             location=location,
             flight=flight_options(parsed),

@@ -28,8 +28,9 @@ from drone_mesh.raspberry import radio_tests, range_test
 from drone_mesh.raspberry.field_radio import FieldRadio
 from drone_mesh.raspberry.node_reports import version
 from drone_mesh.raspberry.wiring_options import (
-    add_channel_options,
+    add_common_options,
     add_wiring_options,
+    common_settings,
     wired_hardware,
 )
 from drone_mesh.stopping import ends_as
@@ -142,7 +143,7 @@ def _model() -> str:
 
 @contextlib.contextmanager
 def _opened(options: argparse.Namespace) -> Iterator[tuple[FieldRadio, IrqPin | None]]:
-    settings = RadioSettings(channel=options.channel, data_rate=DATA_RATES[options.rate])
+    settings = common_settings(options)
     spi: SpiDevice
     ce: CePin
     irq: IrqPin | None
@@ -200,7 +201,7 @@ def _parser() -> argparse.ArgumentParser:
         default=MAX_NODE_ID,
         help="id of this radio (default: %(default)s)",
     )
-    add_channel_options(parser)
+    add_common_options(parser)
     parser.add_argument(
         "--emulated",
         type=decimal(0.1, FARTHEST_M),

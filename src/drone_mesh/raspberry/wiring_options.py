@@ -1,4 +1,4 @@
-"""The wiring of a radio and its channel: options that the programs of a Pi share."""
+"""The wiring of a radio and its settings: options that the programs of a Pi share."""
 
 from __future__ import annotations
 
@@ -18,10 +18,11 @@ from drone_mesh.nrf24.pins import (
     SpiDevice,
     open_spi,
 )
-from drone_mesh.nrf24.settings import DATA_RATES, DEFAULT_RATE, RadioSettings
+from drone_mesh.nrf24.settings import DATA_RATES, DEFAULT_RATE, BroadcastMode, RadioSettings
 
 HIGHEST_GPIO = 27  # of the 40-pin header
 SPI_HZ_RANGE = (10_000, 10_000_000)  # [DS 8.3.2]: 10 MHz at most
+_BROADCASTS = {mode.value: mode for mode in BroadcastMode}
 
 
 @dataclass(frozen=True)
@@ -81,8 +82,8 @@ def wired_hardware(parsed: argparse.Namespace) -> Hardware:
     return Hardware(parsed.spi, parsed.ce, parsed.irq, parsed.spi_hz)
 
 
-def add_channel_options(group: argparse._ActionsContainer) -> None:
-    """Add where on the air a radio is: its channel and rate."""
+def add_common_options(group: argparse._ActionsContainer) -> None:
+    """Add what all radios of a mesh have in common."""
     group.add_argument(
         "--channel",
         type=whole(0, 125),
@@ -94,6 +95,30 @@ def add_channel_options(group: argparse._ActionsContainer) -> None:
         choices=DATA_RATES,
         default=DEFAULT_RATE,
         help="data rate in bits per second (default: %(default)s)",
+    )
+    group.add_argument(
+        "--crc",
+        type=int,
+        choices=(8, 16),
+        default=8 * RadioSettings.crc_bytes,
+        help="length of the CRC in bits; 8 if a node runs the software of 2019 "
+        "(default: %(default)s)",
+    )
+    group.add_argument(
+        "--broadcast",
+        choices=_BROADCASTS,
+        default=BroadcastMode.NO_ACK.value,
+        help="broadcast mode; shockburst if a node has a clone of the chip or a chip without '+' "
+        "(default: %(default)s)",
+    )
+
+
+def common_settings(parsed: argparse.Namespace) -> RadioSettings:
+    return RadioSettings(
+        channel=parsed.channel,
+        data_rate=DATA_RATES[parsed.rate],
+        crc_bytes=parsed.crc // 8,
+        broadcast_mode=_BROADCASTS[parsed.broadcast],
     )
 
 

@@ -190,6 +190,15 @@ def test_a_stream_of_targets_is_one_order_and_its_refusal_is_said_once():
     assert sum(len(looker.ask(target(*IN_UNITS))) for _ in range(10)) == 2  # one text in two parts
 
 
+def test_of_a_stream_one_order_a_second_is_taken_though_a_simulation_shows_the_mesh_more_often():
+    rig = DeskRig()
+    for step in range(10):
+        now_s = 101.0 + 0.2 * step
+        rig.fleet.show([drone(0, now_s), drone(3, now_s, flying=True)], now_s)
+        rig.ask(target(520000700 + step * 100, 50000000))
+    assert len(rig.ordered) == 2
+
+
 def test_the_mode_is_what_the_drone_does_not_what_was_asked():
     rig = DeskRig()
     rig.ask(long(mavlink.MAV_CMD_NAV_LAND))

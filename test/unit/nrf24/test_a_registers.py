@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from chip_lab import PAYLOAD
 
+from drone_mesh.nrf24.emulator.fifos import Incoming
 from drone_mesh.nrf24.emulator.frames import Frame, FrameFormat, frame_crc
 from drone_mesh.nrf24.registers import Command, Register
 
@@ -85,6 +86,20 @@ def test_row_06_activate_toggles_access_in_the_chip_without_plus(lab):
     assert wires.byte(Register.FEATURE) == 0x05
     wires.command(Command.ACTIVATE, b"\x73")
     assert wires.byte(Register.FEATURE) == 0x00
+
+
+def test_row_06_commands_that_the_chip_without_plus_has_not_activated_do_nothing(lab):
+    """nRF24L01 Product Specification 2.0, p. 46: a write has no effect, a read gives zeros."""
+    old = lab.wires("old", plus=False)
+    old.command(Command.W_TX_PAYLOAD_NO_ACK, b"\x55" * 32)
+    old.command(Command.W_ACK_PAYLOAD, b"\x55" * 32)
+    assert old.byte(Register.FIFO_STATUS) == 0x11  # both FIFOs are empty
+    old.chip.rx_fifo.push(Incoming(2, PAYLOAD, 32))
+    assert old.command(Command.R_RX_PL_WID, b"\0") == b"\0"
+    old.command(Command.ACTIVATE, b"\x73")
+    assert old.command(Command.R_RX_PL_WID, b"\0") == b"\x20"
+    old.command(Command.W_TX_PAYLOAD_NO_ACK, b"\x55" * 32)
+    assert old.byte(Register.FIFO_STATUS) == 0x00
 
 
 def test_row_07_registers_and_fifos_survive_power_down(lab):

@@ -12,11 +12,12 @@ from drone_mesh.channel.runtime import Runtime
 from drone_mesh.communication.wire.messages import IntroduceMessage
 from drone_mesh.nrf24.emulator.air import Air
 from drone_mesh.nrf24.emulator.chip import EmulatedChip
+from drone_mesh.nrf24.emulator.chip_core import ChipVariant
 from drone_mesh.nrf24.emulator.clock import WallClock
 from drone_mesh.nrf24.emulator.links import LogDistance
 from drone_mesh.nrf24.errors import RadioError
 from drone_mesh.nrf24.registers import Register
-from drone_mesh.nrf24.settings import DataRate, RadioSettings
+from drone_mesh.nrf24.settings import BroadcastMode, DataRate, RadioSettings
 from drone_mesh.raspberry import radio_tests
 from drone_mesh.raspberry.field_radio import FieldRadio
 from drone_mesh.raspberry.options import parse_gateway
@@ -42,8 +43,8 @@ class Rig:
         self.chip = EmulatedChip(self.air, "radio")
         self.radio = self.make(self.chip, 253)
 
-    def make(self, chip: EmulatedChip, node_id: int, ce=None) -> FieldRadio:
-        return FieldRadio(chip.spi, ce or chip.ce, node_id, SETTINGS, self.clock.runtime)
+    def make(self, chip: EmulatedChip, node_id: int, ce=None, settings=SETTINGS) -> FieldRadio:
+        return FieldRadio(chip.spi, ce or chip.ce, node_id, settings, self.clock.runtime)
 
     def check(self) -> list[str]:
         return list(radio_tests.check(self.radio, self.chip.irq))
@@ -61,6 +62,28 @@ def test_a_good_radio_passes_every_check(rig):
     assert len(lines) == 5
     assert all(line.startswith("ok ") for line in lines)
     assert rig.chip.warnings == []
+
+
+def test_a_chip_without_plus_passes_with_the_settings_that_it_needs(rig):
+    rig.chip = EmulatedChip(rig.air, "old", variant=ChipVariant(plus=False))
+    plain = RadioSettings(data_rate=DataRate.MBPS_1, broadcast_mode=BroadcastMode.SHOCKBURST)
+    rig.radio = rig.make(rig.chip, 253, settings=plain)
+    lines = rig.check()
+    assert [line[:3] for line in lines] == ["ok "] * 5, lines
+    assert rig.chip.warnings == []
+
+
+def test_a_tool_takes_what_all_radios_of_a_mesh_have_in_common(monkeypatch, capsys):
+    monkeypatch.setattr(radio_tests, "check", lambda radio, _irq: [str(radio.settings)])
+    line = "--emulated 30 --channel 82 --rate 1M --crc 8 --broadcast shockburst check"
+    assert main(line.split()) == 0
+    wanted = RadioSettings(
+        channel=82,
+        data_rate=DataRate.MBPS_1,
+        crc_bytes=1,
+        broadcast_mode=BroadcastMode.SHOCKBURST,
+    )
+    assert capsys.readouterr().out == f"{wanted}\n"
 
 
 def test_without_a_chip_the_wiring_is_named(rig):

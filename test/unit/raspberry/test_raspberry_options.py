@@ -152,6 +152,14 @@ def test_each_option_reaches_what_it_is_for():
     )
 
 
+def test_a_value_south_or_west_of_the_origin_is_not_taken_for_an_option():
+    line = "--id 3 --origin -33.86,151.21,3 --latitude -.5 --longitude -1e1 --power -6"
+    options = parse_router(line.split(), {})
+    assert options.flight.origin == Origin(-33.86, 151.21, 3.0)
+    assert options.location == Location(latitude=-0.5, longitude=-10.0, height=0.0)
+    assert options.radio.power is TxPower.DBM_MINUS_6
+
+
 def test_a_gateway_is_node_0_and_serves_this_machine_alone():
     options = parse_gateway([], {})
     assert options.node_id == 0

@@ -24,7 +24,16 @@ from drone_mesh.nrf24.registers import (
 _REGISTERS = {int(register): register for register in Register}
 _REGISTER_MASK = 0x1F
 _ACTIVATE_KEY = 0x73
-_ADVANCED = (Register.DYNPD, Register.FEATURE)  # locked in the chip without "+"
+# Locked in the chip without "+" until ACTIVATE: a write has no effect, a read gives zeros (nRF24L01
+# Product Specification 2.0, p. 46).
+_ADVANCED = (Register.DYNPD, Register.FEATURE)
+_ADVANCED_COMMANDS = frozenset(
+    (
+        Command.R_RX_PL_WID,
+        Command.W_TX_PAYLOAD_NO_ACK,
+        *range(Command.W_ACK_PAYLOAD, Command.W_ACK_PAYLOAD + PIPES),
+    )
+)
 _ACTIVE = SENDING | ANSWERING | {State.RX_SETTLING, State.RX}
 
 
@@ -39,6 +48,8 @@ class CommandDecoder:
     def execute(self, mosi: bytes) -> bytes:
         """Execute a command; returns the bytes that leave while those after the command arrive."""
         command, data = mosi[0], mosi[1:]
+        if command in _ADVANCED_COMMANDS and not self._advanced_unlocked:
+            return bytes(len(data))
         if command < Command.W_REGISTER:
             return self._read(command & _REGISTER_MASK, len(data))
         if command < 2 * Command.W_REGISTER:

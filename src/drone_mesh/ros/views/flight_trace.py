@@ -8,6 +8,7 @@ from typing import Sequence, Tuple
 
 import rospy
 
+from drone_mesh.arguments import ArgumentParser
 from drone_mesh.earth_files import WRITERS, tracks_of
 from drone_mesh.errors import ConfigurationError, MeshError
 from drone_mesh.mobility.trace_files import write_csv
@@ -22,7 +23,7 @@ Position = Tuple[float, int, Sequence[float]]
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
+    parser = ArgumentParser(
         prog="rosrun drone_mesh flight_trace",
         description="Writes the positions in a recording as CSV (t,id,x,y,z; seconds from its "
         "start, metres), which mobility of kind trace replays, or as tracks in GeoJSON or KML.",

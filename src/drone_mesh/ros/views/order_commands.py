@@ -12,7 +12,7 @@ from pathlib import Path
 import rospy
 
 from drone_mesh import srv
-from drone_mesh.arguments import decimal, whole
+from drone_mesh.arguments import ArgumentParser, decimal, whole
 from drone_mesh.communication.interfaces import MAX_NODE_ID, OrderState
 from drone_mesh.drone.goal import MAX_COORDINATE_M, MAX_HEIGHT_M
 from drone_mesh.drone.location import Location
@@ -39,7 +39,7 @@ SHOW_EVERY_S = 2.0  # simulated
 
 
 def fly() -> None:
-    parser = argparse.ArgumentParser(
+    parser = ArgumentParser(
         prog="rosrun drone_mesh fly",
         description="Orders a drone to a place, through the mesh, and shows how far it is. "
         "After Ctrl-C the drone flies on.",
@@ -61,17 +61,9 @@ def fly() -> None:
         action="store_true",
         help="order it although it, or another drone, would have no route to a gateway then",
     )
-    options = parser.parse_args(_with_negative_numbers(rospy.myargv()[1:]))
+    options = parser.parse_args(rospy.myargv()[1:])
     goal = Location(latitude=options.y, longitude=options.x, height=float(options.height))
     run_tool("fly", lambda: _fly(options.drone, goal, options.out_of_reach))
-
-
-def _with_negative_numbers(words: list[str]) -> list[str]:
-    """The numbers after "--", as argparse would take one such as -1e3 for an option."""
-    if {"-h", "--help"} & set(words):
-        return words
-    options = [word for word in words if word == OUT_OF_REACH]
-    return [*options, "--", *(word for word in words if word != OUT_OF_REACH)]
 
 
 def _fly(drone: int, goal: Location, out_of_reach: bool) -> int:
@@ -130,7 +122,7 @@ def _follow_flight(
 
 
 def layout() -> None:
-    parser = argparse.ArgumentParser(
+    parser = ArgumentParser(
         prog="rosrun drone_mesh layout",
         description="Sends the drones of a layout to their places, and shows how far they are. "
         "They set out one after the other, so that none meets another and the mesh holds. "
