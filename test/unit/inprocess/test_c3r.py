@@ -35,6 +35,19 @@ def test_neighbours_hold_the_place_in_turn_and_return_until_each_had_its_turns(r
         assert (here.longitude, here.latitude) == pytest.approx(PLACES[node], abs=0.1)
 
 
+@pytest.mark.parametrize(("routing", "cut_off_s"), [("beacon", 11.0), ("child_table_tree", 26.0)])
+def test_at_a_change_of_turns_the_group_is_cut_off_for_seconds(routing, cut_off_s):
+    network = placed(PLACES, repair="c3r", routing=routing)
+    network.run_for(40.0)
+    network.power(1, False)
+    assert network.run_until(lambda: events(network, "FLIGHT_DECIDED"), 100.0)
+    assert network.run_until(network.all_connected, 20.0)
+    network.run_until(lambda: not network.all_connected(), 100.0)
+    left_s = network.clock.now_s
+    assert network.run_until(network.all_connected, 60.0)
+    assert network.clock.now_s - left_s == pytest.approx(cut_off_s, abs=1.0)
+
+
 @pytest.mark.parametrize("routing", ["beacon", "child_table_tree"])
 def test_who_leaves_has_given_up_its_connection(routing):
     network = placed(PLACES, repair="c3r", routing=routing)

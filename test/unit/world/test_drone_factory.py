@@ -8,6 +8,7 @@ import pybullet
 import pytest
 
 from drone_mesh.air.obstacles import Box, Obstacles
+from drone_mesh.drone.fence import Fence, Zone
 from drone_mesh.drone.fleet import plan_fleet
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
@@ -148,6 +149,14 @@ def test_a_place_against_an_obstacle_is_refused(make):
     with pytest.raises(FleetRefused, match="x 18.9 m, y 0 m is in or against a box"):
         fleet.add(Role.ROUTER, 18.9, 0.0)
     assert fleet.add(Role.ROUTER, 18.8, 0.0).node_id == 4
+
+
+def test_a_place_outside_the_fence_is_refused(make):
+    yard = Zone("yard", (((-30.0, -30.0), (30.0, -30.0), (30.0, 30.0), (-30.0, 30.0)),))
+    fleet = make(obstacles=Obstacles((), fence=Fence.of([yard], [])))
+    with pytest.raises(FleetRefused, match="x 40 m, y 0 m is outside fence yard"):
+        fleet.add(Role.ROUTER, 40.0, 0.0)
+    assert fleet.add(Role.ROUTER, 20.0, 0.0).node_id == 4
 
 
 def test_a_full_fleet_takes_no_more(make):

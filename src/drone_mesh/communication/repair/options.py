@@ -17,7 +17,7 @@ class LostPlace(enum.Enum):
 
     BESIDE = "beside"
     ABOVE = "above"
-    BELOW = "below"  # beside, if the ground is in the way
+    BELOW = "below"  # above, if the ground is in the way
     EXACT = "exact"  # at that very place, as in the document
 
 

@@ -56,7 +56,7 @@ def start_pilots(
 
 
 def area_around(places: Sequence[Sequence[float]], range_m: float) -> Area:
-    """A square around the middle of these places, for a mean degree of MEAN_DEGREE at least."""
+    """A square around the middle of these places, for a mean degree of MEAN_DEGREE at most."""
     xs, ys = [place[0] for place in places], [place[1] for place in places]
     fleet_m = max(max(xs) - min(xs), max(ys) - min(ys))
     side_m = max(fleet_m, math.sqrt(len(places) * math.pi * range_m**2 / (MEAN_DEGREE + 1.0)))

@@ -71,5 +71,6 @@ def test_the_backup_is_no_cut_vertex_then_of_least_degree_then_the_nearest(why, 
     assert backup_for(drawn, NO_ROUTE) == named, why
 
 
-def test_a_backup_stays_the_backup_while_another_is_only_nearer():
+def test_a_backup_stays_the_backup_while_another_is_only_nearer_or_of_less_degree():
     assert backup_for(Drawn({0: WEST, 2: (6, 0), 3: (5, 2)}), 2) == 2
+    assert backup_for(Drawn({0: WEST, 2: (3, 0), 3: (6, 0), 4: (-2, 6)}), 2) == 2
