@@ -75,3 +75,11 @@ def is_passed_on(file: str, name: str) -> bool:
     tree = ET.parse(LAUNCH / file)
     found = tree.findall(f".//node[@name='{node}']/param[@name='{name}']")
     return [param.attrib["value"] for param in found] == [f"$(arg {name})"]
+
+
+def test_scripts_run_takes_every_path_relative_to_the_folder_where_it_is_typed() -> None:
+    script = (ROOT / "scripts/run").read_text(encoding="utf-8")
+    arguments = ET.parse(LAUNCH / "factory.launch").getroot().iter("arg")
+    paths = [one.get("name") for one in arguments if "absolute path" in one.get("doc", "")]
+    assert {"fence", "key", "obstacles", "tiles"} <= set(paths)
+    assert [name for name in paths if f" {name}:=[!/~]*" not in script] == []

@@ -131,9 +131,19 @@ def check_scenario(scenario: Scenario, source: Source) -> None:
 
 
 def _mistakes(scenario: Scenario) -> Iterator[tuple[KeyPath, str]]:
+    if scenario.model == "ideal":
+        yield from _wrong_in_ideal(scenario)
     yield from _wrong_layouts(scenario)
     yield from _wrong_ids(scenario)
     yield from _late_begins(scenario)
+
+
+def _wrong_in_ideal(scenario: Scenario) -> Iterator[tuple[KeyPath, str]]:
+    kill = scenario.faults[0].kill if len(scenario.faults) == 1 else None
+    if kill is None or kill.pick not in ("random", "cut_vertex") or kill.ids is not None:
+        yield ("faults",), "with model ideal one kill, of a random share or number or cut vertices"
+    if scenario.obstacles.boxes:
+        yield ("obstacles",), "model ideal has none: its drones fly straight"
 
 
 def _wrong_layouts(scenario: Scenario) -> Iterator[tuple[KeyPath, str]]:

@@ -202,12 +202,10 @@ class Flown(NamedTuple):
 def run_ideal(scenario: Scenario, streams: Streams) -> tuple[dict[str, float], str]:
     """All metrics (NaN for those undefined without packets), and a hash of the final positions.
 
-    Raises ConfigurationError unless the scenario is one kill of a random share or number, or of
-    cut vertices.
+    Raises ConfigurationError if no gateway is left.
     """
-    kill = scenario.faults[0].kill if len(scenario.faults) == 1 else None
-    if kill is None or kill.pick not in ("random", "cut_vertex") or kill.ids is not None:
-        raise ConfigurationError("model ideal: faults must be one random kill or cut vertices")
+    kill = scenario.faults[0].kill
+    assert kill is not None  # ensured by the check of the file
     starts = draw_places(scenario.layout, scenario.range_m, streams.generator("layout"))
     places = np.array([(start.x, start.y) for start in starts])
     gateways = [index for index, start in enumerate(starts) if start.gateway]
@@ -230,15 +228,17 @@ def run_ideal(scenario: Scenario, streams: Streams) -> tuple[dict[str, float], s
 
 
 def _planned(draw: Draw) -> Flown:
-    """The flights of a rule that plans all of them at once."""
+    """The flights of a rule that plans all of them at once; to it the gateway has id 0."""
     scenario = draw.scenario
-    places = {int(node): Location.from_vector((*draw.start[node], 0.0)) for node in draw.alive}
+    ids = [0 if row == draw.home else row + (row < draw.home) for row in range(len(draw.alive))]
+    starts = draw.start[draw.alive]
+    places = {node: Location.from_vector((*place, 0.0)) for node, place in zip(ids, starts)}
     flown: dict[int, float] = {}
     if draw.victims:
         hole = Location.from_vector((*draw.start[draw.victims[0]], 0.0))
         places, flown = IDEAL_PLANS[scenario.repair](places, hole, scenario.range_m)
-    end = np.array([places[int(node)].to_vector()[:2] for node in draw.alive])
-    metres = np.array([flown.get(int(node), 0.0) for node in draw.alive])
+    end = np.array([places[node].to_vector()[:2] for node in ids])
+    metres = np.array([flown.get(node, 0.0) for node in ids])
     return Flown(end, metres, float(metres.max()) / scenario.speed_m_s, 0)
 
 

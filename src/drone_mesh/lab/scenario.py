@@ -49,7 +49,8 @@ _MOTION: Dict[str, FrozenSet[str]] = {
     "eight": frozenset({"radius_m", *_MODEL}),
     "trace": frozenset({"path", "knots"}),
 }
-_RANDOM = ("drones", "width_m", "least_distance_m", "require", "gateway_at")
+_DRAWN = ("drones", "gateways", "ids")
+_RANDOM = (*_DRAWN, "width_m", "least_distance_m", "require", "gateway_at")
 
 
 class Layout(PartOfKind):
@@ -58,12 +59,11 @@ class Layout(PartOfKind):
     KEYS: ClassVar[Dict[str, FrozenSet[str]]] = {
         "uniform": frozenset({"mean_degree", *_RANDOM}),
         "clusters": frozenset({"clusters", "cluster_radius_m", *_RANDOM}),
-        "grid": frozenset({"drones", "columns", "spacing_m"}),
-        "line": frozenset({"drones", "spacing_m", "at_end"}),
-        "casus": frozenset({"case"}),
-        "file": frozenset({"path", "places"}),
+        "grid": frozenset({"columns", "spacing_m", *_DRAWN}),
+        "line": frozenset({"spacing_m", "at_end", *_DRAWN}),
+        "casus": frozenset({"case", "gateways"}),
+        "file": frozenset({"path", "places"}),  # which has the ids and the gateways
     }
-    OF_ALL_KINDS = frozenset({"kind", "gateways", "ids"})
 
     kind: Literal["uniform", "clusters", "grid", "line", "casus", "file"] = "uniform"
     drones: Annotated[int, Field(ge=2, le=MAX_DRONES)] = 25  # gateways included

@@ -144,6 +144,8 @@ def network_of(
             is_grounded = grounded.random() < scenario.grounded_share
             why = "on the ground" if is_grounded else ""
             network.add_router(place.node_id, place.x, place.y, why_not_fly=why)
+    for node in network.nodes.values():
+        node.drone.speed_m_s = scenario.speed_m_s
     return network
 
 

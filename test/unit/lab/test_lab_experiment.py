@@ -126,6 +126,7 @@ def test_a_default_that_is_written_out_is_the_same_run(tmp_path: Path) -> None:
         ("drones: 5", "drone: 5", 4, "unknown key base.layout.drone; did you mean drones?"),
         ("drones: 5", "drones: 300", 4, "base.layout.drones: input should be less than or equal"),
         ("drones: 5", "mean_degree: 8", 4, "base.layout: layout grid has no mean_degree"),
+        ("kind: grid, drones: 5", "kind: casus, ids: shuffled", 4, "layout casus has no ids: it"),
         ("at_s: 2", "at_s: -2", 7, "base.faults.0.at_s: input should be greater than or equal"),
         ("at_s: 2", "at_s: 5", 8, "faults.0.kill: begins at 5 s, after the end of the run"),
         ("  faults:", "  probes: {per_s: 1}\n  faults:", 6, "probes.from_s: begins at 22 s, after"),
@@ -440,6 +441,14 @@ def test_places_come_from_a_file_beside_the_experiment(tmp_path: Path) -> None:
     text = "name: yard\nbase:\n  layout: {kind: file, path: yard.csv}\n"
     (cell,) = load_experiment(write(tmp_path, text)).cells
     assert cell.scenario.layout.places == [[0, 0, 0, 1], [3, 5, 0, 0]]
+
+
+@pytest.mark.parametrize("key", ["ids: shuffled", "gateways: 2"])
+def test_a_file_of_places_alone_says_who_is_who(tmp_path: Path, key: str) -> None:
+    (tmp_path / "yard.csv").write_text("id,x,y,role\n0,0,0,gateway\n3,5,0,router\n")
+    text = f"name: yard\nbase:\n  layout: {{kind: file, path: yard.csv, {key}}}\n"
+    with pytest.raises(ConfigurationError, match=r"line 3: base\.layout: layout file has no"):
+        load_experiment(write(tmp_path, text))
 
 
 @pytest.mark.parametrize(

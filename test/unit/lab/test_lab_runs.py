@@ -353,6 +353,13 @@ def test_links_of_a_mesh_without_probes_are_watched_from_the_start() -> None:
     assert measured["link_changes"] > 0
 
 
+def test_drones_fly_at_the_speed_of_the_experiment_with_packets_too() -> None:
+    order = {"at_s": 11, "order": {"id": 4, "to": [24, 6]}}
+    wind = {"at_s": 5, "wind": {"speed_factor": 0.5}}
+    assert run(speed_m_s=1.0, faults=[order]).legs[0].path.duration_s == pytest.approx(6.0)
+    assert run(speed_m_s=1.0, faults=[wind, order]).legs[0].path.duration_s == pytest.approx(12.0)
+
+
 def test_wind_slows_the_flights_that_begin_in_it() -> None:
     order = {"at_s": 11, "order": {"id": 4, "to": [24, 6]}}
     calm = run(faults=[order])

@@ -151,3 +151,39 @@ def test_a_rule_for_packets_is_none_without_them(tmp_path: Path) -> None:
     path.write_text("name: x\nbase:\n  model: ideal\n  repair: thesis\n")
     with pytest.raises(ConfigurationError, match=r"line 4: repair: unknown rule 'thesis' for"):
         load_experiment(path)
+
+
+KILL = "{at_s: 9, kill: {number: 1}}"
+
+
+@pytest.mark.parametrize(
+    ("base", "words"),
+    [
+        (f"faults: [{KILL}, {KILL}]", "line 5: faults: with model ideal one kill, of a random"),
+        ("faults: [{at_s: 9, kill: {ids: [3]}}]", "line 5: faults: with model ideal one kill"),
+        ("duration_s: 60", "faults: with model ideal one kill, of a random share or number or"),
+        (
+            f"faults: [{KILL}]\n  obstacles: {{boxes: [{{center: [9, 9, 2], size: [2, 2, 4]}}]}}",
+            "line 6: obstacles: model ideal has none: its drones fly straight",
+        ),
+    ],
+)
+def test_what_no_run_without_packets_can_do_is_refused_when_the_file_is_read(
+    tmp_path: Path, base: str, words: str
+) -> None:
+    path = tmp_path / "x.yaml"
+    path.write_text(f"name: x\nbase:\n  model: ideal\n  repair: home\n  {base}\n")
+    with pytest.raises(ConfigurationError) as caught:
+        load_experiment(path)
+    assert words in str(caught.value)
+
+
+def test_the_gateway_of_an_ideal_plan_may_have_any_id() -> None:
+    content = {
+        "model": "ideal", "layout": {"kind": "line", "drones": 5, "ids": "shuffled"},
+        "repair": "nearest", "duration_s": 60,
+        "faults": [{"at_s": 9, "kill": {"number": 1, "pick": "cut_vertex"}}],
+    }  # fmt: skip
+    for repetition in range(4):
+        measured, _ = run_ideal(Scenario.model_validate(content), Streams(1, repetition))
+        assert measured["distance_total_m"] == pytest.approx(6.0 * measured["cut_off"])

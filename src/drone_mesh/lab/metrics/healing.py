@@ -12,7 +12,7 @@ from drone_mesh.lab.record import RunRecord
 from drone_mesh.state.model import EventRecord
 
 
-@more("0/1", "all live routers are served again before the end")
+@more("0/1", "all live routers are served again, for 5 s, before the end")
 def healed(run: RunRecord) -> float:
     return run.healed_at_s is not None
 
