@@ -17,6 +17,8 @@ WEB = {"fastapi", "fastapi_offline", "pydantic", "starlette", "uvicorn", "websoc
 REPORT = {"jinja2", "matplotlib"}
 SIMULATION = {"numpy", "pybullet", "rospy"}
 AUTOPILOT = {"pymap3d", "pymavlink"}
+# Without hardware the extra `http` is enough (docs/raspberry-pi.md): spidev needs a compiler.
+OF_A_PI = {"cryptography", "gpiod", "greenlet", "paho", "serial", "spidev", "yaml"}
 NODE = {"drone_mesh.communication.node.component"}  # the software of a node of the mesh
 TECHNIQUES = {"drone_mesh.communication.repair.strategies", "drone_mesh.communication.routing"}
 
@@ -73,7 +75,7 @@ def loaded_by(program: Path) -> set[str]:
         ("console", NODE | REPORT | {"fastapi", "pybullet", "rosbag"}),
         ("report", WEB | {"pybullet"}),
         ("raspberry_router", WEB | REPORT | SIMULATION | AUTOPILOT),
-        ("raspberry_gateway", WEB | REPORT | SIMULATION | AUTOPILOT),
+        ("raspberry_gateway", WEB | REPORT | SIMULATION | AUTOPILOT | OF_A_PI),
         ("mesh_send", NODE | TECHNIQUES | SIMULATION),
     ],
 )

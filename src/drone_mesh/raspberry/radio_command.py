@@ -46,16 +46,18 @@ DISSECTOR = Path(__file__).with_name("drone_mesh.lua")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one tool; the exit status is 0, 1 if the radio failed, 2 for a wrong option."""
     options = _parser().parse_args(arguments)
+    has_failed = False
     try:
         with _opened(options) as (radio, irq):
             for line in _tool(options, radio, irq):
                 print(line, flush=True)
+                has_failed |= line.startswith("FAIL")
     except MeshError as error:
         print(f"FAIL {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         print(file=sys.stderr)
-    return 0
+    return int(has_failed)
 
 
 def _tool(options: argparse.Namespace, radio: FieldRadio, irq: IrqPin | None) -> Iterator[str]:

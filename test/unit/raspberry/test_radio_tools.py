@@ -263,13 +263,32 @@ def test_without_hardware_it_says_what_to_do_and_fails(capsys):
     assert capsys.readouterr().err.startswith("FAIL ")
 
 
-def test_it_releases_spi_and_both_pins_when_it_ends(rig, monkeypatch, capsys):
-    closed = []
-    for name in ("spi", "ce", "irq"):
-        device = getattr(rig.chip, name)
-        monkeypatch.setattr(device, "close", lambda name=name: closed.append(name), raising=True)
+@pytest.fixture
+def wired(rig, monkeypatch) -> Rig:
+    """The chip of the rig is the hardware of this machine."""
     wired = (rig.chip.spi, rig.chip.ce, rig.chip.irq)
     monkeypatch.setattr(Hardware, "open", lambda _hardware: wired)
+    return rig
+
+
+def test_a_stuck_irq_pin_is_a_failure_like_any_other(wired, capsys):
+    wired.chip.faults.irq_stuck_at = True
+    assert main(["--irq", "24", "check"]) == 1
+    assert capsys.readouterr().out.splitlines()[-1].startswith("FAIL IRQ: never falls")
+
+
+def test_a_report_of_a_radio_that_fails_is_written_and_ends_as_a_failure(wired, tmp_path, capsys):
+    wired.chip.faults.miso_stuck_at = 0xFF
+    assert main(["report", str(tmp_path / "radio.txt")]) == 1
+    assert "== check\nFAIL no nRF24L01+ answers" in (tmp_path / "radio.txt").read_text()
+    assert "report written to" in capsys.readouterr().out
+
+
+def test_it_releases_spi_and_both_pins_when_it_ends(wired, monkeypatch, capsys):
+    closed = []
+    for name in ("spi", "ce", "irq"):
+        device = getattr(wired.chip, name)
+        monkeypatch.setattr(device, "close", lambda name=name: closed.append(name), raising=True)
     assert main(["--irq", "24", "check"]) == 0, capsys.readouterr().err
     assert sorted(closed) == ["ce", "irq", "spi"]
 

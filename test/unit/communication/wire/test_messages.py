@@ -259,3 +259,19 @@ def test_nan_and_infinity_can_be_decoded_and_are_recognised(kind, ids, text, sec
     assert finite == (not (has_two or (has_one and not second)))
     if has_one and not second:
         assert not math.isfinite(MovementNegotiationMessage.from_payload(payload).cost)
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        ("00", "01 07"),
+        ("01 05", "02 05 07"),
+        ("10 01 02 03 04 05 06 07 08 09 0a 0b 0c 0d 0e 0f 10",) * 2,
+    ],
+)
+def test_each_node_that_forwards_an_echo_adds_its_id_up_to_16(before, after):
+    def echo(from_, to, route):
+        header = bytes((1, from_, 194, to, 9))
+        return (header + bytes.fromhex("34 12") + bytes.fromhex(route)).ljust(32, b"\0")
+
+    assert messages.next_hop(echo(1, 7, before), 7, 8) == echo(7, 8, after)
