@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import multiprocessing
 import os
+import queue
 import runpy
 import signal
 import socket
@@ -22,7 +23,7 @@ import rospkg
 import rospy
 from rosgraph_msgs.msg import Log
 
-from drone_mesh.msg import NRF24, DroneInfo, NodeDebugInfo
+from drone_mesh.msg import NRF24, DroneInfo, MeshState, NodeDebugInfo
 from drone_mesh.ros.graph.resting_clock import RestingClock
 from drone_mesh.srv import Casus, PowerSwitch, RequestGPS, WirelessMessage
 
@@ -141,6 +142,20 @@ class LogWatch:
     def failures(self) -> list[str]:
         """Lines of unexpected exceptions."""
         return self.lines("Traceback") + self.lines("bad callback") + self.lines("in a mesh node")
+
+
+class StateWatch:
+    """`/mesh/state`, without a subscription for each report of it: that takes 20 ms."""
+
+    def __init__(self) -> None:
+        self._reports: queue.SimpleQueue[MeshState] = queue.SimpleQueue()
+        self._subscriber = rospy.Subscriber("/mesh/state", MeshState, self._reports.put)
+
+    def next(self) -> MeshState:
+        """The first report from now on; queue.Empty if there is none."""
+        while not self._reports.empty():
+            self._reports.get()
+        return self._reports.get(timeout=WALL_LIMIT_S)
 
 
 class MeshWatch:

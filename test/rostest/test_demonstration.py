@@ -8,11 +8,10 @@ import unittest
 
 import rospy
 import rostest
-from rostest_support import WALL_LIMIT_S, LogWatch, MeshWatch
+from rostest_support import LogWatch, MeshWatch, StateWatch
 
 from drone_mesh.console.controls import OrderRefused
 from drone_mesh.console.demonstration import RepairDemonstration
-from drone_mesh.msg import MeshState
 from drone_mesh.ros.graph.conversions import mesh_status
 from drone_mesh.ros.views.console_controls import RosControls
 from drone_mesh.state.model import MeshStatus
@@ -20,14 +19,14 @@ from drone_mesh.state.model import MeshStatus
 AT_PLACE_M = 0.5
 
 
-def next_state() -> MeshStatus:
-    return mesh_status(rospy.wait_for_message("/mesh/state", MeshState, WALL_LIMIT_S))
-
-
 class DemonstrationTest(unittest.TestCase):
     def test_when_it_says_that_all_is_put_back_all_is_as_before(self) -> None:
         rospy.init_node("test_demonstration")
-        log = LogWatch()
+        log, states = LogWatch(), StateWatch()
+
+        def next_state() -> MeshStatus:
+            return mesh_status(states.next())
+
         MeshWatch(8).wait("all connected at the start", 30, lambda: all_connected(next_state()))
         before, controls, demonstration = next_state(), RosControls(), RepairDemonstration()
         mesh = before

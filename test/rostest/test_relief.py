@@ -13,7 +13,7 @@ import unittest
 
 import rospy
 import rostest
-from rostest_support import WALL_LIMIT_S, MeshWatch, call, pid_of, wait_for
+from rostest_support import WALL_LIMIT_S, MeshWatch, StateWatch, call, pid_of, wait_for
 
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.console.relief_demonstration import ReliefDemonstration
@@ -23,23 +23,25 @@ from drone_mesh.ros.views.console_controls import RosControls
 from drone_mesh.srv import OrderFormation
 
 POSTS = {3: (5.0, 4.0, 4), 4: (5.0, 8.0, 4)}  # x, y, z
-POSTS_KEPT_S = 420.0  # simulated; a battery lasts for 180 s
+POSTS_KEPT_S = 280.0  # simulated; a battery lasts for 120 s
 HOLDS_M = 2.2  # of the place or the one beside it
 
 
-def state() -> MeshState:
-    return rospy.wait_for_message("/mesh/state", MeshState, WALL_LIMIT_S)
-
-
 class ReliefTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls) -> None:
+        cls.states = StateWatch()
+
     def test_1_the_demonstration_explains_a_relief_and_puts_everything_back(self) -> None:
-        MeshWatch(5).wait("all connected", 60, lambda: all(n.connected for n in state().nodes))
+        MeshWatch(5).wait(
+            "all connected", 60, lambda: all(n.connected for n in self.states.next().nodes)
+        )
         controls, demonstration = RosControls(), ReliefDemonstration()
-        mesh = mesh_status(state())
+        mesh = mesh_status(self.states.next())
         while not demonstration.is_over:
             for order in demonstration.advance(mesh):
                 order(controls)
-            mesh = mesh_status(state())
+            mesh = mesh_status(self.states.next())
         told = [step.text for step in demonstration.story.steps]
         parts = ("[12] relieves [34]", "hovers beside", "flies home", "swaps its battery", "spare")
         self.assertRegex("; ".join(told), ".*".join(parts))
@@ -51,7 +53,7 @@ class ReliefTest(unittest.TestCase):
         routers = (
             "all have full batteries",
             60,
-            lambda: min(n.battery for n in state().nodes[1:]) > 95,
+            lambda: min(n.battery for n in self.states.next().nodes[1:]) > 95,
         )
         wait_for(*routers)
         places = [Location(latitude=y, longitude=x, height=z) for x, y, z in POSTS.values()]
