@@ -36,6 +36,7 @@ class Campaign:
         self.folder = folder
         self._command = list(command)
         self.failures = 0  # of the runs of this session
+        self.first_failure = ""  # its message
         self.completed = 0
 
     def run(
@@ -107,6 +108,7 @@ class Campaign:
                 progress.count(bool(outcome.failure))
                 self.completed += 1
                 self.failures += bool(outcome.failure)
+                self.first_failure = self.first_failure or outcome.message
         finally:
             outcomes.close()  # type: ignore[attr-defined]
             progress.close()

@@ -232,6 +232,7 @@ def _run(options: argparse.Namespace) -> int:
     if loaded.experiment.expect:
         print(f"`{PROGRAM} check {folder}` judges what it expects")
     if campaign.failures:
+        print(f"failed: {campaign.first_failure}")
         print(f"failed runs: {folder / 'failures.csv'} has the command that repeats each of them")
         return 1
     return 0

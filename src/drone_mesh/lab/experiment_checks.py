@@ -60,7 +60,8 @@ class Source:
 def nearest_name(name: str, known: Sequence[str]) -> str:
     """A hint for an unknown name: the closest one, or all of them."""
     close = difflib.get_close_matches(name, known, n=1)
-    return f"did you mean {close[0]}?" if close else f"known keys: {', '.join(sorted(known))}"
+    names = ", ".join(sorted(known)) or "none: nothing is swept"
+    return f"did you mean {close[0]}?" if close else f"known keys: {names}"
 
 
 def _keys_at(model: Any, place: KeyPath) -> list[str]:

@@ -62,7 +62,8 @@ class _OverAxes(ast.NodeTransformer):
         name = _dotted(node)
         if name is not None:
             if name not in self._axes:
-                raise ExpressionError(f"no axis {name}; the axes are {', '.join(self._axes)}")
+                axes = ", ".join(self._axes) or "none: nothing is swept"
+                raise ExpressionError(f"no axis {name}; the axes are {axes}")
             return ast.copy_location(ast.Name(name, ast.Load()), node)
         if not isinstance(node, _ALLOWED):
             raise ExpressionError("use axes, numbers, texts, lists, comparisons, and, or, not")

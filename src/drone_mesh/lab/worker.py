@@ -101,7 +101,11 @@ def measured(record: RunRecord, own_metrics: tuple[str, ...]) -> dict[str, float
     """All metrics of a run, with the user's own ones last."""
     values = measure_all(record)
     for name in own_metrics:
-        values[extensions.column_of(name)] = float(extensions.own_metric(name)(record))
+        value = extensions.own_metric(name)(record)
+        try:
+            values[extensions.column_of(name)] = float(value)
+        except (TypeError, ValueError):
+            raise ConfigurationError(f"metric {name} returned {value!r}, not a number") from None
     return values
 
 

@@ -1,6 +1,6 @@
 """Random and hostile messages, and a link that breaks at any moment.
 
-The long run is this file with MAVLINK_MESSAGES=100000 MAVLINK_LOSSES=1000 in the environment.
+The long run is this file with MAVLINK_MESSAGES=200000 MAVLINK_LOSSES=1000 in the environment.
 """
 
 from __future__ import annotations

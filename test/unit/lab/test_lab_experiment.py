@@ -221,6 +221,15 @@ def test_what_belongs_to_the_whole_file_is_checked_as_well(
     assert "\n" not in message
 
 
+@pytest.mark.parametrize(
+    "added", ["where: routing == 'beacon'", "compare: {over: routing, baseline: beacon}"]
+)
+def test_a_file_that_sweeps_nothing_has_no_axes(tmp_path: Path, added: str) -> None:
+    path = write(tmp_path, GOOD.split("sweep:")[0] + added + "\n")
+    with pytest.raises(ConfigurationError, match="no axis routing; .* none: nothing is swept"):
+        load_experiment(path)
+
+
 def test_an_axis_without_the_baseline_asks_for_another_baseline(tmp_path: Path) -> None:
     path = write(tmp_path, f"{GOOD}compare: {{over: radio.loss, baseline: 0.2}}\n")
     with pytest.raises(ConfigurationError, match=r"line 14: .*as in compare\.baseline=0\.4$"):

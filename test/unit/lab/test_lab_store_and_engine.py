@@ -43,6 +43,9 @@ import os, signal, time
 def boom(record):
     raise ValueError("no good")
 
+def nothing(record):
+    pass
+
 def drones(record):
     return float(len(record.start.places))
 
@@ -229,7 +232,9 @@ def test_a_failing_run_is_a_failure_with_traceback_and_command_and_the_others_co
     assert (first["kind"], first["message"]) == ("exception", "ValueError: no good")
     assert 'raise ValueError("no good")' in first["traceback"]
     assert first["command"] == f"python3 -m drone_mesh.lab show {out} {first['run']}"
-    assert "4 failed" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "4 failed" in printed
+    assert "\nfailed: ValueError: no good\n" in printed
     assert run(experiment(text=text), out) == 0  # failures are not missing
     assert run(experiment(text=text), out, "--retry-failed") == 1
 
@@ -242,6 +247,14 @@ def test_an_endless_run_is_a_timeout(experiment: Callable[..., Path], tmp_path: 
     (failure,) = read_rows(out / "failures.csv")
     assert failure["kind"] == "timeout"
     assert failure["message"] == "still running after 0.5 s of wall time"
+
+
+def test_a_metric_without_a_number_is_named(
+    experiment: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run(experiment("metrics: ['own_lab_parts:nothing']\n"), tmp_path / "out", "seeds=1")
+    words = "metric own_lab_parts:nothing returned None, not a number"
+    assert f"failed: ConfigurationError: {words}" in capsys.readouterr().out
 
 
 def test_a_metric_of_the_users_is_a_column(experiment: Callable[..., Path], tmp_path: Path) -> None:
