@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import io
 import math
 import os
 import select
@@ -115,6 +116,9 @@ def ends_as(program: str, failed: int = 1) -> Callable[[Main], Main]:
         def ending_main(*args: Any, **kwargs: Any) -> int:
             if signal.getsignal(signal.SIGINT) is signal.SIG_DFL:
                 signal.signal(signal.SIGINT, signal.default_int_handler)
+            out = sys.stdout  # None: the program was started without one
+            if isinstance(out, io.TextIOWrapper) and out.errors == "strict":
+                out.reconfigure(errors="backslashreplace")  # as stderr: a name may be in any bytes
             try:
                 try:
                     return main(*args, **kwargs)
@@ -124,10 +128,11 @@ def ends_as(program: str, failed: int = 1) -> Callable[[Main], Main]:
                 except KeyboardInterrupt:
                     return INTERRUPTED
                 finally:
-                    sys.stdout.flush()
+                    if out is not None:
+                        out.flush()
             except BrokenPipeError:
                 # Or else the interpreter would try once more to write what is left, and complain.
-                os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+                os.dup2(os.open(os.devnull, os.O_WRONLY), out.fileno())
                 return CLOSED_PIPE
 
         return cast(Main, ending_main)

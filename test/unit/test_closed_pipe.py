@@ -1,4 +1,4 @@
-"""Programs whose reader ends, as in `raspberry_radio registers | head -n 1`, end quietly."""
+"""What becomes of the output of a program: nobody reads it, or not every character of it."""
 
 from __future__ import annotations
 
@@ -42,3 +42,33 @@ def test_a_reader_that_has_closed_the_pipe_is_no_error(main, arguments):
     assert "Traceback" not in ended.stderr, ended.stderr
     assert "Exception ignored" not in ended.stderr, ended.stderr
     assert "Broken pipe" not in ended.stderr, ended.stderr
+
+
+def test_a_program_without_an_output_ends_as_well_as_any(tmp_path):
+    code = "from drone_mesh.raspberry.key_command import main; raise SystemExit(main())"
+    ended = subprocess.run(
+        ["sh", "-c", 'exec "$@" >&-', "sh", sys.executable, "-c", code, "new", tmp_path / "key"],
+        env={**os.environ, "PYTHONPATH": str(ROOT / "src")},
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert (ended.returncode, ended.stderr) == (0, "")
+
+
+@pytest.mark.parametrize(
+    ("encoding", "name", "told"),
+    [
+        ("ascii:strict", "caf\u00e9", rb"caf\xe9"),
+        ("utf-8:strict", os.fsdecode(b"caf\xe9"), rb"caf\udce9"),
+        ("utf-8:strict", "caf\u00e9", "caf\u00e9".encode()),
+    ],
+)
+def test_what_a_terminal_cannot_show_is_written_as_its_number(tmp_path, encoding, name, told):
+    code = "from drone_mesh.raspberry.key_command import main; raise SystemExit(main())"
+    ended = subprocess.run(
+        [sys.executable, "-c", code, "new", tmp_path / name],
+        env={**os.environ, "PYTHONPATH": str(ROOT / "src"), "PYTHONIOENCODING": encoding},
+        capture_output=True,
+    )
+    assert (ended.returncode, ended.stderr) == (0, b"")
+    assert ended.stdout == b"raspberry_key: new mesh key in %s/%s\n" % (os.fsencode(tmp_path), told)

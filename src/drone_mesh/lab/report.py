@@ -43,7 +43,8 @@ def write_report(folder: Path, out: Path | None, formats: Sequence[str]) -> list
     drawings += [d for d in (phases_drawing(results), survival_drawing(results)) if d is not None]
     page = out or folder / "report.html"
     try:
-        page.write_text(_render(results, tables, drawings), encoding="utf-8")
+        with page.open("w", encoding="utf-8", errors="backslashreplace") as file:  # of file names
+            file.write(_render(results, tables, drawings))
         return [page, *_export(results, tables, drawings, formats)]
     except OSError as error:
         raise ReportError(f"cannot write {error.filename or page}: {error.strerror}") from error

@@ -103,7 +103,8 @@ def _write_page(options: argparse.Namespace, shown: Replay, title: str) -> None:
 
     text = render_page(tell_story(shown.states, shown.record.events), title)
     try:
-        options.page.write_text(text, encoding="utf-8")
+        with options.page.open("w", encoding="utf-8", errors="backslashreplace") as file:
+            file.write(text)  # with file names
     except OSError as error:
         raise MeshError(f"cannot write {options.page}: {error.strerror}") from error
     print(f"wrote {options.page}")

@@ -69,13 +69,18 @@ class Store:
     def _take_lock(self) -> None:
         try:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
+        except BlockingIOError:
             self._lock.seek(0)
             holder = self._lock.read().strip() or "another process"
             self._lock.close()
             raise StoreError(
                 f"{self.folder}: {holder} is writing there; wait for it, or choose another --out"
             ) from None
+        except OSError as error:  # as on NFS without its lock service
+            self._lock.close()
+            raise StoreError(
+                f"cannot lock {self.folder}: {error.strerror}; choose another --out"
+            ) from error
         self._lock.truncate(0)
         self._lock.write(f"lab run, process {os.getpid()} on {os.uname().nodename},")
         self._lock.flush()

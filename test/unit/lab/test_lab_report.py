@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import csv
+import json
+import os
 import re
+import shutil
 import sys
 from pathlib import Path
 
@@ -47,6 +50,17 @@ def test_the_page_needs_nothing_but_itself(results_folder: Path) -> None:
     assert page.count("<svg") >= 3  # one axis, phases, healed over time
     assert "p (Holm)" in page
     assert "connection_lost_after_s" in page
+
+
+def test_a_folder_may_have_a_name_in_any_bytes(results_folder: Path, tmp_path: Path) -> None:
+    folder = tmp_path / os.fsdecode(b"caf\xe9")
+    shutil.copytree(results_folder, folder)
+    sessions = (folder / "provenance.json").read_text(encoding="utf-8")
+    named = sessions.replace(json.dumps(str(results_folder)), json.dumps(str(folder)))
+    assert named != sessions
+    (folder / "provenance.json").write_text(named, encoding="utf-8")
+    assert main(["report", str(folder)]) == 0
+    assert rb"caf\udce9" in (folder / "report.html").read_bytes()
 
 
 @pytest.mark.slow

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import csv
+import errno
+import fcntl
 import json
 import math
 import os
@@ -283,6 +285,18 @@ def test_two_runs_in_one_folder_are_refused(
         Store(tmp_path / "out", plan)
     first.close()
     Store(tmp_path / "out", plan).close()
+
+
+def test_a_file_system_without_locks_is_named_and_no_other_process_is_waited_for(
+    experiment: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def no_locks(_file: object, _how: int) -> None:  # NFS without its lock service
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(fcntl, "flock", no_locks)
+    reason = f"^cannot lock {tmp_path / 'out'}: No locks available; "
+    with pytest.raises(StoreError, match=reason):
+        Store(tmp_path / "out", Plan(load_experiment(experiment())))
 
 
 def test_a_folder_that_cannot_be_made_is_refused_before_anything_runs(

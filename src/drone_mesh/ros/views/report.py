@@ -50,7 +50,8 @@ def _run(options: argparse.Namespace) -> int:
     print("drawing ...", file=sys.stderr)
     html = render_page(story, options.title or options.bag.stem)
     try:
-        page.write_text(html, encoding="utf-8")
+        with page.open("w", encoding="utf-8", errors="backslashreplace") as file:  # of file names
+            file.write(html)
         written = [page] + (write_csv(story, options.csv) if options.csv else [])
     except OSError as error:
         raise MeshError(f"{error.filename}: {error.strerror}") from error
