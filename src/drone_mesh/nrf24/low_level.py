@@ -16,6 +16,7 @@ from drone_mesh.communication.interfaces import PAYLOAD_BYTES
 from drone_mesh.communication.wire.packet_types import Priority
 from drone_mesh.nrf24.errors import RadioError
 from drone_mesh.nrf24.pins import CePin, IrqPin, SpiDevice
+from drone_mesh.nrf24.registers import FIFO_DEPTH
 from drone_mesh.nrf24.settings import RadioSettings
 from drone_mesh.nrf24.transceiver import PipePayload, Transceiver
 
@@ -23,7 +24,8 @@ __all__ = ["NRF24LowLevelInterface"]  # for users; see docs/architecture.md
 
 logger = logging.getLogger(__name__)
 
-POLL_S = 5e-3  # three payloads fit in the FIFO, and take 5.4 ms to arrive at 250 kbit/s
+LONGEST_POLL_S = 5e-3  # between two looks at a chip without IRQ, however slow the rate
+POLL_SHARE = 0.9  # of the time in which packets one after the other fill the FIFO
 VERIFY_PERIOD_S = 1.0  # how long a brown-out may stay unnoticed while listening
 IRQ_PATIENCE = 3  # contradictions between pin and chip; a single one may be a race
 RESTART_PERIOD_S = 1.0  # shortest time between two attempts to find a lost chip
@@ -80,6 +82,7 @@ class NRF24LowLevelInterface:
         self.node_id = node_id
         self.settings = settings
         self.medium = settings.medium
+        self._poll_s = min(LONGEST_POLL_S, POLL_SHARE * FIFO_DEPTH * settings.acknowledged_s)
         self._spi, self._ce, self._irq = spi, ce, irq
         self._runtime = runtime or SystemRuntime()
         self.access = MediumAccess(settings.access_rules, rng or random.Random())
@@ -209,7 +212,7 @@ class NRF24LowLevelInterface:
             if left_s <= 0:
                 return []
             if self._irq is None or not self._irq_watch.trusted or not self.working:
-                self._runtime.sleep(min(left_s, POLL_S))
+                self._runtime.sleep(min(left_s, self._poll_s))
             else:
                 self._irq_watch.said = self._irq.wait_low(left_s)
 
@@ -227,7 +230,7 @@ class NRF24LowLevelInterface:
             left_s = until_s - self._runtime.now_s()
             if left_s <= 0:
                 return
-            self._runtime.sleep(min(left_s, POLL_S))
+            self._runtime.sleep(min(left_s, self._poll_s))
             with self._lock:
                 self._poll()
 

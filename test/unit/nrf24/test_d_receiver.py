@@ -7,6 +7,7 @@ from chip_lab import ADDRESS, BROADCAST_ADDRESS, PAYLOAD, us
 
 from drone_mesh.nrf24.emulator.chip_core import State
 from drone_mesh.nrf24.registers import Register
+from drone_mesh.nrf24.settings import DataRate
 
 
 def test_row_31_payloads_come_with_the_pipe_they_were_sent_to(lab):
@@ -235,3 +236,25 @@ def test_the_acknowledgement_goes_to_the_address_that_the_packet_came_to(lab):
     prx.write(Register.RX_ADDR_P2, b"\x77")
     lab.wait_us(5_000)
     assert ptx.status & 0x30 == 0x20
+
+
+@pytest.mark.parametrize("rate", DataRate)
+def test_a_receiver_without_irq_is_never_full_when_a_train_arrives(lab, rate):
+    """Three packets fill the FIFO, the sooner the higher the rate; a fourth is not acknowledged."""
+    sender = lab.driver(5, data_rate=rate)
+    receiver = lab.driver(10, 100.0, irq=False, data_rate=rate)
+    train = [bytes((number,)) * 32 for number in range(60)]
+    following = iter(train[1:])
+    got = []
+
+    def receive():
+        while len(got) < len(train) and lab.clock.now_s() < 2.0:
+            got.extend(payload for _pipe, payload in receiver.receive(0.1))
+
+    tries, _none = lab.at_once(
+        lambda: sender.try_once(10, train[0], False, 1, 2, lambda _frames: next(following, None)),
+        receive,
+    )
+    assert tries.acknowledged
+    assert got == train
+    assert sender.statistics().retries == 0
