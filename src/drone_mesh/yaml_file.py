@@ -24,6 +24,7 @@ MAX_SHARING_CHARACTERS = 5_000  # of a value in a file that may share parts by a
 MAX_VALUES = 50_000  # with those that aliases repeat
 
 INT_TAG, FLOAT_TAG = "tag:yaml.org,2002:int", "tag:yaml.org,2002:float"
+TEXT_TAG = "tag:yaml.org,2002:str"
 MERGE_TAG = "tag:yaml.org,2002:merge"  # of the key <<
 
 KeyPath = Tuple[Hashable, ...]
@@ -135,13 +136,15 @@ def _expanded(node: yaml.Node, known: dict[int, int]) -> int:
 
 
 def _is_as_read(node: yaml.ScalarNode) -> bool:
-    """Whether YAML 1.1 reads a number as people do: not 1_000, 010, 1:30.
+    """Whether YAML 1.1 reads a number as people do: not 1_000, 010, 1:30, 1e6.
 
     Who takes the number refuses .inf and .nan, and says what is expected there.
     """
     text = node.value.lstrip("+")
     if node.tag == INT_TAG:
         return is_whole(text) and (text.lstrip("-")[0] != "0" or not text.lstrip("-0"))
+    if node.tag == TEXT_TAG and not node.style:
+        return not is_decimal(text)
     return node.tag != FLOAT_TAG or is_decimal(text) or text.lower().endswith((".inf", ".nan"))
 
 
@@ -176,6 +179,8 @@ class _Loader(yaml.SafeLoader):
         self._depth -= 1
         if isinstance(node, yaml.ScalarNode) and not _is_as_read(node):
             problem = f"{node.value[:40]} is not a number in decimal digits"
+            if node.tag == TEXT_TAG:
+                problem = f"{node.value[:40]} is a text in YAML: write it as in 1.0e+6, or quoted"
             raise ComposerError(None, None, problem, mark)
         return node
 

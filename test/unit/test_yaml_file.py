@@ -54,6 +54,13 @@ def test_numbers_that_yaml_reads_otherwise_than_people_are_refused(number):
         read_mapping_text(f"a: 1\nb: {number}", "f")
 
 
+@pytest.mark.parametrize("number", ["1e6", "1e-3", "2.5e3", "-1E+6"])
+def test_an_exponent_that_yaml_takes_for_a_text_is_refused_unless_quoted(number):
+    with pytest.raises(ConfigurationError, match="f, line 2: .* is a text in YAML: write it as in"):
+        read_mapping_text(f"a: 1\nb: {number}", "f")
+    assert read_mapping_text(f"a: '{number}'", "f").content == {"a": number}
+
+
 @pytest.mark.parametrize(("text", "number"), [("0", 0), ("-12", -12), ("+3", 3), ("+1.5e+3", 1500)])
 def test_numbers_in_decimal_digits_are_read(text, number):
     assert read_mapping_text(f"a: {text}", "f").content == {"a": number}

@@ -55,6 +55,10 @@ class Campaign:
         Loads the modules that the experiment names. Raises ConfigurationError for one that fails,
         StoreError or EngineError; completed runs are kept, in order.
         """
+        if shard is not None and self.loaded.experiment.stop is not None:
+            raise StoreError(
+                "--shard: `stop` needs the runs of all shards: give seeds=N stop=null instead"
+            )
         self.loaded.check_own_code()
         plan = Plan(self.loaded)
         store = Store(self.folder, plan)

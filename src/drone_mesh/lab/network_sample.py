@@ -109,7 +109,7 @@ class Lapses:
     """How many of the routers that have a path are in the state that they should be in."""
 
     shares: list[float] = field(default_factory=list)  # of each sample
-    lapses_s: list[float] = field(default_factory=list)  # times with a path, but not in that state
+    _ended_s: list[float] = field(default_factory=list, repr=False)  # lengths of lapses
     _since_s: dict[int, float] = field(default_factory=dict, repr=False)  # node -> of its lapse
 
     def look(self, now_s: float, reachable: AbstractSet[int], well: AbstractSet[int]) -> None:
@@ -118,9 +118,13 @@ class Lapses:
         if reachable:
             self.shares.append(1.0 - len(lapsing) / len(reachable))
         for node in self._since_s.keys() - lapsing:  # well again, off, or without any path
-            self.lapses_s.append(now_s - self._since_s.pop(node))
+            self._ended_s.append(now_s - self._since_s.pop(node))
         for node in lapsing - self._since_s.keys():
             self._since_s[node] = now_s
+
+    def lapses_s(self, end_s: float) -> list[float]:
+        """How long routers had a path and were not in that state; without an end: up to `end_s`."""
+        return [*self._ended_s, *(end_s - since_s for since_s in self._since_s.values())]
 
 
 @dataclass

@@ -12,7 +12,7 @@ from drone_mesh.lab.plan import PlannedRun
 from drone_mesh.lab.provenance import code_with
 from drone_mesh.lab.record import RunRecord
 from drone_mesh.lab.results import Results, load_results
-from drone_mesh.lab.worker import scenario_of, simulation_of
+from drone_mesh.lab.worker import measured, scenario_of, simulation_of
 from drone_mesh.state.model import MeshStatus
 
 POLL_PERIOD_S = 0.5  # period of checks for Ctrl-C
@@ -74,6 +74,7 @@ def show_run(options: argparse.Namespace) -> int:
         _print_story(shown)
     if not options.console:
         print(verdict)
+        measured(shown.record, shown.planned.spec.own_metrics)  # raises as in the run
     row = results.rows.get(shown.planned.spec.run)
     return 0 if row is None or row["event_hash"] == shown.event_hash else 1
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import pytest
 
 from drone_mesh.air.obstacle_file import MAX_BOXES, read_obstacles, rows_of_file
 from drone_mesh.air.obstacles import Box
+from drone_mesh.drone.fleet import DEFAULT_ROUTERS, plan_fleet
 from drone_mesh.errors import ConfigurationError
 
 STREET = Path(__file__).parents[3] / "experiments" / "street.yaml"
@@ -32,6 +34,15 @@ def test_a_box_has_the_place_size_angle_and_material_of_its_row(tmp_path: Path) 
 
 def test_the_street_of_the_experiments_can_stand_in_the_world() -> None:
     assert len(read_obstacles(STREET).boxes) == len(rows_of_file(STREET)) == 8
+
+
+def test_no_drone_of_the_command_in_docs_flying_starts_inside_a_house() -> None:
+    page = (STREET.parents[1] / "docs" / "flying.md").read_text(encoding="utf-8")
+    found = re.search(r"obstacles:=experiments/street.yaml spacing:=(\d+) gridsize:=(\d+)`", page)
+    assert found is not None
+    street = read_obstacles(STREET)
+    fleet = plan_fleet(1, DEFAULT_ROUTERS, int(found[2]), float(found[1]))
+    assert [drone for _, _, *drone in fleet if not street.is_free((drone[0], drone[1], 0.1))] == []
 
 
 @pytest.mark.parametrize(

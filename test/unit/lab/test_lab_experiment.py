@@ -414,7 +414,7 @@ def keys_of(part: Any, before: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]
             yield from keys_of(field.annotation, (*before, name))
 
 
-@pytest.mark.parametrize("value", ["[[]]", ".nan", "-1e300"])
+@pytest.mark.parametrize("value", ["[[]]", ".nan", "-1.0e+300"])
 @pytest.mark.parametrize("keys", list(keys_of(Scenario)), ids=".".join)
 def test_every_key_refuses_what_is_of_another_type_or_out_of_range(
     tmp_path: Path, keys: tuple[str, ...], value: str

@@ -241,10 +241,18 @@ def test_lapses_are_the_times_in_which_a_router_has_a_path_and_is_not_served_or_
     for now_s, (states, served_now) in enumerate(zip(connected, served)):
         watch.look(NetworkSample(float(now_s), both, states, served_now), line, [0])
     watch.look(NetworkSample(6.0, both, both, both), line, [0])
-    assert sorted(watch.service.lapses_s) == [1.0, 1.0, 2.0]
+    assert sorted(watch.service.lapses_s(6.0)) == [1.0, 1.0, 2.0]
     assert watch.service.shares == [0.5, 0.5, 1.0, 0.0, 1.0, 1.0]
-    assert sorted(watch.connection.lapses_s) == [1.0, 1.0, 2.0]
+    assert sorted(watch.connection.lapses_s(6.0)) == [1.0, 1.0, 2.0]
     assert watch.connection.shares == [1.0, 0.5, 1.0, 0.0, 0.5, 1.0]
+
+
+def test_a_lapse_that_never_ends_counts_up_to_the_end() -> None:
+    watch = LinkWatch(0.0)
+    for now_s in range(5):
+        alone, nobody = frozenset({1}), frozenset()
+        watch.look(NetworkSample(float(now_s), alone, nobody, nobody), Graph({0: [1], 1: [0]}), [0])
+    assert watch.service.lapses_s(9.0) == watch.connection.lapses_s(9.0) == [8.0]
 
 
 CHANNEL = {"kind": "shared", "rate": "1M"}

@@ -347,6 +347,14 @@ def test_a_load_waits_for_routers_that_live() -> None:
     assert 0 < len(record.messages) < 60
 
 
+def test_links_are_watched_only_in_a_run_with_motion_churn_or_probes() -> None:
+    names = list(METRICS)
+    watched = names[names.index("link_changes") : names.index("unconnected_p99_s") + 1]
+    quiet = measure_all(run(duration_s=8))
+    assert [name for name in watched if not math.isnan(quiet[name])] == []
+    assert measure_all(run(duration_s=8, probes={"per_s": 1, "from_s": 4}))["reachable"] == 1.0
+
+
 def test_links_of_a_mesh_without_probes_are_watched_from_the_start() -> None:
     moving = {"kind": "random_waypoint", "speed_m_s": 2.0}
     measured = measure_all(run(mobility=moving, duration_s=15))

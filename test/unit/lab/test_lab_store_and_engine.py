@@ -212,6 +212,17 @@ def test_a_store_that_is_damaged_is_refused_in_one_line(
     assert "runs.sqlite: file is not a database; what was written before is kept" in error
 
 
+def test_a_shard_does_not_know_whether_all_runs_together_are_enough(
+    experiment: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, out = experiment("stop: {metric: packets, half_width: 1000000}\n"), tmp_path / "out"
+    assert run(path, out, "--shard", "0/2") == 1
+    assert "--shard: `stop` needs the runs of all shards" in capsys.readouterr().err
+    assert not out.exists()
+    assert run(path, out, "stop=null", "--shard", "0/2") == 0
+    assert len(read_rows(out / "runs.csv")) == 4
+
+
 @pytest.mark.slow
 def test_shards_of_different_experiments_are_not_merged(
     experiment: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -257,6 +268,9 @@ def test_a_metric_without_a_number_is_named(
     run(experiment("metrics: ['own_lab_parts:nothing']\n"), tmp_path / "out", "seeds=1")
     words = "metric own_lab_parts:nothing returned None, not a number"
     assert f"failed: ConfigurationError: {words}" in capsys.readouterr().out
+    (failure,) = read_rows(tmp_path / "out/failures.csv")[:1]
+    assert lab("show", tmp_path / "out", failure["run"]) == 1  # the command that repeats it
+    assert f"lab: {words}" in capsys.readouterr().err
 
 
 def test_a_metric_of_the_users_is_a_column(experiment: Callable[..., Path], tmp_path: Path) -> None:

@@ -56,7 +56,7 @@ def service(run: RunRecord) -> list[float]:
     lapse_p99_s="99th percentile of these times",
 )
 def lapses(run: RunRecord) -> list[float]:
-    return percentiles(run.links.service.lapses_s, 0.5, 0.99)
+    return percentiles(run.links.service.lapses_s(run.end_s), 0.5, 0.99)
 
 
 @metrics(
@@ -76,7 +76,7 @@ def connection(run: RunRecord) -> list[float]:
     unconnected_p99_s="99th percentile of these times",
 )
 def unconnected(run: RunRecord) -> list[float]:
-    return percentiles(run.links.connection.lapses_s, 0.5, 0.99)
+    return percentiles(run.links.connection.lapses_s(run.end_s), 0.5, 0.99)
 
 
 @metrics(
