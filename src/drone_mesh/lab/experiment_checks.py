@@ -12,7 +12,7 @@ from typing_extensions import get_args
 
 from drone_mesh.arguments import MOST, is_up_to
 from drone_mesh.drone.fleet import ids_in_words
-from drone_mesh.drone.goal import check_apart
+from drone_mesh.drone.goal import check_apart, check_goal
 from drone_mesh.errors import ConfigurationError, GoalRefused
 from drone_mesh.formations.layouts import Layouts, UnknownCase
 from drone_mesh.lab import places
@@ -135,6 +135,7 @@ def _mistakes(scenario: Scenario) -> Iterator[tuple[KeyPath, str]]:
     if scenario.model == "ideal":
         yield from _wrong_in_ideal(scenario)
     yield from _wrong_layouts(scenario)
+    yield from _wrong_goals(scenario)
     yield from _wrong_ids(scenario)
     yield from _late_begins(scenario)
 
@@ -173,6 +174,17 @@ def _wrong_layouts(scenario: Scenario) -> Iterator[tuple[KeyPath, str]]:
                 f"{corners} drones would stand {apart_m:.2f} m apart: the clearance is "
                 f"{clearance_m:g} m",
             )
+
+
+def _wrong_goals(scenario: Scenario) -> Iterator[tuple[KeyPath, str]]:
+    fence = scenario.fence.fence()
+    for index, fault in enumerate(scenario.faults):
+        if fault.order is not None and fault.order.to is not None:
+            x, y, height = (*fault.order.to, 0.0)[:3]
+            try:
+                check_goal(y, x, height, fence)
+            except GoalRefused as error:
+                yield ("faults", index, "order", "to"), str(error)
 
 
 def _wrong_ids(scenario: Scenario) -> Iterator[tuple[KeyPath, str]]:
@@ -214,7 +226,11 @@ def _late_begins(scenario: Scenario) -> Iterator[tuple[KeyPath, str]]:
         begins.append((("probes", "from_s"), scenario.probes.from_s + scenario.probes.within_s))
     if scenario.mobility.knots:
         begins.append((("mobility", "path"), min(t for _id, t, *_place in scenario.mobility.knots)))
+    end = f"the end of the run (duration_s {scenario.duration_s:g})"
     for place, begin_s in begins:
         if begin_s is not None and begin_s >= scenario.duration_s:
-            end = f"the end of the run (duration_s {scenario.duration_s:g})"
             yield place, f"begins at {begin_s:g} s, after {end}"
+    for index, fault in enumerate(scenario.faults):
+        counts_s = (fault.at_s or 0.0) + fault.load.counted_after_s if fault.load else 0.0
+        if counts_s >= scenario.duration_s:
+            yield ("faults", index, "load"), f"counts from {counts_s:g} s on, after {end}"

@@ -25,7 +25,6 @@ from drone_mesh.lab.scenario_parts import (
     Above0,
     AtLeast0,
     Fault,
-    NodeId,
     Part,
     PartOfKind,
     Point,
@@ -49,6 +48,7 @@ _MOTION: Dict[str, FrozenSet[str]] = {
     "eight": frozenset({"radius_m", *_MODEL}),
     "trace": frozenset({"path", "knots"}),
 }
+_Drones = Annotated[int, Field(ge=2, le=MAX_DRONES)]
 _DRAWN = ("drones", "gateways", "ids")
 _RANDOM = (*_DRAWN, "width_m", "least_distance_m", "require", "gateway_at")
 
@@ -66,7 +66,7 @@ class Layout(PartOfKind):
     }
 
     kind: Literal["uniform", "clusters", "grid", "line", "casus", "file"] = "uniform"
-    drones: Annotated[int, Field(ge=2, le=MAX_DRONES)] = 25  # gateways included
+    drones: _Drones = 25  # gateways included
     gateways: Annotated[int, Field(ge=1, le=MAX_DRONES)] = 1
     ids: Literal["in_order", "shuffled"] = "in_order"
     mean_degree: Optional[Annotated[float, Field(gt=0, le=253)]] = None  # uniform; default: 8
@@ -283,10 +283,17 @@ class Sequence(Part):
         *DEATHS, "silent_for_a_while", "links_cut", "restarted_cut_off", "goes_mute", "goes_deaf",
     )  # fmt: skip
 
-    drones: Annotated[List[NodeId], Field(min_length=2, max_length=2)] = [8, 60]  # least, most
+    drones: Annotated[List[_Drones], Field(min_length=2, max_length=2)] = [8, 60]  # least, most
     density: Annotated[List[Above0], Field(min_length=2, max_length=2)] = [7.0, 9.0]
     """Least and most neighbours of a drone far from the edge."""
-    incidents: List[str] = list(DEATHS)
+    incidents: Annotated[List[str], Field(min_length=1)] = list(DEATHS)
+
+    @field_validator("drones", "density")
+    @classmethod
+    def _are_in_order(cls, ends: List[float]) -> List[float]:
+        if ends[0] > ends[1]:
+            raise ValueError("give the least first, then the most")
+        return ends
 
     @field_validator("incidents")
     @classmethod

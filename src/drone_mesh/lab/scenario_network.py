@@ -92,6 +92,8 @@ def put_obstacles(network: Network, impairments: Impairments, scenario: Scenario
 
 def put_noise(network: Network, jam: Jam, range_m: float, rng: random.Random) -> Callable[[], None]:
     """Start a transmitter of noise on a shared channel; returns what stops it."""
+    if not jam.loss:
+        return lambda: None
     air = cast(ChannelAir, network.air)
     mhz = 2400 + air.settings.channel
     links, (x, y) = air.space.links, jam.center

@@ -10,7 +10,7 @@ from typing import Callable, ContextManager, Iterable, Iterator, NamedTuple, Seq
 
 from drone_mesh.communication.data.outgoing import Ticket
 from drone_mesh.communication.events.observer import MeshEventKind
-from drone_mesh.errors import QueueFull
+from drone_mesh.errors import GoalRefused, QueueFull
 from drone_mesh.inprocess import Network
 from drone_mesh.lab.flights import Flights
 from drone_mesh.lab.formations import Formations
@@ -303,13 +303,19 @@ class Timeline:
         return []
 
     def send_order(self, node: int, x: float, y: float, height: int) -> None:
-        """Order a drone to x, y (m) through the first gateway that is on."""
+        """Order a drone to x, y (m) through the first gateway that is on.
+
+        A goal outside the fence is refused to whoever gives the order, so there is none.
+        """
         gateway = next(
             (g for g in gateways_of(self._network) if self._network.nodes[g].antenna.powered), None
         )
-        taken = gateway is not None and self._network.order(
-            node, x, y, height, gateway, allow_shared_place=True
-        )
+        try:
+            taken = gateway is not None and self._network.order(
+                node, x, y, height, gateway, allow_shared_place=True
+            )
+        except GoalRefused:
+            return
         self.orders.append(OrderAttempt(self._network.clock.now_s, node, taken))
 
     def _send(self, fault: Fault, _rng: random.Random) -> list[int]:

@@ -313,6 +313,14 @@ def test_orders_are_counted_with_those_that_arrived() -> None:
     assert measure_all(run(faults=[cut, *faults], layout=pair))["order_delivery"] == 0.0
 
 
+def test_random_orders_to_places_outside_the_fence_are_not_given() -> None:
+    yard = {"polygon": [[-3, -3], [9, -3], [9, 3], [-3, 3]]}
+    faults = [{"at_s": 10, "order": {"every_s": 1, "within_m": 8}}]
+    pair = {"kind": "line", "drones": 2}
+    measured = measure_all(run(faults=faults, layout=pair, fence={"areas": [yard]}))
+    assert 0 < measured["orders"] < 29
+
+
 def test_each_departure_is_that_of_one_order() -> None:
     away = {"between": [0, 1], "for_s": 5}
     faults = [
@@ -339,6 +347,22 @@ def test_messages_that_a_queue_has_no_room_for_were_not_offered() -> None:
     burst = {"at_s": 20, "send": {"ids": [1], "number": 1000, "size": 16}}
     record = run(faults=[burst], layout={"kind": "line", "drones": 2})
     assert 0 < len(record.messages) < 1000
+
+
+def test_no_time_gives_no_rate_of_messages() -> None:
+    pair = {"kind": "line", "drones": 2}
+    itself = {"at_s": 20, "send": {"ids": [0], "number": 2, "size": 16}}
+    assert math.isnan(measure_all(run(faults=[itself], layout=pair))["data_rate"])
+    late = {"when": "1 s after all connected", "load": {"per_s": 5, "counted_after_s": 60}}
+    measured = measure_all(run(faults=[late], layout=pair))
+    assert math.isnan(measured["taken_rate"])
+    assert math.isnan(measured["arrival_rate"])
+
+
+def test_a_jammer_that_never_sends_disturbs_nobody() -> None:
+    jam = {"at_s": 5, "jam": {"center": [0, 0], "radius_m": 9, "loss": 0}}
+    jammed, quiet = (run(radio={"kind": "shared"}, faults=faults) for faults in ([jam], []))
+    assert jammed.air == quiet.air
 
 
 def test_a_load_waits_for_routers_that_live() -> None:

@@ -110,7 +110,7 @@ def data_rate(run: RunRecord) -> float:
     if not run.received:
         return 0.0 if run.messages else NAN
     seconds = max(message.received_s for message in run.received) - run.messages_since_s
-    return sum(len(message.payload) for message in run.received) * 8 / seconds / 1000
+    return ratio(sum(len(message.payload) for message in run.received) * 8 / 1000, seconds)
 
 
 @more("share", "users' messages that arrived; reliable ones: as their sender knows")
@@ -122,12 +122,17 @@ def data_delivered(run: RunRecord) -> float:
 
 @metric("1/s", "users' messages that the queues of the drones took")
 def taken_rate(run: RunRecord) -> float:
-    return len(run.messages) / (run.end_s - run.messages_since_s)
+    return ratio(len(run.messages), _counted_s(run))
 
 
 @more("1/s", "users' messages that arrived")
 def arrival_rate(run: RunRecord) -> float:
-    return len(run.received) / (run.end_s - run.messages_since_s)
+    return ratio(len(run.received), _counted_s(run))
+
+
+def _counted_s(run: RunRecord) -> float:
+    """The time in which messages count."""
+    return max(0.0, run.end_s - run.messages_since_s)
 
 
 @more("", "Jain's index of the share that arrived, over senders at equal hops; least of all hops")
