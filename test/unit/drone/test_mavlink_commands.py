@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 
 import pytest
-from mavlink_rig import ARDUPILOT, Rig
+from mavlink_rig import ARDUPILOT, Rig, in_flight
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from drone_mesh.drone.location import Location
@@ -116,6 +116,32 @@ def test_a_drone_that_never_leaves_the_ground_is_given_up_with_the_reason() -> N
     rig.goal(10.0, 0.0, 5.0)
     rig.run_until("it gave up", lambda: not rig.status().is_flying, within_s=60.0)
     assert rig.status().ended.startswith("taking off: ") or rig.status().ended == "disarmed"
+
+
+@pytest.mark.parametrize(
+    ("target", "why"),
+    [
+        ((255, mavlink.MAV_COMP_ID_MISSIONPLANNER), ""),  # QGroundControl, also system 255
+        ((254, mavlink.MAV_COMP_ID_ONBOARD_COMPUTER), ""),
+        ((255, mavlink.MAV_COMP_ID_ONBOARD_COMPUTER), "landing: the autopilot refused: denied"),
+        ((0, 0), "landing: the autopilot refused: denied"),  # MAVLink 1, and older releases
+    ],
+)
+def test_what_the_autopilot_answers_to_another_program_is_no_answer_to_this_one(
+    target: tuple[int, int], why: str
+) -> None:
+    rig = in_flight(ARDUPILOT)
+    rig.down.loses = lambda: rig.status().phase is Phase.LANDING
+    rig.goal(0.0, 0.0, 0.0, lands=True)
+    rig.reach(Phase.LANDING)
+    land, denied = mavlink.MAV_CMD_NAV_LAND, mavlink.MAV_RESULT_DENIED
+    rig.step()
+    rig.up.send(mavlink.MAVLink_command_ack_message(land, denied, 0, 0, *target))
+    rig.run(2.0)
+    rig.down.loses = lambda: False
+    assert rig.status().ended == why
+    if not why:
+        rig.run_until("it has landed", lambda: rig.place.height == 0.0)
 
 
 @BOTH

@@ -61,6 +61,7 @@ def _is_on(value: float) -> bool:
 
 
 OUR_SYSTEM_ID = 255  # of a ground station: the autopilot's failsafe watches its heartbeat
+US = (OUR_SYSTEM_ID, mavlink.MAV_COMP_ID_ONBOARD_COMPUTER)  # QGroundControl is 255, too
 
 ARDUPILOT = Autopilot(
     name="ArduPilot",

@@ -14,7 +14,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from drone_mesh.drone.fence import OF_AUTOPILOT, Fence, Rule, Zone
 from drone_mesh.drone.geodesy import EarthPlace, Origin
-from drone_mesh.drone.mavlink.autopilots import OUR_SYSTEM_ID, PX4
+from drone_mesh.drone.mavlink.autopilots import PX4, US
 from drone_mesh.drone.mavlink.telemetry import Message, Telemetry
 from drone_mesh.errors import ConfigurationError
 
@@ -24,7 +24,6 @@ TRIES = 5  # without any answer, or that ended in an error
 LOOK_AGAIN_S = 10.0  # after the last answer
 MOST_ITEMS = 500
 FAR_M = 20_000.0  # the circle of a fence that only has a ceiling; no goal is so far from home
-_US = (OUR_SYSTEM_ID, mavlink.MAV_COMP_ID_ONBOARD_COMPUTER)
 _RETURN_POINT = mavlink.MAV_CMD_NAV_FENCE_RETURN_POINT
 _ITEMS = {  # whether it is one of the corners of an area, and whether to stay inside
     mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION: (True, True),
@@ -100,7 +99,7 @@ class OwnFence:
     def on_mission(self, message: Message, now_s: float) -> None:
         """MISSION_COUNT, MISSION_ITEM_INT or MISSION_ACK, also of others' transfers."""
         kind = message.get_type()
-        is_ours = (message.target_system, message.target_component) == _US
+        is_ours = (message.target_system, message.target_component) == US
         if kind == "MISSION_ITEM_INT":
             # PX4 before 1.14.1 leaves out the mission type of items (PX4-Autopilot#22069).
             if is_ours and self._count is not None:

@@ -17,6 +17,7 @@ from drone_mesh.drone.flight_path import Point
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.authority import Authority, FlightArea
+from drone_mesh.drone.mavlink.autopilots import US
 from drone_mesh.drone.mavlink.commander import CARRIED_OUT_WITHIN_S, Commander
 from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions
 from drone_mesh.drone.mavlink.own_fence import OwnFence
@@ -86,8 +87,9 @@ class MavlinkPilot:
         if message.get_type() == "HEARTBEAT":
             self._authority.on_heartbeat(now_s, self._phase)
         elif message.get_type() == "COMMAND_ACK":
-            self._commander.on_ack(message, now_s)
-            self._on_ack(message, now_s)
+            if _is_for_us(message):
+                self._commander.on_ack(message, now_s)
+                self._on_ack(message, now_s)
         elif message.get_type() == "STATUSTEXT":
             self._commander.on_text(message)
         elif message.get_type() == "PARAM_VALUE":
@@ -435,3 +437,9 @@ class MavlinkPilot:
             return
         self._target_due_s = now_s + TARGET_PERIOD_S
         self._commander.target(self._area.to_earth(target))
+
+
+def _is_for_us(acknowledgement: Message) -> bool:
+    """A router or an autopilot also passes on what answers a ground station; 0: not told."""
+    target = acknowledgement.target_system, acknowledgement.target_component
+    return all(told in (0, own) for told, own in zip(target, US))
