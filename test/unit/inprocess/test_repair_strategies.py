@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import random
+from collections import Counter
 
 import pytest
 from scenarios import LAYOUTS, events, fleet, flown, layout, line, outage, placed, run_until
@@ -158,6 +159,8 @@ def test_all_drones_are_back_at_their_places_after_a_silence(silence_s):
     assert network.run_until(network.all_connected, within_s=20.0)
     network.run_for(20.0)
     assert {n for n, at in before.items() if network.location(n).distance_m(at) > 0.1} == set()
+    flights = Counter(node for _at_s, node, _to in events(network, "FLIGHT_DECIDED"))
+    assert set(flights.values()) <= ({2, 4, 6} if silence_s >= 300.0 else {2})  # there and back
 
 
 def test_while_their_channel_is_jammed_no_drone_moves():
