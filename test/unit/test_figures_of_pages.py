@@ -1,4 +1,4 @@
-"""Numbers on the pages about ROS, views, repairs and motion are those of the code."""
+"""Numbers on the pages are those of the code."""
 
 from __future__ import annotations
 
@@ -7,32 +7,43 @@ from pathlib import Path
 
 import pytest
 
-from drone_mesh.air.obstacles import BOX_CLEARANCE_M
+from drone_mesh import fence_file
+from drone_mesh.air.obstacles import BOX_CLEARANCE_M, CUT_DB, METRE_DB
 from drone_mesh.communication.control.control_plane import ITechnique
 from drone_mesh.communication.data.packets import MAX_MESSAGE_BYTES
 from drone_mesh.communication.repair import c3r, fiedler, group_repair, legs, lone_repair
 from drone_mesh.communication.repair import named_backup as backup
 from drone_mesh.communication.repair.interfaces import SILENCE_PATIENCE
-from drone_mesh.communication.repair.spots import PITCH, WITHIN_REACH
+from drone_mesh.communication.repair.options import RANGE_M
+from drone_mesh.communication.repair.spots import LOWEST_M, PITCH, WITHIN_REACH
 from drone_mesh.communication.repair.virtual_spring import REST
 from drone_mesh.communication.routing.techniques import etx_tree
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.communication.wire.packet_types import TECHNIQUE_TYPES
 from drone_mesh.console import demonstration, earth, history, put_back
-from drone_mesh.drone import flight_path, goal
+from drone_mesh.drone import fence, flight_path, goal, way_round
+from drone_mesh.drone.battery import LAND_AT_PERCENT
+from drone_mesh.drone.mavlink import authority, commander, own_fence, pilot, telemetry
+from drone_mesh.drone.mavlink.limits import FlightLimits
+from drone_mesh.drone.route import LEAD_S
 from drone_mesh.earth_files import MAX_CHARACTERS
 from drone_mesh.earth_files.placemarks import STEP_M
 from drone_mesh.earth_files.plan import MAX_PLAN_CHARACTERS
 from drone_mesh.execution import REQUESTS_PER_STEP
 from drone_mesh.formations import airspace, departures, mission_files, missions, standing_order
 from drone_mesh.inprocess import drone as inprocess
+from drone_mesh.inprocess.radio import HOP_DELAY_S
 from drone_mesh.internet.http_internet import ANSWER_WITHIN_S
+from drone_mesh.lab import engine, estimate, experiment, plan, policies, scenario, statistics
+from drone_mesh.lab.scenario_parts import Churn
+from drone_mesh.nrf24.settings import RadioSettings
 from drone_mesh.raspberry.node_events import EVENTS_KEPT
 from drone_mesh.state.alarms import LOW_BATTERY_PERCENT
 from drone_mesh.state.condition import SILENT_AFTER_S
 from drone_mesh.state.links import JUST_LOST_S, SOON_S
 from drone_mesh.state.packets import MOST_SAMPLED
 from drone_mesh.web.access import FREE_GUESSES, GUESS_PERIOD_S
+from drone_mesh.world.dynamic_engine import BodyLimits
 
 ROOT = Path(__file__).resolve().parents[2]
 WORDS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
@@ -58,6 +69,10 @@ LARGE_S = 254 * of_ros("host/host_reports.py", "REPORT_PERIOD_PER_NODE_S")
 AGAIN_S = of_ros("host/node_access.py", "ORDER_PERIOD_S")
 AT_ONCE = of_ros("host/node_access.py", "MOST_ORDERS_AT_ONCE")
 INFO_S = of_ros("world/engine_server.py", "INFO_PERIOD_S")
+LIMITS = FlightLimits()
+LAYERS = 1 + int((LIMITS.max_height_m - LIMITS.cruise_height_m) / LIMITS.layer_m)
+BODY = BodyLimits()
+HOP_S = RadioSettings().acknowledged_s
 
 SENTENCES = {
     "ros": [
@@ -142,6 +157,67 @@ SENTENCES = {
         f"Without one: {missions.DEFAULT_SPEED_M_S:g} m/s",
         f"Up to {mission_files.MOST_WAYPOINTS:,} waypoints, and {MAX_PLAN_CHARACTERS:,} characters",
         f"more than {goal.MAX_COORDINATE_M / 1000:g} km away",
+    ],
+    "flying": [
+        f"| height above home | {LIMITS.max_height_m:g} m |",
+        f"| horizontal distance from home | {LIMITS.max_distance_m:g} m |",
+        f"| speed | {LIMITS.speed_m_s:g} m/s |",
+        f"| battery to start a flight | {LIMITS.min_battery_percent:g} % |",
+        f"| cruise height | {LIMITS.cruise_height_m:g} m, plus a layer of {LIMITS.layer_m:g} m per "
+        f"node ({LAYERS} layers)",
+        f"whose ids differ by {LAYERS} share one",
+        f"its height in the next {authority.FELL_WITHIN_S:g} s says",
+        f"{pilot.HOLD_TARGETS_S:g} s after a flight the program sends ArduPilot no more targets",
+        f"home is more than {authority.HOME_OFF_M:g} m above or below `--origin`",
+        f"more than {fence_file.MOST_AREAS} areas, {fence.MOST_CORNERS} corners of one area and "
+        f"{fence_file.MOST_CORNERS:,} of all (a circle has {fence.CIRCLE_CORNERS})",
+        f"none past at most {way_round.MOST_MET} areas and obstacles, or none among the first "
+        f"{way_round.MOST_LEGS:,} straight pieces",
+        f"in the way to one of the {WORDS[way_round.MOST_ENTRIES]} nearest places inside",
+        f"and again every {own_fence.LOOK_AGAIN_S:g} s, at once",
+        f"for {own_fence.TRIES * own_fence.ASK_AGAIN_S:g} s does not answer",
+        f"hangs at the fence for {pilot.STALLED_S:g} s",
+        f"more than {-LOWEST_M:g} m below it",
+        f"was heard in the last {telemetry.HEARTBEAT_LOST_S:g} s",
+        f"a good estimate, not older than {telemetry.FRESH_S:g} s",
+        f"within {goal.MAX_COORDINATE_M / 1000:g} km of the origin",
+        f"have not moved in the last {telemetry.STICKS_REST_S:g} s",
+        f"for the effect: {commander.CARRIED_OUT_WITHIN_S:g} s, {pilot.TAKE_OFF_WITHIN_S:g} s for",
+        f"heartbeats at {telemetry.HEARTBEAT_HZ:g} Hz and for GPS and estimator at "
+        f"{telemetry.ESTIMATE_HZ:g} Hz",
+        f"leads by {LEAD_S:g} s of flight",
+        f"a body of {BODY.mass_kg:g} kg with drag",
+        f"a battery for {BODY.power.hover_s / 60:g} minutes in the air",
+        f"its speed changes by {BODY.crash_m_s:g} m/s",
+        f"in the air for {'half a second' if BODY.held_s == 0.5 else '?'}",
+        f"At {LAND_AT_PERCENT:g} % of its battery a drone lands",
+    ],
+    "lab": [
+        f"at most {experiment.MOST_CELLS:,} cells and {experiment.MOST_RUNS:,} runs",
+        f"(with more than {estimate.MOST_CELLS} cells, of every n-th)",
+        f"repeats them for about {estimate.BUDGET_S:g} s",
+        f"at least {'a quarter' if estimate.LEAST_SHARE == 0.25 else '?'} of a run",
+        f"of these runs is {plan.CONTROL_FROM:,} and up",
+        f"one run, {experiment.Experiment.model_fields['timeout_s'].default:g} by default",
+        f"after `within_s` ({scenario.Probes().within_s:g} s) is lost",
+        f"at once `every_s` ({Churn().every_s:g} s)",
+        f"{CUT_DB['brick']:g} dB for each surface crossed and {METRE_DB:g} dB for each metre",
+        f"`drones: {scenario.Sequence().drones}`",
+        f"nor do fewer than {WORDS[statistics.FEWEST]} values of a mean",
+        f"kills its worker {WORDS[engine.DEATHS_ALLOWED + 1]} times",
+        f"than `max_distance_m` ({RANGE_M:g} m) hear each other",
+        f"takes `delay_s` ({1000 * HOP_DELAY_S:g} ms)",
+    ],
+    "rl": [
+        f"in shares -1..1 of {'half' if policies.LEG == 0.5 else '?'} the range",
+        f"{policies.LOOK_S:g} s after a flight, {policies.STAY_S:g} s after it stayed",
+        f"of the {policies.SLOTS} nearest neighbours",
+        f"{policies.PlacementPolicy.STEP_S:g} s or more, until some agent may act | "
+        f"{policies.RoutingPolicy.STEP_S:g} s, the check period",
+    ],
+    "performance": [
+        f"its acknowledgement take {1000 * HOP_S:.2f} ms, settling times included, so it carries "
+        f"at most {1 / HOP_S:.0f} packets a second",
     ],
 }
 

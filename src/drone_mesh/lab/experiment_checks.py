@@ -146,6 +146,8 @@ def _wrong_in_ideal(scenario: Scenario) -> Iterator[tuple[KeyPath, str]]:
         yield ("faults",), "with model ideal one kill, of a random share or number or cut vertices"
     if scenario.obstacles.boxes:
         yield ("obstacles",), "model ideal has none: its drones fly straight"
+    if scenario.sequence is not None:
+        yield ("sequence",), "model ideal has none: it knows one kill"
 
 
 def _wrong_layouts(scenario: Scenario) -> Iterator[tuple[KeyPath, str]]:

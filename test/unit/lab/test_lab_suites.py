@@ -166,6 +166,7 @@ KILL = "{at_s: 9, kill: {number: 1}}"
             f"faults: [{KILL}]\n  obstacles: {{boxes: [{{center: [9, 9, 2], size: [2, 2, 4]}}]}}",
             "line 6: obstacles: model ideal has none: its drones fly straight",
         ),
+        (f"faults: [{KILL}]\n  sequence: {{}}", "line 6: sequence: model ideal has none"),
     ],
 )
 def test_what_no_run_without_packets_can_do_is_refused_when_the_file_is_read(
