@@ -91,6 +91,30 @@ def test_the_code_of_a_page_runs_without_extras(page, tmp_path):
     assert done.returncode == 0, done.stdout
 
 
+@pytest.mark.slow
+@pytest.mark.skipif(sys.version_info < (3, 10), reason="sys.stdlib_module_names")
+def test_each_public_name_is_there_without_extras_but_those_that_the_page_excepts():
+    excepted = {"drone_mesh.lab.env", "drone_mesh.nrf24.emulator.cooperative_clock"}
+    exceptions = ARCHITECTURE.partition("has what they need, except")[2].partition(".\n")[0]
+    need_extras = re.findall(r"`(\w+)`", exceptions)
+    assert "lab" in need_extras
+    modules = [m for m in PUBLIC if m not in excepted and not m.startswith(NEEDS_ROS)]
+    lines = [
+        f"from {module} import {name}"
+        for module in modules
+        for name in exported_by(module)
+        if name not in need_extras
+    ]
+    done = subprocess.run(
+        [sys.executable, "-c", WITHOUT_EXTRAS + "\n".join(lines)],
+        env={"PYTHONPATH": str(ROOT / "src")},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+    assert done.returncode == 0, done.stdout
+
+
 def test_the_base_of_an_installation_is_what_its_file_lists():
     lines = (ROOT / "requirements" / "base.txt").read_text(encoding="utf-8").splitlines()
     assert [re.match(r"\w*", line)[0] for line in lines if not line.startswith("#")] == ["numpy"]
