@@ -13,6 +13,7 @@ from drone_mesh.channel.radio import PacketRadio, Received
 from drone_mesh.channel.runtime import Runtime, SystemRuntime, Task
 from drone_mesh.channel.sender import Sender
 from drone_mesh.channel.statistics import ChannelMeter, LinkQuality, Quality, RadioStatistics
+from drone_mesh.communication.events.observer import in_hops
 from drone_mesh.communication.interfaces import (
     BROADCAST,
     MAX_NODE_ID,
@@ -203,15 +204,16 @@ class PacketAntenna(IWirelessCommunication):
 
     def _show(self, info: IMeshDebugInfo) -> None:
         use = self.channel_use()
-        place_of = info.get_last_good_known_location_id()
+        place_of, connection = info.get_last_good_known_location_id(), "not connected"
+        if info.get_connected_to_gateway():
+            hops = in_hops(info.get_hops_from_gateway_away())
+            connection = f"connected, gateway {info.get_preferred_gateway()}, {hops}"
         logger.info(
-            "node %d: %s, %s, gateway %d, %d hops, %d nodes known, %d messages sent, steps back to "
+            "node %d: %s, %s, %d nodes known, %d messages sent, steps back to "
             "%s; airtime %.1f %%, %.2f tries per packet, %d waiting, %d given up",
             info.get_node_id(),
             "on" if self.powered else "off",
-            "connected" if info.get_connected_to_gateway() else "not connected",
-            info.get_preferred_gateway(),
-            info.get_hops_from_gateway_away(),
+            connection,
             info.get_router_tech_table_size(),
             info.get_total_message_sent(),
             "none" if place_of == NO_ROUTE else f"node {place_of}",

@@ -222,6 +222,28 @@ def test_debugging_mode_logs_a_line_per_period_until_it_is_switched_off(lab, nod
     )
 
 
+@pytest.mark.parametrize(
+    ("connected", "gateway", "hops", "words"),
+    [(True, 0, 1, "connected, gateway 0, 1 hop"), (False, 255, 255, "not connected")],
+)
+def test_the_line_of_a_node_names_its_gateway_only_if_it_has_one(
+    lab, nodes, caplog, connected, gateway, hops, words
+):
+    info = SimpleNamespace(
+        **{
+            **vars(INFO),
+            "get_connected_to_gateway": lambda: connected,
+            "get_preferred_gateway": lambda: gateway,
+            "get_hops_from_gateway_away": lambda: hops,
+        }
+    )
+    with caplog.at_level(logging.INFO):
+        nodes[1].antenna.debugging_mode(info, True)
+        lab.clock.sleep(11.0)
+    (line,) = (record.getMessage() for record in caplog.records)
+    assert line.startswith(f"node 1: on, {words}, 42 nodes known, ")
+
+
 def test_the_use_of_the_channel_is_measured(lab, nodes):
     antenna = nodes[0].antenna
     antenna.channel_use()
