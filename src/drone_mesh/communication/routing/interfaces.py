@@ -74,7 +74,7 @@ class IRoutingEssentials(abc.ABC):
 
     @abc.abstractmethod
     def place_of(self, node: int) -> Location | None:
-        """The last reported place of `node`, or None."""
+        """The last reported place of this node's gateway or next hop to it; None: of others."""
 
 
 class IRoutingTechnique(ITechnique, IRoutes):

@@ -72,6 +72,19 @@ def test_a_technique_given_by_its_path_carries_a_mesh_its_orders_and_the_death_o
     assert network.run_until(lambda: all(map(network.connected, left)), within_s=60.0)
 
 
+def test_a_technique_knows_the_places_of_its_gateway_and_its_next_hop_and_of_no_other_neighbour():
+    network = Network(seed=3, routing=f"{__name__}:LatestNeighbour")
+    network.add_fleet(gateways=1, routers=11, gridsize=4, spacing=6.0)
+    network.run_for(60.0)
+    technique = network.nodes[11].component.control.routes
+    next_hop, essentials = technique.get_direction_to_node(0), technique._essentials
+    assert essentials.place_of(0) == network.location(0)
+    assert essentials.place_of(next_hop) == network.location(next_hop)
+    others = technique.get_set_of_children() - {0, next_hop}
+    assert len(others) >= 2
+    assert {essentials.place_of(node) for node in others} == {None}
+
+
 def test_by_default_a_heartbeat_proves_a_path_and_other_packets_teach_it_only_to_the_unknown():
     data, heartbeat = 0x80, 0x04
     technique = LatestNeighbour()
