@@ -30,7 +30,7 @@ def requirements(name: str) -> list[str]:
 # The mesh's hot path, which mypyc can compile (docs/decisions.md, "The core may be compiled").
 # Not in it: what users derive from, and classes with two bases.
 HOT = {
-    "channel": "access_rules medium_access packet_queue statistics",
+    "channel": "access_rules medium_access packet_queue statistics trains",
     "communication": "neighbours timing",
     "communication/beacon": "connection courier disputes neighbour own_beacons packets plane routes"
     " times verdicts",

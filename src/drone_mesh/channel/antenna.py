@@ -7,12 +7,12 @@ import math
 from dataclasses import replace
 from typing import Callable, Mapping
 
-from drone_mesh.channel.medium_access import place_in_train
 from drone_mesh.channel.packet_queue import ALL_NODES
 from drone_mesh.channel.radio import PacketRadio, Received
 from drone_mesh.channel.runtime import Runtime, SystemRuntime, Task
 from drone_mesh.channel.sender import Sender
 from drone_mesh.channel.statistics import ChannelMeter, LinkQuality, Quality, RadioStatistics
+from drone_mesh.channel.trains import place_in_train
 from drone_mesh.communication.events.observer import in_hops
 from drone_mesh.communication.interfaces import (
     BROADCAST,

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Callable
 
-from drone_mesh.channel.medium_access import Fate, InTrain
+from drone_mesh.channel.medium_access import Fate
 from drone_mesh.channel.packet_queue import ALL_NODES, OutgoingPacket
 from drone_mesh.channel.radio import PacketRadio, Try
 from drone_mesh.channel.runtime import Runtime, Task
+from drone_mesh.channel.trains import InTrain
 from drone_mesh.communication.wire.packet_types import Priority
 
 

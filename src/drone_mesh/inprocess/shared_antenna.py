@@ -6,9 +6,10 @@ import math
 import random
 from typing import Final
 
-from drone_mesh.channel.medium_access import Fate, MediumAccess, place_in_train
+from drone_mesh.channel.medium_access import Fate, MediumAccess
 from drone_mesh.channel.packet_queue import ALL_NODES, OutgoingPacket
 from drone_mesh.channel.statistics import ChannelMeter, RadioStatistics
+from drone_mesh.channel.trains import place_in_train
 from drone_mesh.communication.interfaces import MAX_NODE_ID, IMeshDebugInfo, IMeshNetwork
 from drone_mesh.communication.timing import ChannelUse, Medium
 from drone_mesh.communication.wire.messages import (

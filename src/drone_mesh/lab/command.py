@@ -14,7 +14,8 @@ from drone_mesh.compiled import core
 from drone_mesh.errors import MeshError
 from drone_mesh.lab.campaign import Campaign, OlderCodeError, merge
 from drone_mesh.lab.estimate import estimate
-from drone_mesh.lab.experiment import load_experiment, write_template
+from drone_mesh.lab.experiment import load_experiment
+from drone_mesh.lab.experiment_keys import write_template
 from drone_mesh.lab.plan import Plan
 from drone_mesh.lab.store import describe_folder
 from drone_mesh.lab.terminal import PROGRAM, as_duration

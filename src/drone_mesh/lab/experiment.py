@@ -1,95 +1,27 @@
-"""An experiment file: read, overridden from the command line, checked, expanded; or begun."""
+"""An experiment file: read, overridden from the command line, and checked."""
 
-import copy
-import functools
+from __future__ import annotations
+
 import hashlib
 import itertools
 import json
-import math
-import re
 from pathlib import Path
-from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, NamedTuple, Sequence
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
-from typing_extensions import Annotated, Literal
+from pydantic import ValidationError
 
-from drone_mesh import fence_file
-from drone_mesh.air import obstacle_file
-from drone_mesh.drone.geodesy import Origin
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.lab import extensions, formations, places
+from drone_mesh.lab import extensions
+from drone_mesh.lab.cells import TECHNIQUES, Cell, as_text, cells_of
 from drone_mesh.lab.expectations import Expectation
-from drone_mesh.lab.experiment_checks import NoSuchPlace, Source, check_scenario, nearest_name, put
-from drone_mesh.lab.expression import ExpressionError, Where
+from drone_mesh.lab.experiment_checks import NoSuchPlace, Source, nearest_name, put
+from drone_mesh.lab.experiment_keys import Experiment
 from drone_mesh.lab.metrics import METRICS
 from drone_mesh.lab.metrics.registry import is_censored
-from drone_mesh.lab.scenario import Scenario
-from drone_mesh.lab.scenario_parts import Part
-from drone_mesh.lab.terminal import PROGRAM
 from drone_mesh.yaml_file import KeyPath, read_mapping, read_value
 
 MOST_CELLS = 10_000
-MOST_COMBINATIONS = 1_000_000  # of the axes, before `where`
 MOST_RUNS = 10_000_000  # docs/lab.md: shards keep the memory small
-
-TEMPLATE = Path(__file__).resolve().parent / "experiment.template.yaml"
-
-_TECHNIQUES = ("routing", "repair")
-NAME_PATTERN = r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$"  # used as the name of a folder
-
-
-class Stop(Part):
-    """Add seeds until the confidence interval of a metric is narrow enough in every cell."""
-
-    metric: str
-    half_width: Optional[Annotated[float, Field(gt=0)]] = None
-    relative_half_width: Optional[Annotated[float, Field(gt=0)]] = None
-    max_seeds: Annotated[int, Field(ge=1, le=1_000_000)] = 400
-
-
-class Compare(Part):
-    """The paired comparison of the report: each value of an axis against its baseline."""
-
-    over: str  # an axis of the sweep
-    baseline: Any
-
-
-class Experiment(BaseModel):
-    """The whole file, before its cells are expanded."""
-
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
-
-    name: Annotated[str, Field(pattern=NAME_PATTERN)]
-    title: str = ""  # of the report
-    seed: Annotated[int, Field(ge=0)] = 1  # of everything random in the experiment
-    seeds: Annotated[int, Field(ge=1, le=1_000_000)] = 10  # repetitions of each cell
-    base: Dict[str, Any] = {}  # a Scenario; checked once per cell
-    sweep: Dict[str, List[Any]] = {}
-    zip: List[Dict[str, List[Any]]] = []
-    where: Optional[str] = None
-    stop: Optional[Stop] = None
-    metrics: List[str] = []
-    compare: Optional[Compare] = None
-    control: bool = False  # run the baseline of `compare` on other seeds, too
-    expect: List[str] = []
-    draws: Literal["all", "split", "whole"] = "all"  # which runs the report counts
-    timeout_s: Annotated[float, Field(gt=0)] = 600.0  # wall time of one run
-
-
-class Cell(NamedTuple):
-    """One point of the sweep."""
-
-    values: Mapping[str, Any]  # axis -> value
-    scenario: Scenario
-
-    @property
-    def texts(self) -> Dict[str, str]:
-        return {axis: as_text(value) for axis, value in self.values.items()}
-
-    @property
-    def label(self) -> str:
-        """The label for display and tables; empty without a sweep."""
-        return " ".join(f"{axis}={value}" for axis, value in self.texts.items())
 
 
 class LoadedExperiment(NamedTuple):
@@ -99,15 +31,15 @@ class LoadedExperiment(NamedTuple):
     cells: Sequence[Cell]
     path: Path
     folder: Path  # of the files and modules that it names
-    overrides: Tuple[str, ...]
+    overrides: tuple[str, ...]
 
     @property
-    def axes(self) -> List[str]:
+    def axes(self) -> list[str]:
         """The names of all swept parameters, in the order of the file."""
         return list(self.cells[0].values) if self.cells else []
 
     @property
-    def own_modules(self) -> List[str]:
+    def own_modules(self) -> list[str]:
         """The modules of techniques and metrics that are no part of this package."""
         names = [*(name for _kind, name in self._own_techniques), *self._own_metrics]
         return sorted({name.partition(":")[0] for name in names})
@@ -129,14 +61,12 @@ class LoadedExperiment(NamedTuple):
             raise ConfigurationError(f"{self.path}: {error}") from None
 
     @property
-    def _own_techniques(self) -> List[Tuple[str, str]]:
-        found = {
-            (kind, getattr(cell.scenario, kind)) for cell in self.cells for kind in _TECHNIQUES
-        }
+    def _own_techniques(self) -> list[tuple[str, str]]:
+        found = {(kind, getattr(cell.scenario, kind)) for cell in self.cells for kind in TECHNIQUES}
         return sorted(one for one in found if extensions.is_own(one[1]))
 
     @property
-    def _own_metrics(self) -> List[str]:
+    def _own_metrics(self) -> list[str]:
         stop = self.experiment.stop
         names = {*self.experiment.metrics, *([stop.metric] if stop else [])}
         return sorted(filter(extensions.is_own, names))
@@ -149,7 +79,7 @@ class LoadedExperiment(NamedTuple):
 
 
 def load_experiment(
-    path: Path, overrides: Sequence[str] = (), folder: Optional[Path] = None
+    path: Path, overrides: Sequence[str] = (), folder: Path | None = None
 ) -> LoadedExperiment:
     """Read and check the file. Raises ConfigurationError: file, line, key and what is wrong.
 
@@ -168,7 +98,7 @@ def load_experiment(
     except ValidationError as error:
         raise source.error_of(error, (), Experiment) from None
     _check_metrics(experiment, source)
-    cells = list(itertools.islice(_cells(experiment, source), MOST_CELLS + 1))
+    cells = list(itertools.islice(cells_of(experiment, source), MOST_CELLS + 1))
     if len(cells) > MOST_CELLS:
         raise source.error(("sweep",), f"more than {MOST_CELLS} cells")
     seeds = max(experiment.seeds, experiment.stop.max_seeds if experiment.stop else 0)
@@ -183,16 +113,7 @@ def load_experiment(
     return LoadedExperiment(experiment, cells, path, source.folder, tuple(overrides))
 
 
-def as_text(value: Any) -> str:
-    """A swept value as text for tables and file names."""
-    if isinstance(value, (str, int, float, bool)) or value is None:
-        return str(value)
-    if isinstance(value, dict):
-        return ";".join(f"{key}:{as_text(inside)}" for key, inside in value.items()) or "none"
-    return json.dumps(value, sort_keys=True, separators=(",", ":"))
-
-
-def _override(content: Dict[str, Any], override: str, source: Source) -> None:
+def _override(content: dict[str, Any], override: str, source: Source) -> None:
     """Apply an override `a.b=c` to the content."""
     path, equals, text = override.partition("=")
     if not equals or not path:
@@ -220,100 +141,13 @@ def _override(content: Dict[str, Any], override: str, source: Source) -> None:
     source.overrides[place] = override
 
 
-def _cells(experiment: Experiment, source: Source) -> Iterator[Cell]:
-    axes: List[List[Dict[str, Any]]] = []
-    named: Dict[str, KeyPath] = {}
-    for axis, values in experiment.sweep.items():
-        named[axis] = ("sweep", axis)
-        if not values:
-            raise source.error(("sweep", axis), f"sweep.{axis}: no values")
-        axes.append([{axis: value} for value in values])
-    for number, group in enumerate(experiment.zip):
-        lengths = {axis: len(values) for axis, values in group.items()}
-        if len(set(lengths.values())) != 1 or 0 in lengths.values():
-            raise source.error(
-                ("zip", number), f"zip: the lists must have the same length, not {lengths}"
-            )
-        for axis in group:
-            if axis in named:
-                raise source.error(("zip", number, axis), f"{axis} is swept twice")
-            named[axis] = ("zip", number, axis)
-        axes.append([dict(zip(group, row)) for row in zip(*group.values())])
-    where = None
-    if experiment.where is not None:
-        try:
-            where = Where(experiment.where, list(named))
-        except ExpressionError as error:
-            raise source.error(("where",), f"where: {error}") from None
-    if math.prod(map(len, axes)) > MOST_COMBINATIONS:
-        raise source.error(("sweep",), f"more than {MOST_COMBINATIONS} combinations of the axes")
-    for combination in itertools.product(*axes):
-        point = {axis: value for part in combination for axis, value in part.items()}
-        try:
-            is_wanted = where is None or where.holds(point)
-        except ExpressionError as error:
-            raise source.error(("where",), f"where: {error}") from None
-        if is_wanted:
-            yield Cell(point, _scenario(experiment, point, named, source))
-
-
-def _scenario(
-    experiment: Experiment, values: Mapping[str, Any], named: Mapping[str, KeyPath], source: Source
-) -> Scenario:
-    content = json.loads(json.dumps(experiment.base))
-    placed: Dict[KeyPath, str] = {}
-    for axis, value in values.items():
-        try:
-            placed[put(content, axis, copy.deepcopy(value))] = axis
-        except NoSuchPlace as error:
-            raise source.error(named[axis], f"axis {axis}: {error}") from None
-    _read_files(content, source)
-    try:
-        scenario = Scenario.model_validate(content)
-    except ValidationError as error:
-        inside = tuple(error.errors()[0]["loc"])
-        for place, axis in placed.items():
-            if inside[: len(place)] == place:
-                raise source.error_of(error, (), Scenario, shown=named[axis]) from None
-        raise source.error_of(error, ("base",), Scenario) from None
-    for key in _TECHNIQUES:
-        try:
-            extensions.check_technique(key, getattr(scenario, key), scenario.model)
-        except ConfigurationError as error:
-            raise source.error(named.get(key, ("base", key)), f"{key}: {error}") from None
-    check_scenario(scenario, source)
-    return scenario
-
-
-def _read_files(content: Dict[str, Any], source: Source) -> None:
-    """Read other files into the scenario, because its id must depend on their content, not path."""
-    for part, key, read in (
-        ("layout", "places", places.rows_of_file),
-        ("obstacles", "boxes", obstacle_file.rows_of_file),
-        ("fence", "areas", functools.partial(_areas, content)),
-        ("mobility", "knots", formations.rows_of_file),
-    ):
-        holder = content.get(part)
-        if not isinstance(holder, dict) or not isinstance(holder.get("path"), str):
-            continue
-        try:
-            holder[key] = read(source.folder / holder["path"])
-        except ConfigurationError as error:
-            raise source.error(("base", part, "path"), f"{part}.path: {error}") from None
-
-
-def _areas(content: Dict[str, Any], path: Path) -> List[fence_file.Row]:
-    origin = content["fence"].get("origin")
-    return fence_file.rows_of_file(path, None if origin is None else Origin.parse(str(origin)))
-
-
 def _check_metrics(experiment: Experiment, source: Source) -> None:
-    wanted: List[Tuple[KeyPath, str]] = [
+    wanted: list[tuple[KeyPath, str]] = [
         (("metrics", index), name) for index, name in enumerate(experiment.metrics)
     ]
     if experiment.stop is not None:
         wanted.append((("stop", "metric"), experiment.stop.metric))
-    columns: Dict[str, str] = {}
+    columns: dict[str, str] = {}
     for place, name in wanted:
         try:
             extensions.check_metric(name)
@@ -366,19 +200,3 @@ def _check_expectations(experiment: Experiment, cells: Sequence[Cell], source: S
                 expectation.cells([cell.texts for cell in cells])
         except ConfigurationError as error:
             raise source.error(("expect", index), f"expect: {error}") from None
-
-
-def write_template(name: str) -> Path:
-    """Write NAME.yaml into the current folder. Raises ConfigurationError if it cannot."""
-    if not re.match(NAME_PATTERN, name):
-        raise ConfigurationError(f"{name!r}: use letters, digits, dot, dash and underscore")
-    path = Path(f"{name}.yaml")
-    try:
-        with path.open("x", encoding="utf-8") as file:
-            text = TEMPLATE.read_text(encoding="utf-8")
-            file.write(text.format(name=name, file=path, program=PROGRAM))
-    except FileExistsError:
-        raise ConfigurationError(f"{path} already exists; it was not changed") from None
-    except OSError as error:
-        raise ConfigurationError(f"{path}: {error.strerror}") from error
-    return path

@@ -53,8 +53,8 @@ def check_technique(kind: str, name: str, model: str) -> None:
     Whether the module of a user has one shows when it is loaded.
     """
     if kind == "repair" and model == "ideal":
-        from drone_mesh.lab.ideal import IDEAL_RULES
         from drone_mesh.lab.ideal_plans import IDEAL_PLANS
+        from drone_mesh.lab.ideal_rules import IDEAL_RULES
 
         if name not in {**IDEAL_RULES, **IDEAL_PLANS}:
             known = ", ".join(sorted({**IDEAL_RULES, **IDEAL_PLANS}))

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
-from drone_mesh.lab.experiment import Cell, as_text
+from drone_mesh.lab.cells import Cell, as_text
 from drone_mesh.lab.metrics.registry import METRICS, is_censored, is_share, unit_of
 from drone_mesh.lab.results import Results, number
 from drone_mesh.lab.statistics import Interval, kaplan_meier

@@ -6,7 +6,8 @@ import hashlib
 import json
 from typing import Any, Iterator, NamedTuple, Sequence
 
-from drone_mesh.lab.experiment import Cell, LoadedExperiment, as_text
+from drone_mesh.lab.cells import Cell, as_text
+from drone_mesh.lab.experiment import LoadedExperiment
 from drone_mesh.lab.provenance import own_code
 from drone_mesh.lab.scenario import Scenario
 

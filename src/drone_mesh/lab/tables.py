@@ -8,7 +8,7 @@ import math
 from dataclasses import dataclass
 from typing import Mapping, Sequence
 
-from drone_mesh.lab.experiment import as_text
+from drone_mesh.lab.cells import as_text
 from drone_mesh.lab.metrics.registry import METRICS, is_censored, is_share, unit_of
 from drone_mesh.lab.results import Results, Row, number, paired
 from drone_mesh.lab.statistics import (

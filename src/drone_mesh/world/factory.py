@@ -14,7 +14,8 @@ from drone_mesh.drone.flight_path import FlightPath, PlanFlight, Vector
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.roles import Role
 from drone_mesh.errors import ConfigurationError, FleetRefused, GoalRefused
-from drone_mesh.world.dynamic_engine import BodyLimits, DynamicEngine
+from drone_mesh.world.body import BodyLimits
+from drone_mesh.world.dynamic_engine import DynamicEngine
 from drone_mesh.world.engine import DroneEngine
 from drone_mesh.world.worlds import PhysicalWorld, World
 

@@ -11,8 +11,9 @@ import random
 import pytest
 
 from drone_mesh.channel.access_rules import AccessRules
-from drone_mesh.channel.medium_access import Fate, InTrain, MediumAccess
+from drone_mesh.channel.medium_access import Fate, MediumAccess
 from drone_mesh.channel.packet_queue import ALL_NODES
+from drone_mesh.channel.trains import InTrain
 from drone_mesh.communication.wire.packet_types import Priority
 
 CYCLE_S = 0.0026

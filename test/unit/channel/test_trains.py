@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from drone_mesh.channel.medium_access import InTrain, place_in_train
+from drone_mesh.channel.trains import InTrain, place_in_train
 
 RELAY, GATEWAY = 3, 0
 

@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.lab.experiment import load_experiment, write_template
-from drone_mesh.lab.ideal import IDEAL_RULES, Swarm, run_ideal
+from drone_mesh.lab.experiment import load_experiment
+from drone_mesh.lab.experiment_keys import write_template
+from drone_mesh.lab.ideal import run_ideal
+from drone_mesh.lab.ideal_rules import IDEAL_RULES, Swarm
 from drone_mesh.lab.metrics import METRICS, listed
 from drone_mesh.lab.plan import Plan
 from drone_mesh.lab.scenario import Scenario, Streams

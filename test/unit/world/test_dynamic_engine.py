@@ -13,8 +13,9 @@ from drone_mesh.drone.battery import LAND_AT_PERCENT, Crews, PowerModel
 from drone_mesh.drone.fence import Fence, Zone
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused
+from drone_mesh.world.body import BodyLimits
 from drone_mesh.world.bullet_world import BulletWorld
-from drone_mesh.world.dynamic_engine import BodyLimits, DynamicEngine
+from drone_mesh.world.dynamic_engine import DynamicEngine
 
 SIZE, HALF_M = (0.2, 0.2, 0.1), 0.05
 

@@ -12,8 +12,9 @@ from drone_mesh.formations.airspace import APART_M, SWAY_M
 from drone_mesh.formations.departures import AT_PLACE_M, Departures, FlightRules
 from drone_mesh.state.model import MeshStatus, NodeStatus
 from drone_mesh.state.observation import describe_drone
+from drone_mesh.world.body import BodyLimits
 from drone_mesh.world.bullet_world import BulletWorld
-from drone_mesh.world.dynamic_engine import BodyLimits, DynamicEngine
+from drone_mesh.world.dynamic_engine import DynamicEngine
 
 HALF_M = Role.ROUTER.size_m[2] / 2
 RULES = FlightRules(sway_m=SWAY_M)

@@ -14,8 +14,9 @@ from drone_mesh.drone.roles import Role
 from drone_mesh.formations.mission_files import read_mission
 from drone_mesh.formations.missions import Mission
 from drone_mesh.mobility.pilot import TrackPilot, along
+from drone_mesh.world.body import BodyLimits
 from drone_mesh.world.bullet_world import BulletWorld
-from drone_mesh.world.dynamic_engine import BodyLimits, DynamicEngine
+from drone_mesh.world.dynamic_engine import DynamicEngine
 from drone_mesh.world.factory import RouterDrone
 
 SQUARE = [(4.0, 0.0, 2.0), (4.0, 4.0, 2.0), (0.0, 4.0, 2.0), (0.0, 0.0, 2.0)]

@@ -50,7 +50,7 @@ from drone_mesh.state.model import EventRecord, MeshStatus
 from drone_mesh.state.observation import describe_fence, describe_obstacles
 from drone_mesh.view.scene import Scene, scene_of
 from drone_mesh.view.window_process import WindowProcess, require_screen
-from drone_mesh.world.dynamic_engine import BodyLimits
+from drone_mesh.world.body import BodyLimits
 from drone_mesh.world.factory import DroneFactory
 from drone_mesh.world.physics import open_world, require_pybullet
 from drone_mesh.world.worlds import World
