@@ -8,7 +8,6 @@ import json
 import math
 import os
 import shutil
-import socket
 import subprocess
 import sys
 import time
@@ -19,6 +18,7 @@ from typing import TYPE_CHECKING, Any, Callable, Iterator, Mapping, Sequence
 
 from arducopter import SAFE, ArduCopter
 from copter_rig import ORIGIN, WORKER
+from patience import free_port
 from pilot_side import PilotSide
 
 from drone_mesh.drone.geodesy import Origin
@@ -38,12 +38,6 @@ FLIGHT_OPTIONS = (
     *("--may-arm", "--may-take-off", "--may-change-mode"),
     *("--cruise-height", "12", "--layers", "6"),
 )
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 class Fleet:

@@ -6,10 +6,10 @@ import os
 import shutil
 import signal
 import subprocess
-import time
 
 import numpy as np
 import pytest
+from patience import wait_for
 from PIL import ImageGrab
 
 from drone_mesh.drone.roles import Role
@@ -19,7 +19,6 @@ from drone_mesh.view.palette import LIGHT, rgb
 from drone_mesh.view.scene import DronePicture, Scene
 from drone_mesh.view.window_process import WindowProcess, require_screen
 
-LONG_S = 60.0  # a deadline for software rendering on a busy machine
 SCENE = Scene(
     [
         DronePicture(0, Role.GATEWAY, (-1.0, 0.0, 0.0)),
@@ -83,25 +82,18 @@ def pixels_like(screen, colour):
     return int(np.sum((likeness > 0.98) & (strength > 40)))
 
 
-def wait_until(condition, what):
-    deadline = time.monotonic() + LONG_S
-    while not condition():
-        assert time.monotonic() < deadline, f"after {LONG_S:.0f} s still not: {what}"
-        time.sleep(0.1)
-
-
 def wait_until_shown(screen):
-    wait_until(lambda: pixels_like(screen, LIGHT.gateway) > 100, "a gateway on the screen")
+    wait_for("a gateway on the screen", lambda: pixels_like(screen, LIGHT.gateway) > 100)
 
 
 @needs_screen
 def test_the_drones_are_on_the_screen_in_their_colours_until_it_is_stopped(screen, window):
     wait_until_shown(screen)
     for colour in (LIGHT.connected, LIGHT.disconnected):
-        wait_until(lambda colour=colour: pixels_like(screen, colour) > 100, f"{colour} on it")
+        wait_for(f"{colour} on it", lambda colour=colour: pixels_like(screen, colour) > 100)
     window.stop()
     # The screen's server notices it a moment later.
-    wait_until(lambda: pixels_like(screen, LIGHT.gateway) == 0, "an empty screen")
+    wait_for("an empty screen", lambda: pixels_like(screen, LIGHT.gateway) == 0)
 
 
 @needs_screen
@@ -111,7 +103,7 @@ def test_a_window_that_crashes_does_no_harm_and_is_reported(screen, caplog):
     window.start()
     wait_until_shown(screen)
     os.kill(window.pid, signal.SIGKILL)
-    wait_until(lambda: "exit code -9" in caplog.text, "a warning")
+    wait_for("a warning", lambda: "exit code -9" in caplog.text)
     window.stop()
 
 

@@ -6,10 +6,10 @@ import re
 import socket
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
+from patience import wait_for
 
 from drone_mesh.drone.engines import FlightOptions, create_engine
 from drone_mesh.drone.location import Location
@@ -95,10 +95,7 @@ def test_a_users_own_engine_is_chosen_by_name_and_flies(monkeypatch):
             assert line.readline() == "goto 1.5 2.5 4\n"
             line.write("at 1.5 2.5 4.0\n")
             line.flush()
-            deadline = time.monotonic() + 10.0
-            while engine._location is None:
-                assert time.monotonic() < deadline, "the place never arrived"
-                time.sleep(0.01)
+            wait_for("the place", lambda: engine._location is not None)
             assert engine.get_location() == Location(latitude=2.5, longitude=1.5, height=4.0)
 
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import socket
 import threading
 import time
-from typing import Callable, Iterator
+from typing import Iterator
 
 import pytest
 from mavlink_vehicle.server import VehicleServer
+from patience import PATIENCE_S, free_port, wait_for
 
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.location import Location
@@ -23,14 +24,6 @@ pytestmark = pytest.mark.slow  # autopilots and links live in real time
 ORIGIN = Origin(52.0907, 5.1214, 3.0)
 LIMITS = FlightLimits(speed_m_s=20.0, cruise_height_m=4.0, layer_m=0.0)
 ALL = Permissions(may_arm=True, may_take_off=True, may_change_mode=True)
-PATIENCE_S = 30.0
-
-
-def wait_for(what: str, holds: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + PATIENCE_S
-    while not holds():
-        assert time.monotonic() < deadline, f"not within {PATIENCE_S:g} s: {what}"
-        time.sleep(0.02)
 
 
 @pytest.fixture(params=[ARDUPILOT, PX4], ids=lambda a: a.name)
@@ -126,10 +119,8 @@ def test_a_vehicle_that_falls_silent_is_noticed(
 
 def test_without_a_vehicle_it_starts_says_why_it_cannot_fly_and_ends() -> None:
     threads = set(threading.enumerate())
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    engine = MavlinkEngine(1, f"udpin:127.0.0.1:{port}", ORIGIN, LIMITS, ALL)
+    address = f"udpin:127.0.0.1:{free_port(socket.SOCK_DGRAM)}"
+    engine = MavlinkEngine(1, address, ORIGIN, LIMITS, ALL)
     assert engine.why_not_fly().startswith("no heartbeat")
     with pytest.raises(LocationUnknown, match="no heartbeat"):
         engine.get_location()

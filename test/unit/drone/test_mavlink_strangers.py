@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import socket
 import threading
-import time
-from typing import Callable, Iterator
+from typing import Iterator
 
 import pytest
+from patience import free_port, wait_for
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from drone_mesh.drone.geodesy import Origin
@@ -19,20 +19,6 @@ mavsdk = pytest.importorskip("mavsdk", reason="the binary in MAVSDK's wheel does
 pytestmark = pytest.mark.slow  # autopilots and links live in real time
 
 ORIGIN = Origin(52.0907, 5.1214, 3.0)
-PATIENCE_S = 40.0
-
-
-def wait_for(what: str, holds: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + PATIENCE_S
-    while not holds():
-        assert time.monotonic() < deadline, f"not within {PATIENCE_S:g} s: {what}"
-        time.sleep(0.05)
-
-
-def free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 class Relay(threading.Thread):
@@ -94,7 +80,7 @@ def test_mavsdk_as_the_vehicle_is_read_and_not_flown_without_an_estimator(
 ) -> None:
     from mavsdk.plugins.telemetry_server import telemetry_server as reports
 
-    engine_port = free_port()
+    engine_port = free_port(socket.SOCK_DGRAM)
     relay = Relay(engine_port, named)
     permissions = Permissions(may_arm=True, may_take_off=True, may_change_mode=True)
     engine = MavlinkEngine(1, f"udpin:127.0.0.1:{engine_port}", ORIGIN, FlightLimits(), permissions)

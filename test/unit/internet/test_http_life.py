@@ -8,19 +8,17 @@ import http.client
 import logging
 import sys
 import threading
-import time
 from concurrent.futures import ThreadPoolExecutor
 
 import httpx
 import pytest
+from patience import PATIENCE_S, wait_for
 
 from drone_mesh.communication.interfaces import IGatewayCommands
 from drone_mesh.internet.http_internet import HttpInternet
 from drone_mesh.internet.http_settings import HttpSettings
 
 pytestmark = pytest.mark.slow
-
-PATIENCE_S = 20.0  # for threads; nothing here takes a tenth of it
 
 
 class SlowGateway(IGatewayCommands):
@@ -87,16 +85,14 @@ def test_after_a_late_answer_the_next_request_is_answered_as_usual(slow):
     gateway, client = slow
     client.post("/DroneMovement/1/2/3/4")
     gateway.go_on.set()
-    deadline = time.monotonic() + PATIENCE_S
-    while client.get("/ready").status_code != 200:
-        assert time.monotonic() < deadline, "the gateway did not recover"
+    wait_for("the gateway recovers", lambda: client.get("/ready").status_code == 200)
     assert client.post("/DroneMovement/1/2/3/4").status_code == 200
 
 
 def test_a_bug_behind_one_request_is_logged_and_stops_nothing(slow, caplog):
     _gateway, client = slow
     assert client.get("/nodes").status_code == 500
-    wait_until(lambda: "a bug in the routing technique" in caplog.text, "nothing was logged")
+    wait_for("a line in the log", lambda: "a bug in the routing technique" in caplog.text)
     # The connection of the request that failed is closed; the next one comes on its own.
     with httpx.Client(base_url=client.base_url, headers=client.headers) as next_client:
         assert next_client.get("/ready").status_code == 200
@@ -115,7 +111,7 @@ def test_disconnecting_on_the_gateways_own_thread_refuses_waiting_requests_and_e
     assert held.wait(PATIENCE_S)
     with ThreadPoolExecutor(max_workers=1) as pool:
         order = pool.submit(mesh.client.post, "/DroneMovement/1/2/3/4")
-        wait_until(lambda: mesh.executor._queue.qsize() == 1, "the order did not come in")
+        wait_for("the order comes in", lambda: mesh.executor._queue.qsize() == 1)
         go_on.set()
         answer = order.result(PATIENCE_S)
     mesh.executor.stop()
@@ -180,26 +176,13 @@ def test_a_thousand_requests_in_a_row_leave_no_thread_and_no_memory_behind(make_
     assert min(grown_blocks) < 50
 
 
-def wait_until(condition, otherwise):
-    deadline = time.monotonic() + PATIENCE_S
-    while not condition():
-        assert time.monotonic() < deadline, otherwise
-        time.sleep(0.01)
-
-
 def test_a_gateway_that_nobody_asks_has_no_internet_until_somebody_does(make_mesh):
     mesh = make_mesh(token="0123456789abcdef0123", silence_s=0.5)
-
-    def wait_until(has_internet: bool) -> None:
-        deadline_s = time.monotonic() + PATIENCE_S
-        while mesh.gateway.get_connected_to_gateway() is not has_internet:
-            assert time.monotonic() < deadline_s
-            time.sleep(0.01)
-
-    wait_until(has_internet=False)
+    has_internet = mesh.gateway.get_connected_to_gateway
+    wait_for("no internet", lambda: not has_internet())
     refused = httpx.get(f"{mesh.internet.url}/nodes", verify=False)
     assert refused.status_code == 401
-    assert not mesh.gateway.get_connected_to_gateway()
+    assert not has_internet()
     assert mesh.client.get("/ready").status_code == 200
-    wait_until(has_internet=True)
-    wait_until(has_internet=False)
+    wait_for("internet", has_internet)
+    wait_for("no internet again", lambda: not has_internet())

@@ -15,6 +15,7 @@ import time
 import paho.mqtt.client as mqtt
 import pytest
 from paho.mqtt.enums import CallbackAPIVersion
+from patience import PATIENCE_S, free_port, wait_for
 
 from drone_mesh.communication.data.outgoing import LIFETIME_S
 from drone_mesh.communication.events.observer import MeshEvent, MeshEventKind
@@ -32,7 +33,6 @@ pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(MOSQUITTO is None, reason="needs a broker: apt install mosquitto"),
 ]
-PATIENCE_S = 40.0
 PASSWORD = "correct horse"
 
 
@@ -40,9 +40,7 @@ class Mosquitto:
     """A broker that writes each change of its messages to disk."""
 
     def __init__(self, folder, access="allow_anonymous true\n"):
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            self.port = probe.getsockname()[1]
+        self.port = free_port()
         self._file = folder / "mosquitto.conf"
         self._file.write_text(
             f"listener {self.port} 127.0.0.1\n{access}persistence true\n"
@@ -146,20 +144,11 @@ class Gateway:
     def from_node_1(self, payload, port=0):
         self.submit(lambda _now_s: self.network.send(1, 0, payload, port))
 
-    def wait_for(self, what, is_so):
-        deadline_s = time.monotonic() + PATIENCE_S
-        while not is_so():
-            assert time.monotonic() < deadline_s, what
-            time.sleep(0.05)
-
     def wait_for_all_at_node_1(self, wanted):
         def missing():
             return wanted - {message.payload for message in self.network.received.get(1, [])}
 
-        deadline_s = time.monotonic() + PATIENCE_S
-        while missing():
-            assert time.monotonic() < deadline_s, f"lost: {missing()}"
-            time.sleep(0.05)
+        wait_for("all messages", lambda: not missing())
 
     def close(self):
         self.internet.disconnect()
@@ -559,7 +548,7 @@ def test_nothing_acknowledged_is_lost_when_the_broker_is_killed_in_mid_transfer(
     for number in range(10, 20):  # the mesh acknowledges them, the broker does not
         gateway.from_node_1(b"up %d" % number)
     data = gateway.network.nodes[0].component.data
-    gateway.wait_for("20 messages in the gateway", lambda: data.figures().messages_received == 20)
+    wait_for("20 messages in the gateway", lambda: data.figures().messages_received == 20)
     broker.kill()
     broker.start()
     while len(received) < 20:
@@ -592,8 +581,8 @@ def test_a_gateway_whose_internet_is_the_broker_has_none_while_it_is_away(broker
         assert gateway.subscribed.wait(PATIENCE_S)
         assert component.get_connected_to_gateway()
         broker.stop()
-        gateway.wait_for("no internet", lambda: not component.get_connected_to_gateway())
+        wait_for("no internet", lambda: not component.get_connected_to_gateway())
         broker.start()
-        gateway.wait_for("internet again", component.get_connected_to_gateway)
+        wait_for("internet again", component.get_connected_to_gateway)
     finally:
         gateway.close()

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import random
 import socket
-import time
 
 import pytest
+from patience import PATIENCE_S, wait_for
 
 from drone_mesh.nrf24.emulator.air import Air
 from drone_mesh.nrf24.emulator.air_server import AirServer, RemoteChip
@@ -18,15 +18,7 @@ from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
 
 pytestmark = pytest.mark.slow
 
-PATIENCE_S = 30.0
 PACKET = bytes(range(32))
-
-
-def wait_for(what, holds):
-    deadline = time.monotonic() + PATIENCE_S
-    while not holds():
-        assert time.monotonic() < deadline, f"not within {PATIENCE_S:g} s: {what}"
-        time.sleep(0.01)
 
 
 class Place:

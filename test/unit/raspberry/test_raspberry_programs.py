@@ -8,7 +8,6 @@ import os
 import queue
 import re
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -17,11 +16,11 @@ from pathlib import Path
 
 import httpx
 import pytest
+from patience import PATIENCE_S, free_port, wait_for
 
 pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).parents[3]
-PATIENCE_S = 60.0  # until all are connected; on an idle machine it takes 3 s
 END_WITHIN_S = 5.0
 TOKEN = "0123456789abcdef"
 NO_SPI = (
@@ -91,12 +90,6 @@ class Program:
         self._process.stdout.close()
 
 
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
-
-
 @pytest.mark.parametrize(
     ("name", "line", "reason"),
     [
@@ -158,13 +151,13 @@ def test_an_emulated_gateway_sends_an_order_over_several_hops_and_ends_on_sigter
     ) as client:
         program.wait_for("all 4 nodes are connected")
         assert client.get("/ready").json() == {"ready": True, "gateway": 0}
-        wait_until(lambda: ask_hops(client).get(3, 0) >= 2, "the gateway never heard of node 3")
-        wait_until(
+        wait_for("the gateway hears of node 3", lambda: ask_hops(client).get(3, 0) >= 2)
+        wait_for(
+            "the gateway finds a route to drone 3",
             lambda: client.post("/DroneMovement/3/21.5/-22.5/4").status_code == 200,
-            "the gateway found no route to drone 3",
         )
         program.wait_for("node 3: order refused: drone 3 cannot fly: it stands on the ground")
-        wait_until(lambda: last_order(client)["state"] == "refused", "no reply to the order came")
+        wait_for("the reply to the order", lambda: last_order(client)["state"] == "refused")
         assert last_order(client)["reason"] == "drone 3 cannot fly: it stands on the ground"
         assert client.get("/ready", headers={"Authorization": ""}).status_code == 401
         status, seconds = program.end(signal.SIGTERM)
@@ -190,12 +183,12 @@ def test_single_nodes_on_a_shared_air_can_be_killed_and_restarted():
         ) as client:
             with router(1) as relay:
                 gateway.wait_for("node 2 joins at x 120, y 0, z 0 m")
-                wait_until(lambda: ask_hops(client).get(2, 0) == 2, "2 did not connect over 1")
+                wait_for("2 is connected over 1", lambda: ask_hops(client).get(2, 0) == 2)
                 relay.end(signal.SIGKILL)
                 gateway.wait_for("node 1 is gone")
-                wait_until(lambda: routes(client) == {}, "the loss of node 1 was not noticed")
+                wait_for("the loss of node 1 is noticed", lambda: routes(client) == {})
             with router(1) as relay:
-                wait_until(lambda: routes(client) == {1: 1, 2: 1}, "2 is not back over 1")
+                wait_for("2 is back over 1", lambda: routes(client) == {1: 1, 2: 1})
                 assert relay.end(signal.SIGTERM)[0] == 0
             assert far.end(signal.SIGTERM)[0] == 0
             assert "Traceback" not in far.said
@@ -223,10 +216,3 @@ def last_order(client):
 
 def ask_hops(client):
     return {node["id"]: node["hops"] or 0 for node in client.get("/nodes").json()["nodes"]}
-
-
-def wait_until(condition, otherwise):
-    deadline = time.monotonic() + PATIENCE_S
-    while not condition():
-        assert time.monotonic() < deadline, otherwise
-        time.sleep(0.1)

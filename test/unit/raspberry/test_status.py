@@ -15,6 +15,7 @@ from typing import Iterator
 
 import httpx
 import pytest
+from patience import free_port, wait_for
 
 from drone_mesh.drone.engines import GroundEngine
 from drone_mesh.internet.http_settings import HttpSettings
@@ -29,15 +30,6 @@ from drone_mesh.raspberry.service_manager import ServiceManager
 from drone_mesh.raspberry.status_command import main
 
 pytestmark = pytest.mark.slow
-
-PATIENCE_S = 60.0
-
-
-def wait_for(what, holds):
-    deadline = time.monotonic() + PATIENCE_S
-    while not holds():
-        assert time.monotonic() < deadline, f"not within {PATIENCE_S:g} s: {what}"
-        time.sleep(0.05)
 
 
 class Field:
@@ -79,12 +71,6 @@ def field(nodes: int, **settings) -> Iterator[Field]:
         yield made
     finally:
         made.close()
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 def test_the_status_over_http_names_neighbours_radio_flight_and_version(capsys):
