@@ -71,9 +71,6 @@ class ShortestPath(ChildTableTree):
     def get_set_of_children(self) -> frozenset[int]:
         return self._links.neighbours(self._node_id)
 
-    def get_amount_of_children(self) -> int:
-        return len(self.get_set_of_children())
-
     def empty(self) -> bool:
         return not self.get_set_of_children()
 
