@@ -33,6 +33,15 @@ def line(routers, spacing=6.0, **options):
     return placed([(spacing * node, 0.0) for node in range(routers + 1)], **options)
 
 
+def between_gateways(routers, **options):
+    """Gateways 0 and 1 at the ends of a line of routers, 2, 3, ..."""
+    network = line(0, **options)
+    for node in range(2, routers + 2):
+        network.add_router(node, 6.0 * (node - 1), 0.0)
+    network.add_gateway(1, 6.0 * (routers + 1), 0.0)
+    return network
+
+
 def fleet(routers, gridsize, seed=0, gateways=1, **options):
     """The factory's fleet, 6 m apart, all started in step."""
     network = Network(seed=seed, **options)

@@ -23,7 +23,6 @@ from drone_mesh.communication.timing import Due
 from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.packet_types import MessageType
 from drone_mesh.drone.location import Location
-from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.drone import InProcessDrone
 from drone_mesh.mobility.track import Legs, leg_to, rest
 
@@ -111,15 +110,12 @@ def test_with_a_key_the_gateways_own_word_about_its_place_counts(creator, hops, 
 
 @pytest.mark.parametrize("key", [None, KEY])
 def test_where_a_gateway_is_that_moves_is_known_at_each_hop(key):
-    network = Network(seed=1, routing="beacon", key=key)
-    start = {node: (6.0 * node, 0.0, 0.0) for node in range(6)}
-    network.add_gateway(0, 0.0, 0.0)
-    for node in range(1, 6):
-        network.add_router(node, *start[node][:2])
+    network = in_line(5, seed=1, routing="beacon", key=key)
     network.run_for(60.0)
     now_s, speed_m_s = network.now_s(), 0.3
     tracks = {}
-    for node, (x, y, z) in start.items():
+    for node in network.nodes:
+        x, y, z = 6.0 * node, 0.0, 0.0
         away = (x, y + 300.0 * speed_m_s, z)
         tracks[node] = Legs(
             [rest(0.0, (x, y, z), now_s), leg_to(now_s, now_s + 300.0, (x, y, z), away)]
@@ -191,10 +187,8 @@ def test_a_search_is_not_repeated_further_than_any_node_would_ask_for():
 
 
 def test_with_a_key_an_order_that_a_dead_neighbour_did_not_take_goes_another_way_at_once():
-    network = Network(seed=2, routing="beacon", radio="shared", rate="1M", key=KEY)
-    network.add_gateway(0, 0.0, 0.0)
-    for node in range(1, 9):
-        network.add_router(node, 6.0 * (node % 3), 6.0 * (node // 3))
+    square = [(6.0 * (node % 3), 6.0 * (node // 3)) for node in range(9)]
+    network = placed(square, seed=2, routing="beacon", radio="shared", rate="1M", key=KEY)
     network.run_for(30.0)
     for step, dead in enumerate((4, 5, 7, 1, 3)):
         network.power(dead, False)

@@ -13,7 +13,6 @@ from scenarios import placed
 from drone_mesh.communication.node.node_configuration import ROUTING_TECHNIQUES
 from drone_mesh.communication.seals.keys import MeshKey
 from drone_mesh.communication.wire.messages import is_data
-from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.bounds import SHORTEST_PATH
 
 PORT = 9
@@ -46,12 +45,8 @@ def assert_all_arrive(network, within_s, count=None, every_s=0.1):
 
 
 def between_two_gateways(**options):
-    """A row of seven nodes with a gateway at each end: each knows the routers near it."""
-    network = Network(seed=1, **options)
-    network.add_gateway(0, 0.0, 0.0)
-    network.add_gateway(1, 36.0, 0.0)
-    for node in range(2, 7):
-        network.add_router(node, 6.0 * (node - 1), 0.0)
+    """Each of them knows the routers near it."""
+    network = scenarios.between_gateways(5, seed=1, **options)
     assert network.run_until(network.all_connected, within_s=60.0)
     network.run_for(30.0)
     return network

@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import pytest
+from scenarios import placed
 
 from drone_mesh.communication.events.observer import MeshEventKind
 from drone_mesh.communication.seals.keys import MeshKey
 from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.packet_types import MessageType
-from drone_mesh.inprocess import Network
 
-PLACES = {1: (6, 0), 2: (12, 0), 3: (6, 6), 4: (12, 6), 5: (18, 3)}
+PLACES = [(0, 0), (6, 0), (12, 0), (6, 6), (12, 6), (18, 3)]
 
 
 @pytest.mark.parametrize("key", [None, MeshKey(b"the key of a lab")], ids=["no key", "key"])
 def test_neighbours_are_told_one_by_one_if_they_hear_no_broadcast(key):
     """Broadcasts collide, and nobody repeats them; with a key each is sealed for all."""
-    network = Network(seed=3, radio="shared", key=key)
-    network.add_gateway(0, 0.0, 0.0)
-    for node, (x, y) in PLACES.items():
-        network.add_router(node, x, y)
+    network = placed(PLACES, seed=3, radio="shared", key=key)
     assert network.run_until(network.all_connected, within_s=120.0)
     network.run_for(60.0)
     antenna = network.nodes[1].antenna

@@ -6,6 +6,7 @@ import random
 from collections import Counter
 
 import pytest
+from scenarios import placed
 
 from drone_mesh.inprocess import Network
 from drone_mesh.mobility import Area, Mobility, tracks_of
@@ -19,11 +20,8 @@ METRES_OF_THE_FIELD = 10.0
 
 
 def layout_101(links: LinkModel, scale: float = 1.0, seed: int = 1) -> Network:
-    mesh = Network(seed, radio="chips", links=links)
-    mesh.add_gateway(0, GATEWAY[0] * scale, GATEWAY[1] * scale)
-    for node, (x_m, y_m) in LAYOUT_101.items():
-        mesh.add_router(node, x_m * scale, y_m * scale)
-    return mesh
+    places = [(x_m * scale, y_m * scale) for x_m, y_m in (GATEWAY, *LAYOUT_101.values())]
+    return placed(places, seed=seed, radio="chips", links=links)
 
 
 @pytest.fixture(params=["disc", "log-distance"])

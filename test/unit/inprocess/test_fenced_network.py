@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
+from scenarios import placed
 
 from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.communication.events.observer import MeshEventKind
@@ -18,7 +19,6 @@ from drone_mesh.errors import GoalRefused
 from drone_mesh.formations.departures import FlightRules
 from drone_mesh.formations.missions import Mission
 from drone_mesh.formations.preview import preview
-from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.drone import PositionErrors
 from drone_mesh.state.condition import find_trouble
 from drone_mesh.world.factory import DroneFactory
@@ -30,10 +30,7 @@ FENCE = Fence.of([YARD], [POND])
 
 
 def fenced(places=((0.0, 0.0), (4.0, 0.0)), fence=FENCE, **options):
-    network = Network(seed=1, fence=fence, **options)
-    network.add_gateway(0, *places[0])
-    for node, place in enumerate(places[1:], start=1):
-        network.add_router(node, *place)
+    network = placed(places, seed=1, fence=fence, **options)
     network.run_for(20.0)
     return network
 

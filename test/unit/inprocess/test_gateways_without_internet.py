@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from scenarios import events, fleet, flown, line, run_until
+from scenarios import between_gateways, events, fleet, flown, line, run_until
 
 from drone_mesh.communication.interfaces import OrderState
 from drone_mesh.communication.seals.keys import MeshKey
@@ -15,12 +15,7 @@ TECHNIQUES = ["child_table_tree", "beacon"]
 
 
 def two_ends(routing, routers=6, **options):
-    """Gateways 0 and 1 at the ends of a line of routers, 2, 3, ..."""
-    network = Network(seed=1, routing=routing, **options)
-    network.add_gateway(0, 0.0, 0.0)
-    for node in range(2, routers + 2):
-        network.add_router(node, 6.0 * (node - 1), 0.0)
-    network.add_gateway(1, 6.0 * (routers + 1), 0.0)
+    network = between_gateways(routers, seed=1, routing=routing, **options)
     network.run_for(40.0)
     assert network.all_connected()
     return network

@@ -1,9 +1,9 @@
 """The status of an in-process network, for tables, pictures and reports."""
 
 import pytest
+from scenarios import line as in_line
 
 from drone_mesh.drone.roles import Role
-from drone_mesh.inprocess import Network
 from drone_mesh.state.outages import find_outages, take_sample
 from drone_mesh.view.table import mesh_table
 
@@ -11,10 +11,7 @@ from drone_mesh.view.table import mesh_table
 @pytest.fixture
 def line():
     """Gateway 0, then routers 1, 2, 3, each in reach of its two neighbours only."""
-    network = Network(seed=3)
-    network.add_gateway(0, x=0.0, y=0.0)
-    for router in (1, 2, 3):
-        network.add_router(router, x=6.0 * router, y=0.0)
+    network = in_line(3, seed=3)
     assert network.run_until(network.all_connected, within_s=15.0)
     network.run_for(1.0)
     return network

@@ -26,24 +26,10 @@ def ends(network):
     return [(order.drone, order.state.value, order.reason) for order in orders]
 
 
-def test_a_drone_three_hops_away_accepts_flies_far_and_arrives():
-    network = line()
-    assert network.order(3, 18.0, 6.0)
-    network.run_for(0.5)
-    assert ends(network) == [(3, "accepted", "")]
-    network.run_for(15.0)
-    assert ends(network) == [(3, "arrived", "")]
-
-
-def test_a_drone_on_the_ground_refuses_over_four_hops_with_its_reason():
-    network = line()
-    assert network.order(4, 24.0, 1.0)
-    network.run_for(0.5)
-    assert ends(network) == [(4, "refused", "drone 4 cannot fly: it stands on the ground")]
-
-
-@pytest.mark.parametrize("medium", [{"radio": "shared"}, {"key": MeshKey(bytes(range(KEY_BYTES)))}])
-def test_replies_and_reports_pass_a_shared_channel_and_the_seals_of_a_key(medium):
+@pytest.mark.parametrize(
+    "medium", [{}, {"radio": "shared"}, {"key": MeshKey(bytes(range(KEY_BYTES)))}]
+)
+def test_replies_and_reports_come_from_four_hops_away_also_on_a_shared_channel_and_sealed(medium):
     network = line(timing=MeshTiming(report_period_s=30.0), **medium)
     assert network.order(3, 18.0, 6.0)
     assert network.order(4, 24.0, 1.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from scenarios import placed
 
 from drone_mesh.communication.data.outgoing import TicketState
 from drone_mesh.communication.events.observer import MeshEventKind
@@ -19,12 +20,10 @@ def network_with(places, routing="beacon", radio="shared"):
     """Nodes at these x, y; the first is the gateway. `network.lost`: links that carry nothing."""
     lost = set()
     links = ScriptedLoss(IdealDisc(RANGE_M), lambda hop: (hop.sender, hop.receiver) in lost)
-    network = Network(seed=1, routing=routing, radio=radio, links=links, max_distance_m=RANGE_M)
+    options = {"routing": routing, "radio": radio, "links": links, "max_distance_m": RANGE_M}
+    network = placed(places, seed=1, **options)
     if radio == "disc":
         network.air.hears = lambda sender, receiver: (sender, receiver) not in lost
-    network.add_gateway(0, *places[0])
-    for node, place in enumerate(places[1:], 1):
-        network.add_router(node, *place)
     return network, lost
 
 

@@ -206,12 +206,6 @@ def test_an_order_during_a_look_around_is_flown():
     assert run_until(network, lambda: network.location(4).latitude == ordered, within_s=60.0)
 
 
-def test_with_field_the_drones_move_towards_the_gateway_leg_by_leg():
-    network = broken_line("field")
-    assert run_until(network, network.all_connected, within_s=120.0)
-    assert network.location(3).longitude < 8.0 + RANGE_M
-
-
 DUMBBELL = [(0.0, 0.0), (0.0, 5.0), (-4.0, 2.5), (7.5, 2.5), (15.0, 0.0), (15.0, 5.0), (19.0, 2.5)]
 BRIDGE, RIGHT = 3, {4, 5, 6}
 

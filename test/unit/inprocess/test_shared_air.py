@@ -7,7 +7,7 @@ import random
 from types import SimpleNamespace
 
 import pytest
-from scenarios import events, flown, layout
+from scenarios import events, flown, layout, placed
 
 from drone_mesh.communication.interfaces import IMeshNetwork
 from drone_mesh.communication.seals.keys import MeshKey
@@ -313,12 +313,11 @@ def test_who_is_too_far_away_to_be_asked_is_out_of_reach(rate, scaled):
 def test_challenges_do_not_fill_the_channel_of_a_mesh_in_motion():
     """Each of fifty drones challenges all whom it meets, ten at any time."""
     side_m, rng = 36.0, random.Random(1)
-    network = Network(seed=1, radio="shared", key=MeshKey(bytes(range(16))))
-    network.add_gateway(0, side_m / 2, side_m / 2)
     places = {0: (side_m / 2, side_m / 2, 0.0)}
     for node in range(1, 50):
         places[node] = rng.random() * side_m, rng.random() * side_m, 0.0
-        network.add_router(node, *places[node][:2])
+    at_start = [place[:2] for place in places.values()]
+    network = placed(at_start, seed=1, radio="shared", key=MeshKey(bytes(range(16))))
     mobility = Mobility("random_waypoint", speed_m_s=(0.3, 0.3))
     network.fly(tracks_of(mobility, places, {0}, Area(0.0, 0.0, side_m, side_m), seed=1))
     network.run_for(20.0)
