@@ -56,13 +56,7 @@ def test_in_an_empty_environment_the_programs_of_a_pi_start_and_all_files_are_th
     mesh_and_radio = "import drone_mesh.communication.node.assembly, drone_mesh.nrf24.high_level"
     run(installed / "bin/python", "-c", mesh_and_radio, cwd=installed)
     (package,) = installed.glob("lib/python3*/site-packages/drone_mesh")
-    for name in (
-        "py.typed",
-        "console/static/index.html",
-        "nrf24/emulator/nrf24_range.csv",
-        "view/meshes/flying.obj",
-    ):
-        assert (package / name).is_file(), name
+    assert (package / "console/static/index.html").is_file()  # test_packaging.py looks for each
     assert (installed / "share/drone_mesh/systemd/raspberry_router.service").is_file()
     assert (installed / "share/drone_mesh/config/casus.yaml").is_file()
     (metadata,) = package.parent.glob("drone_mesh-*.dist-info/METADATA")

@@ -109,8 +109,12 @@ def test_more_contenders_do_not_lower_what_the_channel_carries_below_half():
     assert carried_per_s(50) > 0.5 * carried_per_s(10)
 
 
-def test_a_receiver_that_is_gone_costs_at_most_18_frames_and_later_packets_6():
-    access = MediumAccess(RULES, random.Random(1))
+@pytest.fixture
+def access():
+    return MediumAccess(RULES, random.Random(1))
+
+
+def test_a_receiver_that_is_gone_costs_at_most_18_frames_and_later_packets_6(access):
     costs = []
     now_s = 0.0
     for number in range(3):
@@ -127,8 +131,7 @@ def test_a_receiver_that_is_gone_costs_at_most_18_frames_and_later_packets_6():
     assert access.contention == 0.0  # it says nothing about the channel
 
 
-def test_a_receiver_that_is_heard_again_gets_all_tries():
-    access = MediumAccess(RULES, random.Random(1))
+def test_a_receiver_that_is_heard_again_gets_all_tries(access):
     now_s = 0.0
 
     def tries():
@@ -146,8 +149,7 @@ def test_a_receiver_that_is_heard_again_gets_all_tries():
     assert tries() == 9
 
 
-def test_waiting_for_one_receiver_does_not_delay_the_others():
-    access = MediumAccess(RULES, random.Random(1))
+def test_waiting_for_one_receiver_does_not_delay_the_others(access):
     access.offer(7, packet(1), 0.0)
     now_s = access.next_try_s
     access.tried(access.due(now_s), False, now_s)
@@ -156,8 +158,7 @@ def test_waiting_for_one_receiver_does_not_delay_the_others():
     assert access.due(now_s).receiver == 8
 
 
-def test_packets_for_one_receiver_keep_their_order():
-    access = MediumAccess(RULES, random.Random(1))
+def test_packets_for_one_receiver_keep_their_order(access):
     for number in range(5):
         access.offer(7, packet(number), 0.0)
     now_s, order = 0.0, []
@@ -169,15 +170,13 @@ def test_packets_for_one_receiver_keep_their_order():
     assert order == [0, 1, 2, 3, 4]
 
 
-def test_control_packets_go_before_data():
-    access = MediumAccess(RULES, random.Random(1))
+def test_control_packets_go_before_data(access):
     access.offer(7, packet(1), 0.0, Priority.DATA)
     access.offer(8, packet(2), 0.0, Priority.CONTROL)
     assert access.due(1.0).receiver == 8
 
 
-def test_users_data_does_not_wait_while_a_packet_of_the_mesh_for_the_same_node_pauses():
-    access = MediumAccess(RULES, random.Random(1))
+def test_users_data_does_not_wait_while_a_packet_of_the_mesh_for_the_same_node_pauses(access):
     access.offer(7, packet(1), 0.0)
     now_s = 0.0
     for _ in range(8):
@@ -188,8 +187,7 @@ def test_users_data_does_not_wait_while_a_packet_of_the_mesh_for_the_same_node_p
     assert access.due(access.next_try_s).payload == packet(2)
 
 
-def test_a_packet_of_the_mesh_does_not_wait_while_users_data_for_the_same_node_pauses():
-    access = MediumAccess(RULES, random.Random(1))
+def test_a_packet_of_the_mesh_does_not_wait_while_users_data_for_the_same_node_pauses(access):
     access.offer(7, packet(1), 0.0, Priority.DATA)
     now_s = 0.0
     for _ in range(8):
@@ -200,8 +198,7 @@ def test_a_packet_of_the_mesh_does_not_wait_while_users_data_for_the_same_node_p
     assert access.due(access.next_try_s).payload == packet(2)
 
 
-def test_if_both_may_go_to_the_same_node_the_packet_of_the_mesh_goes_first():
-    access = MediumAccess(RULES, random.Random(1))
+def test_if_both_may_go_to_the_same_node_the_packet_of_the_mesh_goes_first(access):
     access.offer(7, packet(1), 0.0, Priority.DATA)
     access.offer(7, packet(2), 1.0)
     assert access.due(1.0).payload == packet(2)
@@ -223,8 +220,7 @@ def test_users_data_waits_for_an_answer_to_a_challenge_which_opens_it():
     assert access.due(access.next_try_s).payload == packet(2)
 
 
-def test_a_burst_is_paced():
-    access = MediumAccess(RULES, random.Random(1))
+def test_a_burst_is_paced(access):
     for receiver in range(100):
         access.offer(receiver, PACKET, 0.0)
     now_s = 0.0
@@ -252,8 +248,7 @@ def test_a_broadcast_and_the_answers_to_one_are_spread():
 @pytest.mark.parametrize(
     ("silent_s", "tries"), [(1.0, RULES.tries), (60.0, RULES.tries_when_silent)]
 )
-def test_a_receiver_that_may_be_gone_gets_few_tries(silent_s, tries):
-    access = MediumAccess(RULES, random.Random(1))
+def test_a_receiver_that_may_be_gone_gets_few_tries(access, silent_s, tries):
     access.heard(7, 0.0)
     access.offer(7, PACKET, silent_s)
     now_s, tried = silent_s, 0
@@ -266,21 +261,18 @@ def test_a_receiver_that_may_be_gone_gets_few_tries(silent_s, tries):
 
 @pytest.mark.parametrize("asked", Priority)
 @pytest.mark.parametrize("sent", Priority)
-def test_only_answers_wait_after_a_broadcast(asked, sent):
-    access = MediumAccess(RULES, random.Random(1))
+def test_only_answers_wait_after_a_broadcast(access, asked, sent):
     access.heard(3, 1.0, broadcast=asked)
     access.offer(3, PACKET, 1.0, sent)
     assert (access.next_try_s > 1.0) == (asked is sent)
 
 
-def test_a_broadcast_at_a_random_time_of_its_sender_does_not_wait():
-    access = MediumAccess(RULES, random.Random(1))
+def test_a_broadcast_at_a_random_time_of_its_sender_does_not_wait(access):
     access.offer(ALL_NODES, PACKET, 1.0, jittered=False)
     assert access.next_try_s == 1.0
 
 
-def test_where_tries_are_limited_a_packet_whose_sender_begins_anew_is_tried_once():
-    access = MediumAccess(RULES, random.Random(1))
+def test_where_tries_are_limited_a_packet_whose_sender_begins_anew_is_tried_once(access):
     access.limit_tries(4)
     access.offer(7, PACKET, 0.0, jittered=False, once=True)
     assert access.tried(access.due(0.0), False, 0.0) is Fate.GIVEN_UP
@@ -299,35 +291,30 @@ def test_where_tries_are_limited_such_a_packet_is_tried_at_a_random_moment():
     assert 0.9 * RULES.once_jitter_s < max(waits) <= RULES.once_jitter_s
 
 
-def test_on_a_full_channel_too_it_is_tried_once_and_at_a_random_moment():
-    access = MediumAccess(RULES, random.Random(1))
+def test_on_a_full_channel_too_it_is_tried_once_and_at_a_random_moment(access):
     access.contention = RULES.busy_at
     access.offer(7, PACKET, 0.0, once=True)
     assert 0.0 < access.next_try_s < RULES.once_jitter_s
     assert access.tried(access.due(RULES.once_jitter_s), False, 1.0) is Fate.GIVEN_UP
 
 
-def test_elsewhere_it_is_tried_at_once_and_as_often_as_any():
-    access = MediumAccess(RULES, random.Random(1))
+def test_elsewhere_it_is_tried_at_once_and_as_often_as_any(access):
     access.offer(7, PACKET, 1.0, once=True)
     assert access.tried(access.due(1.0), False, 1.0) is Fate.WAITS
 
 
-def test_the_same_bytes_for_the_same_receiver_wait_only_once():
-    access = MediumAccess(RULES, random.Random(1))
+def test_the_same_bytes_for_the_same_receiver_wait_only_once(access):
     assert access.offer(7, PACKET, 0.0)
     assert access.offer(7, PACKET, 0.0)
     assert len(access) == 1
 
 
-def test_a_full_queue_refuses_packets():
-    access = MediumAccess(RULES, random.Random(1))
+def test_a_full_queue_refuses_packets(access):
     taken = [access.offer(7, packet(number), 0.0) for number in range(RULES.queue_length + 1)]
     assert taken == [True] * RULES.queue_length + [False]
 
 
-def test_failing_tries_make_the_pauses_longer_and_the_mesh_patient():
-    access = MediumAccess(RULES, random.Random(1))
+def test_failing_tries_make_the_pauses_longer_and_the_mesh_patient(access):
     assert access.patience == 0.0
     for number in range(50):
         access.offer(7, packet(number), 0.0)
@@ -338,8 +325,7 @@ def test_failing_tries_make_the_pauses_longer_and_the_mesh_patient():
     assert access.patience == RULES.most_patience
 
 
-def test_what_was_cleared_is_not_tried_again():
-    access = MediumAccess(RULES, random.Random(1))
+def test_what_was_cleared_is_not_tried_again(access):
     access.offer(7, PACKET, 0.0)
     due = access.due(0.0)
     access.clear()

@@ -13,7 +13,8 @@ from drone_mesh.errors import ConfigurationError
 REPORTING = MeshTiming(check_period_s=1000.0, report_period_s=30.0)
 
 
-def router():
+@pytest.fixture
+def rig():
     """Router 1, connected to gateway 0; its first report is due after half a period."""
     rig = Rig(timing=REPORTING)
     rig.engine.place = Location(1.0, -2.5, 3.0)
@@ -27,20 +28,17 @@ def gateway(*texts):
     return rig
 
 
-def test_a_report_has_these_bytes():
-    rig = router()
+def test_a_report_has_these_bytes(rig):
     rig.wait(15.0)
     assert rig.sent(66) == [packet("01 01 42 00 00 01 01 00 05 00 f4 ff 0f 00 ff 02 00")]
 
 
-def test_a_node_reports_once_in_a_period():
-    rig = router()
+def test_a_node_reports_once_in_a_period(rig):
     rig.wait(100.0)
     assert len(rig.sent(66)) == 3
 
 
-def test_in_flight_it_reports_every_second_and_once_after_its_landing():
-    rig = router()
+def test_in_flight_it_reports_every_second_and_once_after_its_landing(rig):
     rig.wait(16.0)
     rig.sent(66)
     rig.mesh._pilot.goal = Location(9.0, 9.0, 9.0)
@@ -77,8 +75,7 @@ def test_a_node_without_a_gateway_reports_nothing():
     assert rig.tried(66) == []
 
 
-def test_why_it_cannot_fly_follows_in_words_when_it_changes_and_now_and_then():
-    rig = router()
+def test_why_it_cannot_fly_follows_in_words_when_it_changes_and_now_and_then(rig):
     rig.engine.grounded = "no 3D fix of the satellites"
     rig.wait(16.0)
     words = rig.sent(67)
@@ -93,8 +90,7 @@ def test_why_it_cannot_fly_follows_in_words_when_it_changes_and_now_and_then():
     assert rig.sent(67) == [packet("01 01 43 00 00")]
 
 
-def test_in_flight_unchanged_words_are_repeated_no_more_often():
-    rig = router()
+def test_in_flight_unchanged_words_are_repeated_no_more_often(rig):
     rig.engine.grounded = "battery low"
     rig.wait(16.0)
     rig.sent(67)
@@ -103,8 +99,7 @@ def test_in_flight_unchanged_words_are_repeated_no_more_often():
     assert rig.sent(67) == []
 
 
-def test_a_drone_without_a_place_says_so_and_logs_nothing(caplog):
-    rig = router()
+def test_a_drone_without_a_place_says_so_and_logs_nothing(rig, caplog):
     rig.engine.place = None
     rig.wait(16.0)
     (report,) = rig.sent(66)
@@ -112,8 +107,7 @@ def test_a_drone_without_a_place_says_so_and_logs_nothing(caplog):
     assert "own location unknown" not in caplog.text
 
 
-def test_places_beyond_the_bounds_do_not_overflow():
-    rig = router()
+def test_places_beyond_the_bounds_do_not_overflow(rig):
     rig.engine.place = Location(1e9, -1e9, 5000.0)
     rig.wait(16.0)
     (report,) = rig.sent(66)
@@ -143,8 +137,7 @@ def test_a_node_that_can_fly_again_has_no_reason_left():
     assert rig.mesh.get_node_reports()[0].why_not_fly == ""
 
 
-def test_a_router_drops_a_report_that_is_addressed_to_it():
-    rig = router()
+def test_a_router_drops_a_report_that_is_addressed_to_it(rig):
     rig.hear("05 05 42 01 01 03")
     assert any("does not process" in reason for reason in rig.mesh.complaints.counts)
 

@@ -6,6 +6,8 @@ import json
 import math
 from dataclasses import replace
 
+import pytest
+
 from drone_mesh.console.frame_store import EVENTS_PER_FRAME, SAMPLES_KEPT, FrameStore
 from drone_mesh.drone.fence import Fence, Zone
 from drone_mesh.drone.location import Location
@@ -33,8 +35,12 @@ def frame(store: FrameStore, version: int) -> dict:
     return json.loads(store.frame_since(version))
 
 
-def test_a_new_page_gets_everything():
-    store = FrameStore()
+@pytest.fixture
+def store():
+    return FrameStore()
+
+
+def test_a_new_page_gets_everything(store):
     store.update_mesh(mesh(neighbours=b"\x00\x09"), wall_s=0.0)
     first = frame(store, 0)
     assert first["full"]
@@ -48,8 +54,7 @@ def test_a_new_page_gets_everything():
     )  # fmt: skip
 
 
-def test_a_page_that_is_up_to_date_gets_only_what_changed():
-    store = FrameStore()
+def test_a_page_that_is_up_to_date_gets_only_what_changed(store):
     store.update_mesh(mesh(), wall_s=0.0)
     known = store.version
     store.update_mesh(mesh(1.2, hops=2), wall_s=0.2)
@@ -59,8 +64,7 @@ def test_a_page_that_is_up_to_date_gets_only_what_changed():
     assert delta["clock"]["t"] == 1.2
 
 
-def test_obstacles_are_sent_once_and_to_every_new_page():
-    store = FrameStore()
+def test_obstacles_are_sent_once_and_to_every_new_page(store):
     box = ObstacleStatus((5.0, 1.0, 2.0), (2.0, 4.0, 4.0), math.pi / 2)
     store.update_mesh(replace(mesh(), obstacles=[box]), wall_s=0.0)
     known = store.version
@@ -71,8 +75,7 @@ def test_obstacles_are_sent_once_and_to_every_new_page():
     assert shown["top"] == 4.0
 
 
-def test_the_fence_is_sent_once_and_an_end_that_is_not_there_is_null():
-    store = FrameStore()
+def test_the_fence_is_sent_once_and_an_end_that_is_not_there_is_null(store):
     ring = [(0.0, 0.0), (9.0, 0.0), (9.0, 9.0)]
     zones = [Zone("yard", (ring, [(6.0, 1.0), (7.0, 1.0), (7.0, 2.0)]), highest_m=30.0)]
     store.update_mesh(replace(mesh(), fence=describe_fence(Fence.of(zones, ()))), wall_s=0.0)
@@ -86,8 +89,7 @@ def test_the_fence_is_sent_once_and_an_end_that_is_not_there_is_null():
     assert rings[1][2] == [7.0, 2.0]
 
 
-def test_a_page_that_fell_behind_gets_the_newest_of_all_it_missed():
-    store = FrameStore()
+def test_a_page_that_fell_behind_gets_the_newest_of_all_it_missed(store):
     store.update_mesh(mesh(), wall_s=0.0)
     known = store.version
     store.update_mesh(mesh(1.2, hops=2), wall_s=0.2)
@@ -95,8 +97,7 @@ def test_a_page_that_fell_behind_gets_the_newest_of_all_it_missed():
     assert frame(store, known)["nodes"] == {"1": {"hops": 3, "total_messages": 7}}
 
 
-def test_a_page_gets_the_names_of_the_algorithms_and_what_each_repair_does():
-    store = FrameStore()
+def test_a_page_gets_the_names_of_the_algorithms_and_what_each_repair_does(store):
     named = replace(mesh(repair=""), routing="etx_tree", repair_strategy="thesis")
     store.update_mesh(named, wall_s=0.0)
     first = frame(store, 0)
@@ -108,8 +109,7 @@ def test_a_page_gets_the_names_of_the_algorithms_and_what_each_repair_does():
     assert frame(store, known)["nodes"] == {"1": {"repair": words, "does": words}}
 
 
-def test_movements_below_a_centimetre_are_not_sent():
-    store = FrameStore()
+def test_movements_below_a_centimetre_are_not_sent(store):
     store.update_mesh(mesh(), wall_s=0.0)
     known = store.version
     store.update_mesh(mesh(1.2, **{}), wall_s=0.2)
@@ -119,8 +119,7 @@ def test_movements_below_a_centimetre_are_not_sent():
     assert "nodes" not in frame(store, known)
 
 
-def test_a_node_that_is_gone_is_removed_and_may_come_back():
-    store = FrameStore()
+def test_a_node_that_is_gone_is_removed_and_may_come_back(store):
     store.update_mesh(mesh(), wall_s=0.0)
     known = store.version
     store.update_mesh(replace(mesh(1.2), nodes=mesh().nodes[:1]), wall_s=0.2)
@@ -131,8 +130,7 @@ def test_a_node_that_is_gone_is_removed_and_may_come_back():
     assert back["nodes"]["1"]["hops"] == 1
 
 
-def test_each_event_is_sent_once():
-    store = FrameStore()
+def test_each_event_is_sent_once(store):
     store.update_mesh(mesh(), wall_s=0.0)
     store.add_events([EventRecord(1.0, 1, "connected", (0,), "1 hop")])
     events = frame(store, 0)["events"]
@@ -142,23 +140,20 @@ def test_each_event_is_sent_once():
     assert [event["kind"] for event in frame(store, known)["events"]] == ["disconnected"]
 
 
-def test_an_event_about_an_order_is_told_with_its_number_and_place():
-    store = FrameStore()
+def test_an_event_about_an_order_is_told_with_its_number_and_place(store):
     store.add_events([EventRecord(1.0, 0, "order refused", (1,), "battery at 9 %", 7, A)])
     [event] = frame(store, 0)["events"]
     assert event["detail"] == "order 7 to x 2.00 m, y 3.00 m, z 0 m: battery at 9 %"
 
 
-def test_of_a_burst_of_events_the_newest_are_sent():
-    store = FrameStore()
+def test_of_a_burst_of_events_the_newest_are_sent(store):
     store.add_events([EventRecord(float(n), 1, "landed") for n in range(EVENTS_PER_FRAME + 50)])
     events = frame(store, 0)["events"]
     assert len(events) == EVENTS_PER_FRAME
     assert events[-1]["t"] == EVENTS_PER_FRAME + 49
 
 
-def test_samples_are_taken_once_a_second_and_not_while_paused():
-    store = FrameStore()
+def test_samples_are_taken_once_a_second_and_not_while_paused(store):
     for tenth in range(31):
         store.update_mesh(mesh(1.0 + tenth / 10), wall_s=tenth / 10)
     assert len(frame(store, 0)["samples"]) == 4
@@ -167,8 +162,7 @@ def test_samples_are_taken_once_a_second_and_not_while_paused():
     assert len(frame(store, 0)["samples"]) == 4
 
 
-def test_a_new_world_is_sent_in_full_and_without_the_past():
-    store = FrameStore()
+def test_a_new_world_is_sent_in_full_and_without_the_past(store):
     store.update_mesh(mesh(100.0), wall_s=0.0)
     store.add_events([EventRecord(99.0, 1, "connected")])
     known = store.version
@@ -180,8 +174,7 @@ def test_a_new_world_is_sent_in_full_and_without_the_past():
     assert [sample["stamp_s"] for sample in delta["samples"]] == [0.5]
 
 
-def test_silence_is_reported_and_ends_with_the_next_state():
-    store = FrameStore()
+def test_silence_is_reported_and_ends_with_the_next_state(store):
     store.update_mesh(mesh(), wall_s=0.0)
     known = store.version
     store.set_link("no ROS master")
@@ -193,8 +186,7 @@ def test_silence_is_reported_and_ends_with_the_next_state():
     assert frame(store, known)["link"] == ""
 
 
-def test_the_selected_node_has_its_neighbours_and_the_age_of_its_fallback_position():
-    store = FrameStore()
+def test_the_selected_node_has_its_neighbours_and_the_age_of_its_fallback_position(store):
     assert store.detail_of(1) == {"neighbours": [], "fallback_age": None}
     fields = {"neighbours": b"\x00\x09", "neighbour_ages": b"\x03\xff"}
     store.update_mesh(mesh(**fields), wall_s=0.0)
@@ -203,8 +195,7 @@ def test_the_selected_node_has_its_neighbours_and_the_age_of_its_fallback_positi
     assert store.detail_of(1)["fallback_age"] == 12
 
 
-def test_a_frame_carries_each_link_once_under_its_use_at_the_lower_id():
-    store = FrameStore()
+def test_a_frame_carries_each_link_once_under_its_use_at_the_lower_id(store):
     nodes = [
         NodeStatus(0, Role.GATEWAY, connected=True),
         NodeStatus(1, connected=True, next_hop=0, neighbours=b"\x00\x09"),
@@ -223,8 +214,7 @@ def test_a_frame_carries_each_link_once_under_its_use_at_the_lower_id():
     assert frame(store, 0)["nodes"]["1"]["lost_links"] == "0"
 
 
-def test_nodes_at_one_position_come_with_their_slots():
-    store = FrameStore()
+def test_nodes_at_one_position_come_with_their_slots(store):
     nodes = [NodeStatus(node, position=(2.0, 2.0, float(node))) for node in (1, 2)]
     store.update_mesh(MeshStatus(1.0, [*nodes, NodeStatus(3)]), wall_s=0.0)
     assert frame(store, 0)["nodes"]["3"]["position"] is None
@@ -232,8 +222,7 @@ def test_nodes_at_one_position_come_with_their_slots():
     assert slots == {"1": [0, 2], "2": [1, 2], "3": None}
 
 
-def test_the_end_of_an_earlier_order_is_not_shown_once_a_new_one_is_given():
-    store = FrameStore()
+def test_the_end_of_an_earlier_order_is_not_shown_once_a_new_one_is_given(store):
     store.add_events([EventRecord(1.0, 0, "order accepted", (1,), "", 7, A)])
     store.update_mesh(mesh(), wall_s=0.0)
     before = store.version
@@ -248,8 +237,7 @@ def test_the_end_of_an_earlier_order_is_not_shown_once_a_new_one_is_given():
     assert frame(store, 0)["nodes"]["1"]["order"] == f"order 8 to {B.in_words()}: sent"
 
 
-def test_an_order_that_was_refused_leaves_the_earlier_one_as_it_was():
-    store = FrameStore()
+def test_an_order_that_was_refused_leaves_the_earlier_one_as_it_was(store):
     store.add_events([EventRecord(1.0, 0, "order arrived", (1,), "", 7, A)])
     store.update_mesh(mesh(), wall_s=0.0)
     refused, newer = store.expect_orders([1]), store.expect_orders([1])
@@ -259,8 +247,7 @@ def test_an_order_that_was_refused_leaves_the_earlier_one_as_it_was():
     assert frame(store, 0)["nodes"]["1"]["order"] == f"order 7 to {A.in_words()}: arrived"
 
 
-def test_a_node_says_what_it_does_on_a_shared_channel_and_which_messages_of_users_it_had():
-    store = FrameStore()
+def test_a_node_says_what_it_does_on_a_shared_channel_and_which_messages_of_users_it_had(store):
     busy = {"airtime": 0.0123, "tries": 1.254, "queue": 2, "given_up": 1}
     busy.update({"data_sent": 3, "data_bytes_sent": 72, "data_queued": 1, "data_given_up": 1})
     store.update_mesh(MeshStatus(1.0, [NodeStatus(1, **busy), NodeStatus(2)]), wall_s=0.0)

@@ -108,8 +108,12 @@ class Mesh:
         return {post["holder"]: post["places"] for post in self.relief.saved()["posts"]}
 
 
-def test_the_old_drone_leaves_when_the_new_one_beside_it_has_been_connected_for_a_while():
-    mesh = Mesh()
+@pytest.fixture
+def mesh():
+    return Mesh()
+
+
+def test_the_old_drone_leaves_when_the_new_one_beside_it_has_been_connected_for_a_while(mesh):
     assert mesh.sent() == {}
     mesh.hover(mesh.holder, 26.0)  # 20 and 2 percent stay, 1 percent is 12 s
     ((drone, place),) = mesh.sent().items()
@@ -126,8 +130,7 @@ def test_the_old_drone_leaves_when_the_new_one_beside_it_has_been_connected_for_
     assert mesh.sent(2) == {1: POST}
 
 
-def test_a_full_spare_stays_in_reserve_while_all_can_be_relieved_in_time():
-    mesh = Mesh()
+def test_a_full_spare_stays_in_reserve_while_all_can_be_relieved_in_time(mesh):
     assert mesh.sent() == {}
     mesh.hover(mesh.holder, 46.0)
     assert mesh.sent() == {}
@@ -135,8 +138,7 @@ def test_a_full_spare_stays_in_reserve_while_all_can_be_relieved_in_time():
     assert mesh.sent().keys() == {2}
 
 
-def test_a_drone_that_nobody_can_relieve_goes_home_in_time_and_its_post_is_filled_later():
-    mesh = Mesh()
+def test_a_drone_that_nobody_can_relieve_goes_home_in_time_and_its_post_is_filled_later(mesh):
     mesh.spare.battery = 50.0
     assert mesh.sent() == {}
     mesh.hover(mesh.holder, 22.0)
@@ -148,8 +150,7 @@ def test_a_drone_that_nobody_can_relieve_goes_home_in_time_and_its_post_is_fille
     assert place.distance_m(POST) < 1.6
 
 
-def test_a_spare_that_does_not_come_is_called_back_and_another_relief_begins():
-    mesh = Mesh()
+def test_a_spare_that_does_not_come_is_called_back_and_another_relief_begins(mesh):
     mesh.sent()
     mesh.hover(mesh.holder, 30.0)
     assert list(mesh.sent()) == [2]
@@ -160,8 +161,7 @@ def test_a_spare_that_does_not_come_is_called_back_and_another_relief_begins():
 
 
 @pytest.mark.parametrize("back_when", ["another one is on its way", "another one holds its post"])
-def test_a_drone_that_was_silent_at_its_post_goes_home_when_another_one_has_come(back_when):
-    mesh = Mesh()
+def test_a_drone_that_was_silent_at_its_post_goes_home_when_another_one_has_come(mesh, back_when):
     mesh.sent()
     mesh.holder.on = False
     ((drone, place),) = mesh.sent().items()
@@ -176,8 +176,7 @@ def test_a_drone_that_was_silent_at_its_post_goes_home_when_another_one_has_come
     assert mesh.sent(10) == {1: OTHER}
 
 
-def test_a_drone_that_was_silent_has_its_post_again_if_nobody_came():
-    mesh = Mesh()
+def test_a_drone_that_was_silent_has_its_post_again_if_nobody_came(mesh):
     mesh.spare.battery = 50.0
     mesh.sent()
     mesh.holder.on = False
@@ -186,8 +185,7 @@ def test_a_drone_that_was_silent_has_its_post_again_if_nobody_came():
     assert mesh.sent(30) == {}
 
 
-def test_where_a_drone_is_ordered_is_its_post_from_then_on():
-    mesh = Mesh()
+def test_where_a_drone_is_ordered_is_its_post_from_then_on(mesh):
     mesh.sent()
     mesh.holder.position = (-6.0, 0.0, 4.0)
     mesh.sent()
@@ -196,8 +194,7 @@ def test_where_a_drone_is_ordered_is_its_post_from_then_on():
     assert place.distance_m(Location(0.0, -6.0, 4.0)) < 1.6
 
 
-def test_a_drone_whose_home_is_unknown_holds_no_post_of_its_own_when_it_is_relieved():
-    mesh = Mesh()
+def test_a_drone_whose_home_is_unknown_holds_no_post_of_its_own_when_it_is_relieved(mesh):
     mesh.relief = Relief(relief_policy("spare_first"), homes={2: HOME})  # as after a restart
     mesh.sent()
     mesh.hover(mesh.holder, 26.0)
@@ -279,8 +276,7 @@ def test_a_drone_that_fails_while_its_relief_comes_is_left_alone_and_its_post_is
     assert list(mesh.posts()) == [2]
 
 
-def test_a_drone_that_has_another_order_is_no_spare():
-    mesh = Mesh()
+def test_a_drone_that_has_another_order_is_no_spare(mesh):
     mesh.sent()
     mesh.orders.ordered(2, AWAY, mesh.now_s)
     mesh.now_s += 1.0
@@ -298,8 +294,7 @@ def test_a_drone_that_is_sent_elsewhere_on_its_way_home_holds_a_post_there():
     assert mesh.posts().keys() == {1, 2}
 
 
-def test_a_post_that_is_far_away_is_relieved_too():
-    mesh = Mesh()
+def test_a_post_that_is_far_away_is_relieved_too(mesh):
     mesh.holder.position = (0.0, 300.0, 4.0)
     mesh.sent()
     mesh.hover(mesh.holder, 50.0)
@@ -310,16 +305,14 @@ def test_a_post_that_is_far_away_is_relieved_too():
     assert mesh.sent(7) == {1: OTHER}
 
 
-def test_nobody_is_sent_to_a_post_whose_drone_flies_elsewhere():
-    mesh = Mesh()
+def test_nobody_is_sent_to_a_post_whose_drone_flies_elsewhere(mesh):
     mesh.sent()
     mesh.holder.path, mesh.holder.battery = AWAY.to_vector(), 25.0
     mesh.sent(20)
     assert mesh.orders.all_progress() == []
 
 
-def test_a_battery_that_recovers_by_a_percent_is_used_as_fast_as_before():
-    mesh = Mesh()
+def test_a_battery_that_recovers_by_a_percent_is_used_as_fast_as_before(mesh):
     mesh.spare.battery = 50.0
     mesh.sent()
     for percent in (80.0, 60.0, 50.0):
@@ -338,8 +331,7 @@ def fence(west):
 
 
 @pytest.mark.parametrize("later", [True, False])
-def test_the_place_beside_is_within_the_fence_that_there_is_or_comes(later):
-    mesh = Mesh()
+def test_the_place_beside_is_within_the_fence_that_there_is_or_comes(mesh, later):
     mesh.holder.position = (6.0, 0.0, 4.0)
     mesh.relief = Relief(relief_policy("spare_first"))  # its home is beyond the fence
     if later:
@@ -352,8 +344,7 @@ def test_the_place_beside_is_within_the_fence_that_there_is_or_comes(later):
     assert places[1].longitude > 5.8
 
 
-def test_a_neighbour_without_a_known_home_relieves_nobody():
-    mesh = Mesh()
+def test_a_neighbour_without_a_known_home_relieves_nobody(mesh):
     mesh.relief = Relief(relief_policy("rotate"), homes={1: OTHER})
     mesh.spare.position = (4.0, 4.0, 4.0)
     mesh.sent()
@@ -371,8 +362,7 @@ def test_a_place_is_taken_by_a_drone_that_flies_there_and_has_fallen_silent():
     } == set()
 
 
-def test_a_relief_reaches_a_post_between_whole_metres_of_height():
-    mesh = Mesh()
+def test_a_relief_reaches_a_post_between_whole_metres_of_height(mesh):
     mesh.holder.position = (0.0, 6.0, 4.5)
     mesh.sent()
     mesh.hover(mesh.holder, 26.0)
@@ -386,10 +376,9 @@ def test_a_relief_reaches_a_post_between_whole_metres_of_height():
     [(True, 5.0, True), (False, 5.0, False), (True, 20.0, False)],
 )
 def test_a_drone_that_is_on_but_mute_is_replaced_and_goes_home_when_it_is_heard_again(
-    was_connected, neighbour_m, is_replaced
+    mesh, was_connected, neighbour_m, is_replaced
 ):
     """Not one that nobody could hear, nor one that was never heard there."""
-    mesh = Mesh()
     mesh.holder.position = (0.0, -14.0, 4.0)
     neighbour = (0.0, -14.0 + neighbour_m, 0.0)
     mesh.others = [NodeStatus(3, connected=True, position=neighbour, battery=50.0)]
@@ -406,9 +395,8 @@ def test_a_drone_that_is_on_but_mute_is_replaced_and_goes_home_when_it_is_heard_
         assert mesh.sent(2) == {1: OTHER}
 
 
-def test_a_neighbour_that_falls_silent_before_it_sets_out_for_another_post_goes_home_later():
+def test_a_neighbour_that_falls_silent_before_it_sets_out_for_another_post_goes_home_later(mesh):
     """Somebody holds the post that it left."""
-    mesh = Mesh()
     mesh.relief = Relief(relief_policy("rotate"), homes={1: OTHER, 2: HOME})
     mesh.others = [NodeStatus(3, connected=True, position=(0.0, 12.0, 0.0), battery=100.0)]
     mesh.spare.position = (4.0, 4.0, 4.0)
@@ -424,8 +412,7 @@ def test_a_neighbour_that_falls_silent_before_it_sets_out_for_another_post_goes_
     assert mesh.sent(2)[2] == HOME
 
 
-def test_who_flies_for_a_repair_leaves_its_post_behind_and_holds_that_of_the_lost_one():
-    mesh = Mesh()
+def test_who_flies_for_a_repair_leaves_its_post_behind_and_holds_that_of_the_lost_one(mesh):
     lost = NodeStatus(3, connected=True, position=(6.0, 6.0, 4.0), battery=90.0)
     mesh.others, mesh.spare.battery = [lost], 50.0
     mesh.sent()
@@ -441,8 +428,7 @@ def test_who_flies_for_a_repair_leaves_its_post_behind_and_holds_that_of_the_los
     assert mesh.posts().keys() == {1, 2}
 
 
-def test_of_two_free_posts_the_one_that_has_been_free_for_longer_is_filled_first():
-    mesh = Mesh()
+def test_of_two_free_posts_the_one_that_has_been_free_for_longer_is_filled_first(mesh):
     second = NodeStatus(3, connected=True, position=(6.0, 6.0, 4.0), battery=90.0)
     mesh.others, mesh.spare.battery = [second], 50.0
     mesh.sent()
@@ -454,8 +440,7 @@ def test_of_two_free_posts_the_one_that_has_been_free_for_longer_is_filled_first
     assert (drone, place.distance_m(Location(6.0, 6.0, 4.0)) < 1.6) == (2, True)
 
 
-def test_who_ends_a_repair_away_from_all_posts_goes_home_when_they_are_held_and_holds_none():
-    mesh = Mesh()
+def test_who_ends_a_repair_away_from_all_posts_goes_home_when_they_are_held_and_holds_none(mesh):
     mesh.spare.battery = 50.0
     mesh.sent(2)
     mesh.holder.repair_state, mesh.holder.path = 5, (6.0, 9.0, 4.0)
@@ -481,32 +466,28 @@ def neighbours(mesh):
     mesh.sent(2)
 
 
-def test_a_drone_that_nobody_hears_any_more_is_replaced_although_it_believes_to_be_connected():
-    mesh = Mesh()
+def test_a_drone_that_nobody_hears_any_more_is_replaced_although_it_believes_to_be_connected(mesh):
     neighbours(mesh)
     mesh.spare.neighbours, mesh.others[0].neighbours = bytes([3]), bytes([2])
     assert mesh.sent() == {}
     assert list(mesh.sent()) == [2]
 
 
-def test_a_drone_that_hears_nobody_is_replaced_as_soon():
-    mesh = Mesh()
+def test_a_drone_that_hears_nobody_is_replaced_as_soon(mesh):
     neighbours(mesh)
     mesh.holder.neighbours, mesh.holder.connected = b"", False
     assert mesh.sent() == {}
     assert list(mesh.sent()) == [2]
 
 
-def test_a_drone_that_looks_for_a_route_among_its_neighbours_is_left_time_for_that():
-    mesh = Mesh()
+def test_a_drone_that_looks_for_a_route_among_its_neighbours_is_left_time_for_that(mesh):
     neighbours(mesh)
     mesh.holder.connected = False
     assert mesh.sent(10) == {}
     assert list(mesh.sent(2)) == [2]
 
 
-def test_a_gap_is_filled_by_the_nearest_drone_that_is_full():
-    mesh = Mesh()
+def test_a_gap_is_filled_by_the_nearest_drone_that_is_full(mesh):
     near = NodeStatus(3, connected=True, position=(4.0, 6.0, 0.0), battery=100.0)
     mesh.spare.position, mesh.others = (20.0, 4.0, 0.0), [near]
     mesh.relief = Relief(relief_policy("spare_first"))
@@ -515,8 +496,7 @@ def test_a_gap_is_filled_by_the_nearest_drone_that_is_full():
     assert list(mesh.sent()) == [3]
 
 
-def test_a_drone_whose_way_home_leads_past_a_drone_at_rest_goes_up_first():
-    mesh = Mesh()
+def test_a_drone_whose_way_home_leads_past_a_drone_at_rest_goes_up_first(mesh):
     mesh.spare.battery = 50.0
     mesh.holder.position = (4.0, 3.0, 4.0)
     mesh.others = [NodeStatus(3, connected=True, position=(7.2, 1.2, 4.0), battery=90.0)]
@@ -541,8 +521,7 @@ def test_a_drone_whose_way_home_leads_past_a_drone_at_rest_goes_up_first():
 
 
 @pytest.mark.parametrize(("x", "goes_up"), [(7.0, True), (8.0, False)])
-def test_a_drone_goes_up_only_where_the_gateway_hears_it(x, goes_up):
-    mesh = Mesh()
+def test_a_drone_goes_up_only_where_the_gateway_hears_it(mesh, x, goes_up):
     home = Location(1.0, x + 4.0, 0.0)
     mesh.relief = Relief(relief_policy("spare_first"), homes={1: home})
     mesh.holder.position, mesh.spare.connected = (x, 3.9, 4.0), False
@@ -554,8 +533,9 @@ def test_a_drone_goes_up_only_where_the_gateway_hears_it(x, goes_up):
     assert (order["goals"]["1"] != list(home)) is goes_up
 
 
-def test_who_is_sent_away_takes_its_post_along_although_nobody_hears_it_for_seconds_on_the_way():
-    mesh = Mesh()
+def test_who_is_sent_away_takes_its_post_along_although_nobody_hears_it_for_seconds_on_the_way(
+    mesh,
+):
     mesh.holder.neighbours, mesh.spare.neighbours = bytes([0, 2]), bytes([0, 1])
     mesh.sent(2)
     mesh.holder.neighbours, mesh.spare.neighbours = b"", bytes([0])

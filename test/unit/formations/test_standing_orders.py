@@ -43,23 +43,25 @@ def words(orders):
     return [progress.in_words() for progress in orders.all_progress()]
 
 
-def test_a_drone_without_a_route_is_ordered_as_soon_as_it_has_one():
-    orders = StandingOrders()
+@pytest.fixture
+def orders():
+    return StandingOrders()
+
+
+def test_a_drone_without_a_route_is_ordered_as_soon_as_it_has_one(orders):
     orders.give("layout 7", {4: EAST}, now_s=0.0)
     assert orders.update(state(6.0, drone(4, connected=False))) == []
     assert words(orders) == ["0 of 1 at their place, 1 without a route: 4"]
     assert orders.update(state(7.0, drone(4))) == [(4, EAST)]
 
 
-def test_an_order_that_a_drone_does_not_carry_out_is_repeated_less_and_less_often():
-    orders = StandingOrders()
+def test_an_order_that_a_drone_does_not_carry_out_is_repeated_less_and_less_often(orders):
     orders.give("layout 7", {4: EAST}, now_s=0.0)
     ordered = [s for s in range(100) if orders.update(state(float(s), drone(4)))]
     assert ordered == [0, 5, 15, 35, 75]
 
 
-def test_a_drone_that_flies_to_its_place_is_left_alone_until_it_is_there():
-    orders = StandingOrders()
+def test_a_drone_that_flies_to_its_place_is_left_alone_until_it_is_there(orders):
     orders.give("layout 7", {4: EAST, 5: NORTH}, now_s=0.0)
     flying = state(20.0, drone(4, to=EAST), drone(5, to=NORTH))
     assert orders.update(flying) == []
@@ -69,16 +71,14 @@ def test_a_drone_that_flies_to_its_place_is_left_alone_until_it_is_there():
     assert orders.all_progress()[0].is_over
 
 
-def test_a_drone_that_flies_elsewhere_is_ordered_when_it_has_landed():
-    orders = StandingOrders()
+def test_a_drone_that_flies_elsewhere_is_ordered_when_it_has_landed(orders):
     orders.give("layout 7", {4: EAST}, now_s=0.0)
     assert orders.update(state(6.0, drone(4, to=NORTH))) == []
     assert words(orders) == ["0 of 1 at their place, 1 waiting to set out: 4"]
     assert orders.update(state(7.0, drone(4, at=NORTH))) == [(4, EAST)]
 
 
-def test_a_drone_that_may_still_set_out_elsewhere_is_ordered_to_the_place_where_it_stands():
-    orders = StandingOrders()
+def test_a_drone_that_may_still_set_out_elsewhere_is_ordered_to_the_place_where_it_stands(orders):
     there = state(0.0, drone(4))
     first = orders.give("layout 7", {4: EAST}, now_s=0.0)
     assert orders.update(there) == [(4, EAST)]
@@ -89,8 +89,7 @@ def test_a_drone_that_may_still_set_out_elsewhere_is_ordered_to_the_place_where_
     assert orders.all_progress()[-1].is_over
 
 
-def test_a_drone_that_another_order_sent_elsewhere_is_ordered_back_to_where_it_stands():
-    orders = StandingOrders()
+def test_a_drone_that_another_order_sent_elsewhere_is_ordered_back_to_where_it_stands(orders):
     orders.ordered(4, EAST, now_s=0.0)
     orders.give("layout 8", {4: HOME}, now_s=1.0)
     assert orders.update(state(1.0, drone(4))) == [(4, HOME)]
@@ -99,15 +98,13 @@ def test_a_drone_that_another_order_sent_elsewhere_is_ordered_back_to_where_it_s
     assert orders.update(state(40.0, drone(5))) == []
 
 
-def test_at_once_a_drone_is_ordered_on_the_way_elsewhere_and_without_a_route():
-    orders = StandingOrders()
+def test_at_once_a_drone_is_ordered_on_the_way_elsewhere_and_without_a_route(orders):
     orders.give("layout 7", {3: EAST, 4: EAST, 5: NORTH}, now_s=0.0, at_once=True)
     present = drone(3), drone(4, to=NORTH), drone(5, connected=False)
     assert orders.update(state(6.0, *present)) == [(5, NORTH), (4, EAST), (3, EAST)]
 
 
-def test_a_drone_that_may_still_set_out_is_not_met_by_another_one():
-    orders = StandingOrders()
+def test_a_drone_that_may_still_set_out_is_not_met_by_another_one(orders):
     there, across = drone(4), drone(5, at=Location(3.0, 3.0, 0.0))
     orders.give("layout 7", {4: EAST}, now_s=0.0)
     assert orders.update(state(1.0, gateway(), there, across)) == [(4, EAST)]
@@ -125,10 +122,9 @@ def test_a_drone_that_may_still_set_out_is_not_met_by_another_one():
     ],
 )
 def test_a_drone_is_under_way_until_its_gateway_has_no_route_whatever_a_relay_says(
-    event, may_set_out
+    orders, event, may_set_out
 ):
     """A relay names no order; on a shared channel the gateway finds the drone and repeats it."""
-    orders = StandingOrders()
     there, across = drone(4), drone(5, at=Location(3.0, 3.0, 0.0))
     orders.give("layout 7", {4: EAST}, now_s=0.0)
     assert orders.update(state(1.0, gateway(), there, across)) == [(4, EAST)]
@@ -139,15 +135,13 @@ def test_a_drone_is_under_way_until_its_gateway_has_no_route_whatever_a_relay_sa
     assert ordered == ([] if may_set_out else [(5, west)])
 
 
-def test_a_drone_that_has_arrived_once_is_not_ordered_back_after_a_repair():
-    orders = StandingOrders()
+def test_a_drone_that_has_arrived_once_is_not_ordered_back_after_a_repair(orders):
     orders.give("layout 7", {4: EAST, 5: NORTH}, now_s=0.0)
     orders.update(state(10.0, drone(4, at=EAST), drone(5)))
     assert orders.update(state(60.0, drone(4, at=HOME), drone(5))) == [(5, NORTH)]
 
 
-def test_a_drone_that_found_no_mesh_at_its_place_is_ordered_back_once_it_is_connected():
-    orders = StandingOrders()
+def test_a_drone_that_found_no_mesh_at_its_place_is_ordered_back_once_it_is_connected(orders):
     orders.give("layout 7", {4: EAST, 5: NORTH}, now_s=0.0)
     orders.update(state(0.0, drone(4), drone(5)))
     late = drone(5, to=NORTH)
@@ -171,8 +165,7 @@ def test_a_drone_brought_back_from_a_place_out_of_reach_is_named_until_that_is_i
     assert orders.update(state(61.0, back, there, *others)) == [(4, far)]
 
 
-def test_a_drone_that_finds_no_mesh_at_its_place_is_not_ordered_back_when_nobody_else_comes():
-    orders = StandingOrders()
+def test_a_drone_that_finds_no_mesh_at_its_place_is_not_ordered_back_when_nobody_else_comes(orders):
     orders.give("layout 7", {4: EAST, 5: NORTH}, now_s=0.0)
     off = drone(5, connected=False)
     orders.update(state(0.0, drone(4), off))
@@ -181,8 +174,7 @@ def test_a_drone_that_finds_no_mesh_at_its_place_is_not_ordered_back_when_nobody
     assert orders.update(state(60.0, repaired, off)) == []
 
 
-def test_a_later_layout_replaces_the_goals_of_its_drones_and_no_others():
-    orders = StandingOrders()
+def test_a_later_layout_replaces_the_goals_of_its_drones_and_no_others(orders):
     orders.give("layout 7", {4: EAST, 5: EAST}, now_s=0.0)
     orders.give("layout 8", {4: NORTH}, now_s=3.0)
     ordered = orders.update(state(60.0, drone(4), drone(5)))
@@ -190,8 +182,7 @@ def test_a_later_layout_replaces_the_goals_of_its_drones_and_no_others():
     assert "1 replaced by a later order: 4" in words(orders)[0]
 
 
-def test_a_flight_ordered_at_a_gateway_replaces_the_drones_goal():
-    orders = StandingOrders()
+def test_a_flight_ordered_at_a_gateway_replaces_the_drones_goal(orders):
     orders.give("layout 7", {4: NORTH}, now_s=10.0)
     elsewhere = Location.from_vector((9.0, 0.0, 0.0))
     orders.on_event(EventRecord(5.0, 0, "order sent", (4,), "", 2, elsewhere))  # an older one
@@ -203,8 +194,7 @@ def test_a_flight_ordered_at_a_gateway_replaces_the_drones_goal():
 
 @pytest.mark.parametrize("x", [1.125, 2.675, 0.005, -3.315, 2.005])
 @pytest.mark.parametrize("at_once", [False, True])
-def test_a_drone_is_never_replaced_by_its_own_order_whatever_its_decimals(x, at_once):
-    orders = StandingOrders()
+def test_a_drone_is_never_replaced_by_its_own_order_whatever_its_decimals(orders, x, at_once):
     goal = Location.from_vector((x, 2.045, 2.4))
     orders.give("my.csv", {4: goal}, now_s=0.0, at_once=at_once)
     assert len(orders.update(state(1.0, drone(4)))) == 1
@@ -215,16 +205,14 @@ def test_a_drone_is_never_replaced_by_its_own_order_whatever_its_decimals(x, at_
     assert words(orders) == ["1 of 1 at their place"]
 
 
-def test_a_refusal_is_shown_with_its_reason_and_tried_again():
-    orders = StandingOrders()
+def test_a_refusal_is_shown_with_its_reason_and_tried_again(orders):
     orders.give("layout 7", {4: EAST}, now_s=0.0)
     orders.on_event(EventRecord(1.0, 0, "order refused", (4,), "battery at 9 %", 3, EAST))
     assert words(orders) == ["0 of 1 at their place, 4 refused: battery at 9 %"]
     assert orders.update(state(6.0, drone(4))) == [(4, EAST)]
 
 
-def test_a_place_that_the_fence_has_taken_is_named_and_flown_to_once_it_is_free_again():
-    orders = StandingOrders()
+def test_a_place_that_the_fence_has_taken_is_named_and_flown_to_once_it_is_free_again(orders):
     orders.give("layout 7", {4: EAST, 5: NORTH}, now_s=0.0)
     pond = Fence.of([], [Zone.circle("pond", (6.0, 0.0), 2.0, inside=False)])
     drones = drone(4), drone(5, at=NORTH)
@@ -235,16 +223,14 @@ def test_a_place_that_the_fence_has_taken_is_named_and_flown_to_once_it_is_free_
     assert orders.update(state(61.0, *drones)) == [(4, EAST)]
 
 
-def test_drones_that_do_not_exist_are_named():
-    orders = StandingOrders()
+def test_drones_that_do_not_exist_are_named(orders):
     orders.give("layout 7", {4: EAST, 9: EAST}, now_s=0.0)
     orders.update(state(1.0, drone(4, at=EAST)))
     assert words(orders) == ["1 of 2 at their places, 1 not in this fleet: 9"]
     assert orders.all_progress()[0].is_over
 
 
-def test_a_withdrawn_layout_orders_nothing_more():
-    orders = StandingOrders()
+def test_a_withdrawn_layout_orders_nothing_more(orders):
     number = orders.give("layout 7", {4: EAST}, now_s=0.0)
     assert orders.withdraw(number).drones[PartState.WAITING] == (4,)
     assert orders.update(state(60.0, drone(4))) == []
@@ -308,8 +294,7 @@ def test_the_last_layout_ordered_is_reached_whatever_was_ordered_before(pause_s)
     assert astray() == [], f"{ids_in_words(astray())}: {last.in_words()}"
 
 
-def test_no_drone_is_sent_to_the_place_of_one_that_stays_there():
-    orders = StandingOrders()
+def test_no_drone_is_sent_to_the_place_of_one_that_stays_there(orders):
     orders.give("layout 7", {4: EAST}, now_s=0.0)
     orders.give("layout 8", {5: NORTH}, now_s=0.0, at_once=True)
     there = drone(6, at=EAST), drone(7, at=NORTH)
@@ -345,8 +330,7 @@ def test_while_it_plans_others_may_change_the_orders_and_what_they_did_counts(ch
     assert 4 not in dict(wanted)
 
 
-def test_a_relief_that_a_user_ended_before_a_restart_is_not_taken_up_again():
-    orders = StandingOrders()
+def test_a_relief_that_a_user_ended_before_a_restart_is_not_taken_up_again(orders):
     number = orders.give("relief", {4: EAST}, now_s=0.0, relieves=5)
     orders.ordered(4, NORTH, now_s=1.0)
     assert orders.give("over", {}, now_s=1.0) == number + 1

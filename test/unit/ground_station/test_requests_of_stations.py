@@ -78,8 +78,12 @@ def test_who_is_not_there_does_not_answer(question):
     assert DeskRig().ask(question) == []
 
 
-def test_an_order_is_in_progress_until_the_drone_has_it():
-    rig = DeskRig()
+@pytest.fixture
+def rig():
+    return DeskRig()
+
+
+def test_an_order_is_in_progress_until_the_drone_has_it(rig):
     assert rig.ask(reposition(NORTH_DEG, 5.0, 15.0)) == [(3, "COMMAND_ACK", (GO_TO, IN_PROGRESS))]
     assert goal_of(rig) == Location(100, 0, 12)
     rig.ordered[-1][2]("")
@@ -105,8 +109,7 @@ def test_an_order_ends_as_the_mesh_says(end, result):
     assert rig.event(end) == [(3, "COMMAND_ACK", (GO_TO, result))]
 
 
-def test_an_order_that_the_gateway_refuses_is_denied_with_its_words():
-    rig = DeskRig()
+def test_an_order_that_the_gateway_refuses_is_denied_with_its_words(rig):
     rig.ask(reposition(NORTH_DEG, 5.0, 15.0))
     rig.ordered[-1][2]("drone 5 is there")
     assert rig.answers() == [
@@ -115,15 +118,13 @@ def test_an_order_that_the_gateway_refuses_is_denied_with_its_words():
     ]
 
 
-def test_an_order_is_followed_though_the_clock_of_its_gateway_is_a_little_behind():
-    rig = DeskRig()
+def test_an_order_is_followed_though_the_clock_of_its_gateway_is_a_little_behind(rig):
     rig.ask(reposition(NORTH_DEG, 5.0, 15.0))
     rig.event("order sent", at_s=100.95)
     assert rig.event("order accepted") == [(3, "COMMAND_ACK", (GO_TO, ACCEPTED))]
 
 
-def test_the_same_command_again_is_the_same_order_and_another_one_replaces_it():
-    rig = DeskRig()
+def test_the_same_command_again_is_the_same_order_and_another_one_replaces_it(rig):
     rig.ask(reposition(NORTH_DEG, 5.0, 15.0))
     assert rig.ask(reposition(NORTH_DEG, 5.0, 15.0))[0][2] == (GO_TO, IN_PROGRESS)
     assert len(rig.ordered) == 1
@@ -150,8 +151,7 @@ def test_the_same_command_again_is_the_same_order_and_another_one_replaces_it():
         (target(*IN_UNITS), (100, 0, 8)),
     ],
 )
-def test_each_way_to_order_leads_to_its_place(message, goal):
-    rig = DeskRig()
+def test_each_way_to_order_leads_to_its_place(rig, message, goal):
     rig.ask(message)
     assert tuple(goal_of(rig)) == pytest.approx(tuple(goal), abs=1)
 
@@ -167,8 +167,7 @@ def test_each_way_to_order_leads_to_its_place(message, goal):
         (target(0, 0, mask=0b000111000111), "only places can be targets"),
     ],
 )
-def test_what_cannot_be_ordered_is_refused_in_words(message, words):
-    rig = DeskRig()
+def test_what_cannot_be_ordered_is_refused_in_words(rig, message, words):
     texts = "".join(brief for _n, kind, brief in rig.ask(message) if kind == "STATUSTEXT")
     assert words in texts
     assert rig.ordered == []
@@ -190,8 +189,7 @@ def test_a_stream_of_targets_is_one_order_and_its_refusal_is_said_once():
     assert sum(len(looker.ask(target(*IN_UNITS))) for _ in range(10)) == 2  # one text in two parts
 
 
-def test_of_a_stream_one_order_a_second_is_taken_though_a_simulation_shows_the_mesh_more_often():
-    rig = DeskRig()
+def test_of_a_stream_one_order_a_second_is_taken_though_a_simulation_shows_the_mesh_more_often(rig):
     for step in range(10):
         now_s = 101.0 + 0.2 * step
         rig.fleet.show([drone(0, now_s), drone(3, now_s, flying=True)], now_s)
@@ -199,8 +197,7 @@ def test_of_a_stream_one_order_a_second_is_taken_though_a_simulation_shows_the_m
     assert len(rig.ordered) == 2
 
 
-def test_the_mode_is_what_the_drone_does_not_what_was_asked():
-    rig = DeskRig()
+def test_the_mode_is_what_the_drone_does_not_what_was_asked(rig):
     rig.ask(long(mavlink.MAV_CMD_NAV_LAND))
     assert rig.fleet.heartbeat(rig.fleet.alive(3)).custom_mode == HOLD
     rig.event("order sent")
@@ -211,8 +208,7 @@ def test_the_mode_is_what_the_drone_does_not_what_was_asked():
     assert rig.fleet.heartbeat(rig.fleet.alive(3)).custom_mode == HOLD
 
 
-def test_a_landing_that_is_asked_for_again_is_the_same_though_the_drone_flies_on():
-    rig = DeskRig()
+def test_a_landing_that_is_asked_for_again_is_the_same_though_the_drone_flies_on(rig):
     rig.ask(mavlink.MAVLink_set_mode_message(4, 129, LAND))
     further = HERE._replace(latitude=14.0)
     rig.fleet.show([drone(3, 102.0, flying=True, place=further)], 102.0)
@@ -220,8 +216,7 @@ def test_a_landing_that_is_asked_for_again_is_the_same_though_the_drone_flies_on
     assert len(rig.ordered) == 1
 
 
-def test_orders_are_limited():
-    rig = DeskRig()
+def test_orders_are_limited(rig):
     for step in range(9):
         rig.ask(reposition(52.0 + step * 1e-5, 5.0, 15.0))
     assert len(rig.ordered) == 5

@@ -75,9 +75,13 @@ def nearest_m(network):
     return min(math.dist(network.location(one), network.location(two)) for one, two in pairs)
 
 
+@pytest.fixture
+def network():
+    return line()
+
+
 @pytest.mark.parametrize(("creator", "hops", "parent"), [(1, 1, 0), (0, 0, NO_ROUTE)])
-def test_a_place_that_is_out_of_reach_leads_no_drone_there(creator, hops, parent):
-    network = line()
+def test_a_place_that_is_out_of_reach_leads_no_drone_there(network, creator, hops, parent):
     number = network.nodes[2].component.control.routes.number + 1
     motion = Motion(FAR, STILL)
     say(network, 2, creator, Beacon(0, number % 256, hops, parent, NO_ANCESTORS, 1.6, motion))
@@ -165,8 +169,7 @@ def test_a_failed_medium_is_recognised_after_a_neighbour_died_while_the_antenna_
     assert all(network.nodes[node].component.get_repair_status().silent for node in range(2, 6))
 
 
-def test_what_a_stranger_says_of_the_gateways_internet_disconnects_nobody():
-    network = line()
+def test_what_a_stranger_says_of_the_gateways_internet_disconnects_nobody(network):
     routes = network.nodes[1].component.control.routes
     ahead = Beacon(0, (routes.number + 100) % 256, 1, 0, NO_ANCESTORS, 1.6, offline=True)
     say(network, 1, 77, ahead)
@@ -176,8 +179,7 @@ def test_what_a_stranger_says_of_the_gateways_internet_disconnects_nobody():
         assert network.connected(2)
 
 
-def test_a_search_is_not_repeated_further_than_any_node_would_ask_for():
-    network = line()
+def test_a_search_is_not_repeated_further_than_any_node_would_ask_for(network):
     sent = []
     network.nodes[1].antenna.broadcast_message = sent.append
     body = Search(77, 1, 255).to_body()
@@ -207,16 +209,14 @@ def test_with_a_key_an_order_that_a_dead_neighbour_did_not_take_goes_another_way
         network.run_for(15.0)
 
 
-def test_a_gateway_knows_when_it_heard_a_node_over_a_relay():
-    network = line()
+def test_a_gateway_knows_when_it_heard_a_node_over_a_relay(network):
     network.send(2, 0, b"hello")
     network.run_for(2.0)
     (known,) = [node for node in network.nodes[0].component.get_known_nodes() if node.node_id == 2]
     assert network.now_s() - known.heard_s < 3.0
 
 
-def test_a_gateway_whose_receiver_errs_a_little_is_not_told_anew_with_each_beacon():
-    network = line()
+def test_a_gateway_whose_receiver_errs_a_little_is_not_told_anew_with_each_beacon(network):
     relay, sent = network.nodes[1], []
     relay.antenna.broadcast_message = sent.append
     for step in range(40):
@@ -247,8 +247,7 @@ def test_the_origins_digest_and_the_gateways_place_take_turns(monkeypatch):
     assert not any(beacon.digest and beacon.gateway_place for beacon in beacons)
 
 
-def test_a_node_without_beacons_that_leaves_has_not_fallen_silent():
-    network = line()
+def test_a_node_without_beacons_that_leaves_has_not_fallen_silent(network):
     network.inject(2, messages.packet(MessageType.PROBE, 200, 200, 2, 2))
     network.run_for(1.0)
     network.power(1, False)
@@ -274,8 +273,7 @@ def test_a_drone_that_is_flown_while_the_internet_is_off_learns_whom_to_step_bac
     assert places.connected_at.distance_m(network.location(9)) < 0.5
 
 
-def test_a_list_of_nodes_that_nobody_hears_is_soon_forgotten():
-    network = line()
+def test_a_list_of_nodes_that_nobody_hears_is_soon_forgotten(network):
     say(network, 0, 77, Beacon(0, 1, 1, 0, NO_ANCESTORS, 1.6, below=Below(100, (101, 102, 103))))
     network.run_for(2.0)
     network.send(2, 0, b"hello")
@@ -284,8 +282,7 @@ def test_a_list_of_nodes_that_nobody_hears_is_soon_forgotten():
     assert known == {1, 2}
 
 
-def test_a_packet_that_is_held_is_tried_again_in_time():
-    network = line()
+def test_a_packet_that_is_held_is_tried_again_in_time(network):
     router = network.nodes[2].component
     network.air.carries = lambda _payload: False
     assert router.control.delivery.send_own(messages.packet(MessageType.FOUND + 1, 2, 2, 99, 99))

@@ -26,7 +26,9 @@ def never(_function):
     raise AssertionError("the gateway got no request")
 
 
-@pytest.mark.parametrize("operation", [("GET", "/ready"), ("GET", "/nodes"), ("POST", ORDER)])
+@pytest.mark.parametrize(
+    "operation", [("GET", "/ready"), ("GET", "/nodes"), ("GET", "/orders"), ("POST", ORDER)]
+)
 @pytest.mark.parametrize(
     "authorization",
     [None, "", "Bearer", "Bearer wrong", "Basic 0123456789abcdef0123", b"Bearer \xff"],

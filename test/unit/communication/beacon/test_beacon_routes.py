@@ -252,16 +252,11 @@ def test_a_neighbour_that_lists_nobody_leads_to_nobody_unless_its_beacon_had_no_
 
 
 def test_a_packet_down_follows_the_child_that_announced_the_node_last(routes):
+    """Also if the node has come back to an earlier one."""
     routes.heard(1, beacon(hops=3, parent=9, below=Below(20, (20,))))
     routes.clock.now_s = 0.5
     routes.heard(2, beacon(hops=3, parent=9, below=Below(20, (20,))))
     assert ways(routes, 20) == [2, 1]
-
-
-def test_a_node_that_came_back_to_an_earlier_relay_is_looked_for_there(routes):
-    routes.heard(1, beacon(hops=3, parent=9, below=Below(20, (20,))))
-    routes.clock.now_s = 0.5
-    routes.heard(2, beacon(hops=3, parent=9, below=Below(20, (20,))))
     routes.clock.now_s = 1.0
     routes.heard(1, beacon(hops=3, parent=9, below=Below(20, (), (20,))))
     assert ways(routes, 20) == [1, 2]
@@ -283,11 +278,6 @@ def test_a_packet_for_an_unknown_node_goes_up_only_if_it_came_from_below(routes)
     assert ways(routes, 50) == [1]
     assert ways(routes, 50, came_from=2) == [1]
     assert ways(routes, 50, came_from=1) == []
-
-
-def test_a_neighbour_whose_ancestor_a_node_is_leads_to_it(routes):
-    routes.heard(1, beacon(hops=4, parent=7, others=(50, 3)))
-    assert ways(routes, 50) == [1]
 
 
 def test_of_neighbours_that_stand_on_a_node_the_one_next_to_it_is_first(routes):

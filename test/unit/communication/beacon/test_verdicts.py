@@ -146,34 +146,34 @@ class Sender:
         return self.verdicts.verdict_on(Transit(packet, came_from, self.deadlines.now_s))
 
 
+@pytest.fixture
+def sender():
+    return Sender()
+
+
 @pytest.mark.parametrize("came_from", [NO_ROUTE, 7], ids=["made here", "of another node"])
-def test_an_order_without_an_answer_goes_another_way_the_next_time(came_from):
-    sender = Sender()
+def test_an_order_without_an_answer_goes_another_way_the_next_time(sender, came_from):
     tries = [sender.next_hop(after_s=2.0, came_from=came_from) for _ in range(4)]
     assert tries == [LIAR, RELAY, LIAR, RELAY]
 
 
-def test_a_drone_that_was_heard_since_its_last_order_is_ordered_the_same_way():
-    sender = Sender()
+def test_a_drone_that_was_heard_since_its_last_order_is_ordered_the_same_way(sender):
     assert sender.next_hop() == LIAR
     sender.routes.clock.now_s += 1.0
     sender.routes.led_to(DRONE, RELAY)
     assert sender.next_hop(after_s=5.0) == LIAR
 
 
-def test_nobody_is_suspected_for_longer_than_the_order_is_repeated():
-    sender = Sender()
+def test_nobody_is_suspected_for_longer_than_the_order_is_repeated(sender):
     assert sender.next_hop() == LIAR
     assert sender.next_hop(after_s=SUSPECTED_S + 1.0) == LIAR
 
 
-def test_packets_that_are_no_orders_go_the_best_way():
-    sender = Sender()
+def test_packets_that_are_no_orders_go_the_best_way(sender):
     assert [sender.next_hop(2.0, MessageType.REQUESTLOCATION) for _ in range(2)] == [LIAR, LIAR]
 
 
-def test_a_poll_without_an_answer_goes_another_way_too_but_not_one_that_wants_none():
-    sender = Sender()
+def test_a_poll_without_an_answer_goes_another_way_too_but_not_one_that_wants_none(sender):
     assert [sender.next_hop(2.0, 193, body=POLL) for _ in range(2)] == [LIAR, RELAY]
     sender = Sender()
     assert [sender.next_hop(2.0, 193, body=LAST_OF_TRAIN) for _ in range(2)] == [LIAR, LIAR]
@@ -185,8 +185,7 @@ def unanswered(sender, drones):
         assert sender.next_hop(after_s=2.0, to=drone) == RELAY
 
 
-def test_a_neighbour_through_which_three_nodes_gave_no_answer_takes_no_packet_of_any_kind():
-    sender = Sender()
+def test_a_neighbour_through_which_three_nodes_gave_no_answer_takes_no_packet_of_any_kind(sender):
     unanswered(sender, DRONES[:2])
     assert sender.next_hop(kind=MessageType.REQUESTLOCATION, to=12) == LIAR
     unanswered(sender, DRONES[2:3])
@@ -194,16 +193,14 @@ def test_a_neighbour_through_which_three_nodes_gave_no_answer_takes_no_packet_of
     assert sender.next_hop(kind=MessageType.REQUESTLOCATION, to=LIAR) == LIAR
 
 
-def test_until_a_packet_of_another_node_comes_through_it():
-    sender = Sender()
+def test_until_a_packet_of_another_node_comes_through_it(sender):
     unanswered(sender, DRONES[:3])
     sender.routes.led_to(12, LIAR)
     sender.deadlines.now_s += 5.0  # that it came from there is no hint any more
     assert sender.next_hop(kind=MessageType.REQUESTLOCATION, to=12) == LIAR
 
 
-def test_it_is_used_where_there_is_no_other_way():
-    sender = Sender()
+def test_it_is_used_where_there_is_no_other_way(sender):
     unanswered(sender, DRONES[:3])
     del sender.routes.neighbours[RELAY]
     ways = list(sender.routes.next_hops(12, NO_ROUTE))

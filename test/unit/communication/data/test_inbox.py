@@ -67,16 +67,19 @@ class Receiver:
         self.now_s = until_s
 
 
-def test_an_ack_leaves_after_a_pause_or_after_two_tenths_of_a_second_without_one():
-    receiver = Receiver()
+@pytest.fixture
+def receiver():
+    return Receiver()
+
+
+def test_an_ack_leaves_after_a_pause_or_after_two_tenths_of_a_second_without_one(receiver):
     for number in range(30):
         receiver.first(number, 0.01 * number)
     receiver.run(1.0)
     assert receiver.acks == [0.2, pytest.approx(0.31)]  # the last message arrived at 0.29
 
 
-def test_an_ack_is_repeated_unasked_three_times_a_second_at_most():
-    receiver = Receiver()
+def test_an_ack_is_repeated_unasked_three_times_a_second_at_most(receiver):
     receiver.first(0, 0.0)
     receiver.run(1.0)
     for n in range(100):
@@ -86,23 +89,22 @@ def test_an_ack_is_repeated_unasked_three_times_a_second_at_most():
 
 
 @pytest.mark.parametrize(("after_s", "delivered"), [(29.0, []), (31.0, [1])])
-def test_a_late_packet_of_the_session_before_does_not_bring_that_back_for_30_s(after_s, delivered):
-    receiver = Receiver()
+def test_a_late_packet_of_the_session_before_does_not_bring_that_back_for_30_s(
+    receiver, after_s, delivered
+):
     receiver.first(0, 0.0, OLD)
     receiver.first(0, 10.0, NEW)
     assert receiver.first(1, 10.0 + after_s, OLD) == delivered
 
 
 @pytest.mark.parametrize(("after_s", "delivered"), [(59.0, [3]), (61.0, [])])
-def test_an_incomplete_message_is_kept_for_a_minute(after_s, delivered):
-    receiver = Receiver()
+def test_an_incomplete_message_is_kept_for_a_minute(receiver, after_s, delivered):
     assert receiver.first(3, 0.0, size=20) == []
     receiver.inbox.on_time(after_s)
     assert receiver.second(3, after_s) == delivered
 
 
-def test_a_number_that_comes_again_belongs_to_a_new_message():
-    receiver = Receiver()
+def test_a_number_that_comes_again_belongs_to_a_new_message(receiver):
     assert receiver.first(7, 0.0) == [7]
     assert receiver.first(7, 20.0, order=263) == [7]  # the 256 before were lost
     assert receiver.first(7, 20.1, order=263) == []
@@ -112,23 +114,22 @@ def test_a_number_that_comes_again_belongs_to_a_new_message():
     ("heard", "after_s", "complete"),
     [([], 10.0, True), ([], 301.0, False), ([100], 10.0, False), ([40], 10.0, True)],
 )
-def test_a_message_is_complete_for_as_long_as_its_sender_can_ask_for_it(heard, after_s, complete):
-    receiver = Receiver()
+def test_a_message_is_complete_for_as_long_as_its_sender_can_ask_for_it(
+    receiver, heard, after_s, complete
+):
     receiver.first(7, 0.0)
     for number in heard:
         receiver.first(number, 1.0, size=20)  # its second half is lost
     assert receiver.poll(7, after_s) == (complete, complete)
 
 
-def test_what_was_acknowledged_and_waits_is_delivered_when_its_sender_restarts():
-    receiver = Receiver()
+def test_what_was_acknowledged_and_waits_is_delivered_when_its_sender_restarts(receiver):
     receiver.first(0, 0.0)
     assert receiver.first(2, 0.1, behind=1) == []
     assert receiver.first(0, 1.0, session=NEW) == [2, 0]
 
 
-def test_a_port_on_which_messages_wait_is_not_forgotten_for_others():
-    receiver = Receiver()
+def test_a_port_on_which_messages_wait_is_not_forgotten_for_others(receiver):
     receiver.first(0, 0.0)
     assert receiver.first(2, 0.1, behind=1) == []
     for port in range(6, 6 + 2 * MOST_PORTS):
@@ -149,8 +150,9 @@ def test_a_flooded_fragment_counts_as_known_for_five_seconds(after_s, is_new):
     assert len(repeated) == 1 + is_new
 
 
-def test_after_a_silence_a_number_is_complete_only_if_it_is_still_that_of_the_same_message():
-    receiver = Receiver()
+def test_after_a_silence_a_number_is_complete_only_if_it_is_still_that_of_the_same_message(
+    receiver,
+):
     receiver.first(7, 0.0, size=20)
     assert receiver.second(7, 0.1) == [7]
     receiver.first(8, 0.2)

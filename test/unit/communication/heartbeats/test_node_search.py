@@ -50,14 +50,17 @@ def test_a_drone_that_a_relay_lost_is_searched_for_and_gets_its_order_when_it_an
     assert "NO_ROUTE" not in rig.kinds()
 
 
-def test_another_report_of_the_loss_does_not_end_the_search():
-    rig = gateway_rig()
+@pytest.fixture
+def rig():
+    return gateway_rig()
+
+
+def test_another_report_of_the_loss_does_not_end_the_search(rig):
     rig.hear(LOST_BEHIND_2, LOST_BEHIND_2)
     assert "NO_ROUTE" not in rig.kinds()
 
 
-def test_an_order_that_never_left_is_lost_if_three_searches_of_a_second_each_find_nothing():
-    rig = gateway_rig()
+def test_an_order_that_never_left_is_lost_if_three_searches_of_a_second_each_find_nothing(rig):
     rig.routing.cant_communicate_with_node(2)
     assert order(rig)
     rig.wait(2.9)
@@ -77,8 +80,7 @@ TAKEN_OFF = "02 02 05 01 fe 05"  # 2 tells all its neighbours that it has lost 5
         (LOST_BEHIND_2, "2 has dropped it: the drone may have taken it, and its ACKs were lost"),
     ],
 )
-def test_an_order_that_left_is_not_without_a_route(told, why):
-    rig = gateway_rig()
+def test_an_order_that_left_is_not_without_a_route(rig, told, why):
     rig.hear(told)
     rig.wait(20.0)
     assert len(searches(rig)) == 3
@@ -89,8 +91,7 @@ def test_an_order_that_left_is_not_without_a_route(told, why):
     assert rig.kinds()[-1] == "ORDER_LOST_CONTACT"
 
 
-def test_a_copy_that_a_relay_dropped_says_nothing_of_the_first_one():
-    rig = gateway_rig()
+def test_a_copy_that_a_relay_dropped_says_nothing_of_the_first_one(rig):
     rig.hear(TAKEN_OFF, FROM_5_THROUGH_2, LOST_BEHIND_2)
     rig.wait(10.0)
     assert "NO_ROUTE" not in rig.kinds()
@@ -99,8 +100,7 @@ def test_a_copy_that_a_relay_dropped_says_nothing_of_the_first_one():
 
 
 @pytest.mark.parametrize("later_s", [3.2, 39.0])  # the third search ends after 3 s
-def test_an_order_that_waits_for_a_route_is_repeated_as_soon_as_its_drone_is_heard(later_s):
-    rig = gateway_rig()
+def test_an_order_that_waits_for_a_route_is_repeated_as_soon_as_its_drone_is_heard(rig, later_s):
     rig.hear(TAKEN_OFF)
     rig.wait(later_s)
     assert rig.sent(ORDER) == []
@@ -112,8 +112,7 @@ def test_an_order_that_waits_for_a_route_is_repeated_as_soon_as_its_drone_is_hea
     assert rig.kinds()[-1] == "ORDER_ARRIVED"
 
 
-def test_an_order_that_was_accepted_while_it_waited_for_a_route_is_not_sent_again():
-    rig = gateway_rig()
+def test_an_order_that_was_accepted_while_it_waited_for_a_route_is_not_sent_again(rig):
     rig.hear(TAKEN_OFF)
     rig.wait(39.0)
     rig.hear("05 03 40 01 01 21 00 01")
@@ -122,16 +121,14 @@ def test_an_order_that_was_accepted_while_it_waited_for_a_route_is_not_sent_agai
     assert rig.sent(ORDER) == []
 
 
-def test_reports_of_a_loss_do_not_put_off_the_repeats_of_an_order():
-    rig = gateway_rig()
+def test_reports_of_a_loss_do_not_put_off_the_repeats_of_an_order(rig):
     for _second in range(44):
         rig.hear(TAKEN_OFF)
         rig.wait(1.0)
     assert "ORDER_LOST_CONTACT" in rig.kinds()
 
 
-def test_searches_do_not_count_as_orders_without_a_reply():
-    rig = gateway_rig()
+def test_searches_do_not_count_as_orders_without_a_reply(rig):
     rig.hear(LOST_BEHIND_2)
     rig.wait(2.5)
     rig.hear(FROM_5_THROUGH_2)
@@ -143,8 +140,7 @@ def test_searches_do_not_count_as_orders_without_a_reply():
     assert "ORDER_LOST_CONTACT" in rig.kinds()
 
 
-def test_a_drone_whose_path_breaks_again_is_searched_for_three_times():
-    rig = gateway_rig()
+def test_a_drone_whose_path_breaks_again_is_searched_for_three_times(rig):
     rig.hear(LOST_BEHIND_2)
     for _again in range(2):
         rig.wait(0.5)
@@ -156,8 +152,7 @@ def test_a_drone_whose_path_breaks_again_is_searched_for_three_times():
     assert len(searches(rig)) == 3
 
 
-def test_a_drone_without_a_route_that_was_there_lately_is_searched_for_before_the_order_leaves():
-    rig = gateway_rig()
+def test_a_drone_without_a_route_that_was_there_lately_is_searched_for_before_the_order_leaves(rig):
     rig.hear(LOST_BEHIND_2)
     rig.wait(3.0)
     assert order(rig)
@@ -165,8 +160,7 @@ def test_a_drone_without_a_route_that_was_there_lately_is_searched_for_before_th
     assert not order(rig, drone=9)  # never heard
 
 
-def test_it_is_searched_for_within_an_hour_after_it_was_heard_but_not_for_ever():
-    rig = gateway_rig()
+def test_it_is_searched_for_within_an_hour_after_it_was_heard_but_not_for_ever(rig):
     rig.hear(LOST_BEHIND_2)
     rig.wait(3500.0)
     assert order(rig)
@@ -174,8 +168,7 @@ def test_it_is_searched_for_within_an_hour_after_it_was_heard_but_not_for_ever()
     assert not order(rig)
 
 
-def test_searches_do_not_follow_each_other_at_once_and_the_second_drone_waits_for_its_own():
-    rig = gateway_rig()
+def test_searches_do_not_follow_each_other_at_once_and_the_second_drone_waits_for_its_own(rig):
     rig.hear("06 02 04 01 01 01 01 01", LOST_BEHIND_2, "02 02 05 01 01 06")
     assert order(rig, drone=6)
     assert [p[5] for p in searches(rig)] == [5]
@@ -197,8 +190,7 @@ def test_a_search_that_comes_again_after_ten_seconds_is_another_one():
         assert len(searches(rig)) == passed_on
 
 
-def test_a_gateway_searches_three_times_a_second_at_most():
-    rig = gateway_rig()
+def test_a_gateway_searches_three_times_a_second_at_most(rig):
     search = rig.mesh.control.search
     assert search(5)
     rig.wait(0.25)
@@ -223,7 +215,6 @@ def test_the_node_that_is_searched_for_answers_even_if_a_heartbeat_is_under_way(
     assert rig.broadcasts() == []
 
 
-def test_a_gateway_does_not_pass_on_its_own_search():
-    rig = gateway_rig()
+def test_a_gateway_does_not_pass_on_its_own_search(rig):
     rig.hear("01 02 44 01 fe 05 20 00")
     assert rig.broadcasts() == []

@@ -46,8 +46,7 @@ def test_a_router_starts_unconnected_with_255_for_what_it_does_not_know():
 
 
 @pytest.mark.parametrize(("hops", "shown"), [(0, 1), (3, 4), (253, 254), (254, 255), (255, 255)])
-def test_a_heartbeat_of_a_gateway_connects_with_one_hop_more_than_it_made(hops, shown):
-    rig = Rig()
+def test_a_heartbeat_of_a_gateway_connects_with_one_hop_more_than_it_made(rig, hops, shown):
     rig.hear(f"09 02 04 01 01 01 09 {hops:02x}")
     assert rig.mesh.get_connected_to_gateway()
     assert rig.mesh.get_preferred_gateway() == 9
@@ -77,17 +76,15 @@ def test_on_a_busy_channel_a_connected_router_waits_longer_for_an_answer(patienc
     assert not rig.mesh.get_connected_to_gateway()
 
 
-def test_becoming_connected_introduces_the_node_at_once():
-    rig = Rig()
+def test_becoming_connected_introduces_the_node_at_once(rig):
     rig.hear(ANSWER)
     assert rig.broadcasts() == [packet(INTRODUCTION_1_HOP), OWN_PLACE]
     assert "CONNECTED" in rig.kinds()
 
 
 @pytest.mark.parametrize(("moved_m", "tells"), [(0.0, False), (0.05, False), (0.2, True)])
-def test_a_router_that_connects_again_tells_its_place_only_if_it_is_another(moved_m, tells):
+def test_a_router_that_connects_again_tells_its_place_only_if_it_is_another(rig, moved_m, tells):
     """The spots of other drones allow for 0.09 m; farther off they might be too near."""
-    rig = Rig()
     rig.hear(ANSWER)
     rig.mesh.control.send_heartbeat(0)
     rig.wait(0.7)
@@ -97,9 +94,8 @@ def test_a_router_that_connects_again_tells_its_place_only_if_it_is_another(move
     assert (len([sent for sent in rig.broadcasts() if sent[2] == LOCATION]) == 1) is tells
 
 
-def test_a_router_that_connects_tells_all_in_range_where_it_stands():
+def test_a_router_that_connects_tells_all_in_range_where_it_stands(rig):
     """They may have to land beside it, if it dies before anybody asks it."""
-    rig = Rig()
     rig.engine.place = Location(1.0, 2.0, 3)
     rig.hear(ANSWER)
     assert rig.broadcasts()[1] == packet("01 01 01 fe fe 00 00 80 3f 00 00 00 40 03 00")
@@ -119,8 +115,9 @@ def test_staying_connected_is_no_reason_to_introduce_the_node():
     ],
     ids=["next door", "behind 2"],
 )
-def test_becoming_connected_asks_the_gateway_and_the_next_hop_for_their_locations(answer, asked):
-    rig = Rig()
+def test_becoming_connected_asks_the_gateway_and_the_next_hop_for_their_locations(
+    rig, answer, asked
+):
     rig.hear(answer)
     assert rig.sent() == [packet(request + FROM_0) for request in asked]
 
@@ -135,15 +132,13 @@ def test_becoming_connected_asks_the_gateway_and_the_next_hop_for_their_location
         (0, ["01 01 04 00 00 01"]),
     ],
 )
-def test_a_connected_router_checks_with_a_heartbeat_to_its_gateway(hop, sent):
-    rig = Rig()
+def test_a_connected_router_checks_with_a_heartbeat_to_its_gateway(rig, hop, sent):
     rig.connect_through(hop)
     rig.wait_until(5.0)
     assert rig.sent(HEARTBEAT) == list(map(packet, sent))
 
 
-def test_the_location_of_the_gateway_is_asked_for_until_it_is_known():
-    rig = Rig()
+def test_the_location_of_the_gateway_is_asked_for_until_it_is_known(rig):
     rig.connect_through(2)
     rig.wait_until(5.0)
     assert packet("01 01 02 02 00" + FROM_0) in rig.sent(REQUEST)
@@ -153,8 +148,7 @@ def test_the_location_of_the_gateway_is_asked_for_until_it_is_known():
 
 
 @pytest.mark.parametrize("neighbour", [0, 2], ids=["gateway", "router"])
-def test_the_location_of_the_next_hop_is_asked_for_in_each_round(neighbour):
-    rig = Rig()
+def test_the_location_of_the_next_hop_is_asked_for_in_each_round(rig, neighbour):
     rig.connect_through(neighbour, hops=0)
     for check_s in (5.0, 15.0, 25.0):
         rig.wait_until(check_s)
@@ -200,9 +194,8 @@ def test_a_heartbeat_that_is_not_answered_ends_the_connection_until_a_late_answe
     assert rig.kinds()[-1] == "CONNECTED"
 
 
-def test_an_answer_after_the_connection_was_lost_is_a_new_connection():
+def test_an_answer_after_the_connection_was_lost_is_a_new_connection(rig):
     """Introduced, and the places asked for: the first question may have been lost with it."""
-    rig = Rig()
     rig.connect_through(2)
     rig.mesh.control.send_heartbeat(0)
     rig.wait(0.7)
@@ -222,8 +215,7 @@ def test_a_heartbeat_without_an_acknowledgement_ends_the_connection_at_once():
     assert not rig.mesh.get_connected_to_gateway()
 
 
-def test_waiting_for_the_first_answer_is_not_being_connected():
-    rig = Rig()
+def test_waiting_for_the_first_answer_is_not_being_connected(rig):
     rig.hear("02 02 04 01 01 01 00 00")
     assert rig.sent(HEARTBEAT) == [packet("01 01 04 02 00 00 00 00")]
     assert not rig.mesh.get_connected_to_gateway()
@@ -233,8 +225,7 @@ def test_waiting_for_the_first_answer_is_not_being_connected():
     assert rig.sent() == []
 
 
-def test_while_the_first_answer_is_waited_for_no_other_offer_is_taken():
-    rig = Rig()
+def test_while_the_first_answer_is_waited_for_no_other_offer_is_taken(rig):
     rig.hear("02 02 04 01 01 01 00 00")
     rig.forget()
     rig.hear("03 03 03 01 fe 02 01", "03 03 04 01 01 01 09 00")
@@ -245,8 +236,7 @@ def test_while_the_first_answer_is_waited_for_no_other_offer_is_taken():
     assert rig.mesh.get_preferred_gateway() == 9
 
 
-def test_a_check_while_the_first_answer_is_waited_for_does_not_drop_the_route():
-    rig = Rig()
+def test_a_check_while_the_first_answer_is_waited_for_does_not_drop_the_route(rig):
     rig.wait_until(4.8)
     rig.hear("02 02 04 01 01 01 00 00")
     rig.wait_until(5.1)
@@ -288,8 +278,7 @@ def test_a_router_answers_one_that_lacks_what_it_has_and_asks_one_that_has_what_
     assert rig.mesh.get_connected_to_gateway() is connected
 
 
-def test_taking_a_gateway_drops_every_other_entry_for_it():
-    rig = Rig()
+def test_taking_a_gateway_drops_every_other_entry_for_it(rig):
     rig.know_neighbour(9)
     rig.hear("09 03 00 01 01")
     rig.routing.other_can_communicate_with_node(3, 9)
@@ -396,23 +385,20 @@ def test_a_shortcut_from_before_the_loss_does_not_count():
 
 
 @pytest.mark.parametrize(("hops", "preferred"), [("01", 9), ("02", 0), ("fe", 0)])
-def test_a_connected_router_changes_its_gateway_only_for_fewer_hops(hops, preferred):
-    rig = Rig()
+def test_a_connected_router_changes_its_gateway_only_for_fewer_hops(rig, hops, preferred):
     rig.connect_through(2, hops=2)
     rig.hear(f"09 03 04 01 01 01 09 {hops}")
     assert rig.mesh.get_preferred_gateway() == preferred
     assert rig.mesh.get_hops_from_gateway_away() == (int(hops, 16) + 1 if preferred else 3)
 
 
-def test_the_own_gateway_is_believed_whatever_it_says():
-    rig = Rig()
+def test_the_own_gateway_is_believed_whatever_it_says(rig):
     rig.connect_through(2, hops=2)
     rig.hear("00 03 04 01 01 01 00 07")
     assert rig.mesh.get_hops_from_gateway_away() == 8
 
 
-def test_within_a_period_of_the_last_answer_a_lost_gateway_is_not_given_up_for_a_far_one():
-    rig = Rig()
+def test_within_a_period_of_the_last_answer_a_lost_gateway_is_not_given_up_for_a_far_one(rig):
     rig.connect_through(2, hops=2)
     rig.mesh.control.send_heartbeat(0)
     rig.wait(1.0)
@@ -425,8 +411,7 @@ def test_within_a_period_of_the_last_answer_a_lost_gateway_is_not_given_up_for_a
     assert rig.mesh.get_connected_to_gateway()
 
 
-def test_another_gateway_has_another_location():
-    rig = Rig()
+def test_another_gateway_has_another_location(rig):
     rig.connect_through(2, hops=2)
     rig.hear("00 02 01 01 01 00 00 80 3f", "09 03 04 01 01 01 09 01")
     rig.forget()
@@ -451,8 +436,7 @@ def test_switching_off_disconnects_at_once(waits):
     assert (rig.tried(), rig.broadcasts(), rig.engine.goals) == ([], [], [])
 
 
-def test_the_time_without_a_gateway_does_not_count_while_the_antenna_is_off():
-    rig = Rig()
+def test_the_time_without_a_gateway_does_not_count_while_the_antenna_is_off(rig):
     rig.connect_through(2)
     rig.mesh.control.send_heartbeat(0)  # never answered
     rig.hear("02 02 01 01 01 00 00 80 3f")
@@ -493,14 +477,12 @@ def test_a_router_that_loses_its_only_route_asks_all_neighbours_at_once_and_less
         assert rig.broadcasts() == search
 
 
-def test_a_router_that_never_had_a_gateway_searches_at_its_checks():
-    rig = Rig()
+def test_a_router_that_never_had_a_gateway_searches_at_its_checks(rig):
     rig.wait_until(14.9)
     assert rig.broadcasts() == [packet("01 01 03 fe fe ff")]
 
 
-def test_a_router_with_another_route_remains_connected():
-    rig = Rig()
+def test_a_router_with_another_route_remains_connected(rig):
     rig.connect_through(3)
     rig.mesh.control.routes.other_can_communicate_with_node(2, 0)
     rig.hear("02 02 05 01 01 00")

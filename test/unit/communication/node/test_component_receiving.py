@@ -47,8 +47,7 @@ def test_bad_input_teaches_nothing_changes_nothing_and_is_counted(payload, gatew
     assert sum(rig.mesh.complaints.counts.values()) == 1
 
 
-def test_a_flood_of_bad_input_is_one_line_in_the_log(caplog):
-    rig = Rig()
+def test_a_flood_of_bad_input_is_one_line_in_the_log(rig, caplog):
     with caplog.at_level(logging.WARNING):
         for tenth in range(100):
             rig.mesh.on_msg(BAD["creator 255"], tenth / 10)
@@ -60,8 +59,7 @@ def test_a_flood_of_bad_input_is_one_line_in_the_log(caplog):
 
 
 @pytest.mark.parametrize("kind", ["00", "08", "7f", "80", "ff"])
-def test_a_type_that_is_not_known_teaches_and_is_forwarded_but_not_processed(kind):
-    rig = Rig()
+def test_a_type_that_is_not_known_teaches_and_is_forwarded_but_not_processed(rig, kind):
     rig.hear(f"05 02 {kind} 01 01")
     assert rig.tried() == []
     assert rig.routing.get_direction_to_node(5) == 2
@@ -73,8 +71,7 @@ def test_a_type_that_is_not_known_teaches_and_is_forwarded_but_not_processed(kin
 # Learning ------------------------------------------------------------------------------------
 
 
-def test_the_sender_is_a_direct_neighbour():
-    rig = Rig()
+def test_the_sender_is_a_direct_neighbour(rig):
     rig.now_s = 2.5
     rig.hear("02 02 00 01 01")
     assert rig.routing.get_set_of_children() == {2}
@@ -90,23 +87,20 @@ def test_the_sender_is_a_direct_neighbour():
         (["05 05 00 01 01", "05 02 00 01 01"], 5, 2),  # came round: 5 remains a neighbour
     ],
 )
-def test_a_packet_teaches_a_route_to_its_creator(heard, next_hop, known):
-    rig = Rig()
+def test_a_packet_teaches_a_route_to_its_creator(rig, heard, next_hop, known):
     rig.hear(*heard)
     assert rig.routing.get_direction_to_node(5) == next_hop
     assert rig.routing.get_table_size() == known
 
 
-def test_an_own_packet_that_comes_back_does_not_teach_a_route_to_itself():
-    rig = Rig()
+def test_an_own_packet_that_comes_back_does_not_teach_a_route_to_itself(rig):
     rig.hear("01 02 04 01 01 00 ff 01", "01 02 00 01 01")
     assert rig.routing.get_direction_to_node(1) == NO_ROUTE
     assert rig.routing.get_set_of_children() == {2}
 
 
-def test_it_learns_first_and_then_answers():
+def test_it_learns_first_and_then_answers(rig):
     """The first question of a new neighbour, and of a node behind it, can be answered."""
-    rig = Rig()
     rig.engine.place = rig.engine.place._replace(latitude=1.0)
     rig.now_s = 3.9
     rig.hear("05 02 02 01 01")
@@ -127,8 +121,7 @@ def test_it_learns_first_and_then_answers():
         ("05 02 00 01 08", "05 01 00 03 08"),  # 8 is behind 3
     ],
 )
-def test_forwarding_changes_from_and_to_alone(heard, sent):
-    rig = Rig()
+def test_forwarding_changes_from_and_to_alone(rig, heard, sent):
     rig.hear("08 03 00 01 01")
     rig.know_neighbour(9)
     rig.hear(heard)
@@ -137,8 +130,7 @@ def test_forwarding_changes_from_and_to_alone(heard, sent):
     assert rig.engine.goals == []
 
 
-def test_a_heartbeat_with_254_hops_is_dropped():
-    rig = Rig()
+def test_a_heartbeat_with_254_hops_is_dropped(rig):
     rig.know_neighbour(9)
     rig.hear("05 02 04 01 09 01 00 fd")
     assert rig.sent() == [packet("05 01 04 09 09 01 00 fe")]
@@ -157,9 +149,8 @@ def test_a_heartbeat_with_254_hops_is_dropped():
     ],
 )
 def test_without_a_route_the_neighbours_are_informed_once_the_sender_first(
-    neighbours, behind, dead, from_, told
+    rig, neighbours, behind, dead, from_, told
 ):
-    rig = Rig()
     rig.know_neighbour(*neighbours)
     for child in behind:
         rig.routing.other_can_communicate_with_node(child, 9)
@@ -169,8 +160,7 @@ def test_without_a_route_the_neighbours_are_informed_once_the_sender_first(
     assert rig.routing.get_direction_to_node(9) in (NO_ROUTE, from_)
 
 
-def test_when_the_next_hop_does_not_take_it_one_other_route_is_tried():
-    rig = Rig()
+def test_when_the_next_hop_does_not_take_it_one_other_route_is_tried(rig):
     rig.hear("09 03 00 01 01")
     rig.routing.other_can_communicate_with_node(4, 9)
     rig.antenna.dead = {3}
@@ -179,8 +169,7 @@ def test_when_the_next_hop_does_not_take_it_one_other_route_is_tried():
     assert rig.routing.get_direction_to_node(9) == 4
 
 
-def test_after_two_routes_that_do_not_take_it_it_is_dropped():
-    rig = Rig()
+def test_after_two_routes_that_do_not_take_it_it_is_dropped(rig):
     for child in (3, 4, 6):
         rig.routing.other_can_communicate_with_node(child, 9)
     rig.antenna.gets_lost = lambda payload: payload[2] == 0x7F and payload[3] in (3, 4)
@@ -200,8 +189,7 @@ def stranded(rig):
 
 
 @pytest.mark.parametrize("circulates", [False, True])
-def test_an_order_without_a_route_or_that_circulates_ends_here_and_is_reported(circulates):
-    rig = Rig()
+def test_an_order_without_a_route_or_that_circulates_ends_here_and_is_reported(rig, circulates):
     rig.know_neighbour(3)
     if circulates:
         rig.know_neighbour(9)
@@ -211,8 +199,7 @@ def test_an_order_without_a_route_or_that_circulates_ends_here_and_is_reported(c
     assert stranded(rig)
 
 
-def test_an_order_that_two_next_hops_do_not_take_ends_here_and_is_reported():
-    rig = Rig()
+def test_an_order_that_two_next_hops_do_not_take_ends_here_and_is_reported(rig):
     for child in (4, 6, 7):
         rig.routing.other_can_communicate_with_node(child, 9)
     rig.antenna.gets_lost = lambda payload: payload[2] == 6
@@ -223,8 +210,7 @@ def test_an_order_that_two_next_hops_do_not_take_ends_here_and_is_reported():
 # Circulating packets ------------------------------------------------------------------------
 
 
-def test_a_packet_that_it_made_itself_is_not_forwarded_and_its_entry_forgotten():
-    rig = Rig()
+def test_a_packet_that_it_made_itself_is_not_forwarded_and_its_entry_forgotten(rig):
     rig.hear("09 03 00 01 01")
     rig.know_neighbour(2)
     rig.mesh.control.send_heartbeat(9)
@@ -236,8 +222,7 @@ def test_a_packet_that_it_made_itself_is_not_forwarded_and_its_entry_forgotten()
     assert rig.routing.get_set_of_children() == {2, 3}
 
 
-def test_another_radio_with_its_id_is_named_and_shown_that_the_id_is_in_use(caplog):
-    rig = Rig()
+def test_another_radio_with_its_id_is_named_and_shown_that_the_id_is_in_use(rig, caplog):
     rig.connect_to_gateway()
     rig.wait(11.0)
     caplog.clear()
@@ -259,8 +244,7 @@ NOT_SENT = "dropped a packet in this node's name that it did not send"
 
 
 @pytest.mark.parametrize("forged", ["01 02 80 01 09", "01 02 04 01 09 01 00 02", "01 02 06 01 09"])
-def test_a_packet_in_its_name_that_it_did_not_send_says_nothing_about_a_route(forged):
-    rig = Rig()
+def test_a_packet_in_its_name_that_it_did_not_send_says_nothing_about_a_route(rig, forged):
     rig.wait(61.0)
     rig.hear("09 03 00 01 01")
     rig.know_neighbour(2)
@@ -270,8 +254,7 @@ def test_a_packet_in_its_name_that_it_did_not_send_says_nothing_about_a_route(fo
     assert NOT_SENT in rig.mesh.complaints.counts
 
 
-def test_its_own_packet_that_comes_back_after_seconds_is_no_forgery_nor_news_of_a_route():
-    rig = Rig()
+def test_its_own_packet_that_comes_back_after_seconds_is_no_forgery_nor_news_of_a_route(rig):
     rig.wait(61.0)
     rig.hear("09 03 00 01 01")
     rig.know_neighbour(2)
@@ -282,8 +265,7 @@ def test_its_own_packet_that_comes_back_after_seconds_is_no_forgery_nor_news_of_
     assert NOT_SENT not in rig.mesh.complaints.counts
 
 
-def test_its_own_bid_that_a_neighbour_passes_on_through_it_is_no_forgery():
-    rig = Rig()
+def test_its_own_bid_that_a_neighbour_passes_on_through_it_is_no_forgery(rig):
     rig.wait(61.0)
     rig.hear("09 03 00 01 01")
     rig.know_neighbour(2)
@@ -292,8 +274,7 @@ def test_its_own_bid_that_a_neighbour_passes_on_through_it_is_no_forgery():
     assert NOT_SENT not in rig.mesh.complaints.counts
 
 
-def test_what_comes_back_to_a_restarted_node_is_no_forgery():
-    rig = Rig()
+def test_what_comes_back_to_a_restarted_node_is_no_forgery(rig):
     rig.hear("09 03 00 01 01")
     rig.know_neighbour(2)
     rig.hear("01 02 06 01 09")
@@ -301,8 +282,7 @@ def test_what_comes_back_to_a_restarted_node_is_no_forgery():
     assert NOT_SENT not in rig.mesh.complaints.counts
 
 
-def test_a_direct_neighbour_is_never_forgotten_for_a_packet_that_goes_round():
-    rig = Rig()
+def test_a_direct_neighbour_is_never_forgotten_for_a_packet_that_goes_round(rig):
     rig.know_neighbour(9)
     rig.hear("01 02 41 01 09")
     rig.hear("05 02 41 01 09", "05 03 41 01 09")
@@ -310,8 +290,7 @@ def test_a_direct_neighbour_is_never_forgotten_for_a_packet_that_goes_round():
     assert rig.routing.get_direction_to_node(9) == 9
 
 
-def test_the_same_packet_from_another_neighbour_is_dropped_and_its_entry_forgotten():
-    rig = Rig()
+def test_the_same_packet_from_another_neighbour_is_dropped_and_its_entry_forgotten(rig):
     rig.hear("09 03 00 01 01")
     rig.hear("05 02 41 01 09 2a")
     rig.wait(0.4)
@@ -334,8 +313,7 @@ def test_the_same_packet_from_another_neighbour_is_dropped_and_its_entry_forgott
         ("05 02 04 01 09 00 ff 01", "05 04 04 01 09 00 ff 03"),
     ],
 )
-def test_a_packet_that_differs_or_was_sent_again_is_forwarded(first, second):
-    rig = Rig()
+def test_a_packet_that_differs_or_was_sent_again_is_forwarded(rig, first, second):
     rig.hear("06 06 00 01 01", "09 03 00 01 01", first, second)
     assert len([sent for sent in rig.sent() if sent[2] != 5]) == 2
     assert rig.routing.get_direction_to_node(9) == 3
@@ -365,16 +343,14 @@ def test_on_a_shared_channel_it_tries_a_neighbour_that_said_that_it_has_a_gatewa
     assert [sent[3] for sent in rig.sent(4) if sent[4] == 0] == [3]
 
 
-def test_the_same_packet_from_another_neighbour_is_forwarded_after_half_a_second():
-    rig = Rig()
+def test_the_same_packet_from_another_neighbour_is_forwarded_after_half_a_second(rig):
     rig.hear("09 03 00 01 01", "05 02 80 01 09 2a")
     rig.wait(0.51)
     rig.hear("05 04 80 01 09 2a")
     assert rig.sent() == [packet("05 01 80 03 09 2a"), packet("05 01 80 03 09 2a")]
 
 
-def test_the_half_second_counts_from_the_first_time():
-    rig = Rig()
+def test_the_half_second_counts_from_the_first_time(rig):
     rig.hear("09 03 00 01 01", "05 02 80 01 09 2a")
     rig.wait(0.3)
     rig.hear("05 02 80 01 09 2a")
@@ -383,9 +359,8 @@ def test_the_half_second_counts_from_the_first_time():
     assert len(rig.sent()) == 3
 
 
-def test_the_entry_that_is_forgotten_is_the_one_that_was_used_in_the_end():
+def test_the_entry_that_is_forgotten_is_the_one_that_was_used_in_the_end(rig):
     """The first next hop did not take the packet: what went round went by the second."""
-    rig = Rig()
     rig.hear("09 03 00 01 01")
     for child in (4, 6):
         rig.routing.other_can_communicate_with_node(child, 9)
@@ -395,8 +370,7 @@ def test_the_entry_that_is_forgotten_is_the_one_that_was_used_in_the_end():
     assert rig.routing.get_direction_to_node(9) == 6
 
 
-def test_a_heartbeat_that_comes_round_with_more_hops_is_dropped_and_its_route_forgotten():
-    rig = Rig()
+def test_a_heartbeat_that_comes_round_with_more_hops_is_dropped_and_its_route_forgotten(rig):
     rig.hear("06 06 00 01 01", "09 03 00 01 01")
     rig.hear("05 02 04 01 09 00 ff 01", "05 04 04 01 09 00 ff 04")
     assert rig.sent(4) == [packet("05 01 04 03 09 00 ff 02")]

@@ -111,8 +111,7 @@ def test_maintaining_introduces_the_node_and_sends_each_child_a_heartbeat():
 # Sending -------------------------------------------------------------------------------------
 
 
-def test_a_round_of_heartbeats_tries_three_times_and_then_another_way():
-    rig = Rig()
+def test_a_round_of_heartbeats_tries_three_times_and_then_another_way(rig):
     rig.know_neighbour(2, 3)
     rig.routing.other_can_communicate_with_node(3, 2)
     rig.antenna.gets_lost = lambda payload: payload[2] == 4 and payload[3] == 2
@@ -125,8 +124,7 @@ def test_a_round_of_heartbeats_tries_three_times_and_then_another_way():
     assert len(heartbeats) == 5
 
 
-def test_a_round_of_heartbeats_goes_to_those_behind_others_as_well():
-    rig = Rig()
+def test_a_round_of_heartbeats_goes_to_those_behind_others_as_well(rig):
     rig.know_neighbour(3)
     rig.routing.other_can_communicate_with_node(3, 9)
     rig.mesh.control.send_heartbeats([9])
@@ -153,8 +151,7 @@ def test_a_technique_that_does_not_forget_a_route_does_not_stop_the_node():
     assert router.get_route_to_gateway() == 2
 
 
-def test_a_packet_that_is_taken_counts_as_sent_and_teaches():
-    rig = Rig()
+def test_a_packet_that_is_taken_counts_as_sent_and_teaches(rig):
     rig.hear(ASK)
     assert rig.sent() == [packet(LOCATION_OF_ORIGIN)]
     assert rig.mesh.get_total_message_sent() == 1
@@ -189,8 +186,7 @@ def test_the_routing_technique_learns_what_can_and_what_cannot_be_reached():
 
 
 @pytest.mark.parametrize("lost", [1, 2])
-def test_a_packet_that_is_lost_is_sent_again_and_costs_no_neighbour(lost):
-    rig = Rig()
+def test_a_packet_that_is_lost_is_sent_again_and_costs_no_neighbour(rig, lost):
     rig.antenna.losing = lost
     rig.hear(ASK)
     assert rig.tried() == [packet(LOCATION_OF_ORIGIN)] * (lost + 1)
@@ -198,8 +194,7 @@ def test_a_packet_that_is_lost_is_sent_again_and_costs_no_neighbour(lost):
     assert rig.mesh.get_total_message_sent() == 1
 
 
-def test_after_three_failures_the_neighbour_is_lost_and_the_others_are_informed():
-    rig = Rig()
+def test_after_three_failures_the_neighbour_is_lost_and_the_others_are_informed(rig):
     rig.know_neighbour(2, 5, 7)
     rig.antenna.losing = 3
     rig.hear(ASK)
@@ -217,9 +212,8 @@ def test_the_number_of_tries_is_adjustable():
     assert rig.tried() == [packet(LOCATION_OF_ORIGIN)] * 5
 
 
-def test_a_lost_neighbour_that_another_one_can_reach_is_not_missing():
+def test_a_lost_neighbour_that_another_one_can_reach_is_not_missing(rig):
     """Its own packet goes on over the next route."""
-    rig = Rig()
     rig.hear("05 02 00 01 01")
     rig.antenna.dead = {5}
     rig.hear(ASK)
@@ -227,8 +221,7 @@ def test_a_lost_neighbour_that_another_one_can_reach_is_not_missing():
     assert rig.routing.get_direction_to_node(5) == 2
 
 
-def test_own_packets_try_every_route():
-    rig = Rig()
+def test_own_packets_try_every_route(rig):
     for child in (2, 3, 4):
         rig.routing.other_can_communicate_with_node(child, 9)
     rig.antenna.gets_lost = lambda payload: payload[2] == 4 and payload[3] in (2, 3)
@@ -236,23 +229,20 @@ def test_own_packets_try_every_route():
     assert rig.sent(4) == [packet("01 01 04 04 09 00 ff")]
 
 
-def test_a_heartbeat_without_a_route_is_false_and_sends_nothing():
-    rig = Rig()
+def test_a_heartbeat_without_a_route_is_false_and_sends_nothing(rig):
     rig.know_neighbour(2)
     assert not rig.mesh.control.send_heartbeat(9)
     assert rig.tried() == []
 
 
-def test_a_heartbeat_without_an_acknowledgement_is_false():
-    rig = Rig()
+def test_a_heartbeat_without_an_acknowledgement_is_false(rig):
     rig.routing.other_can_communicate_with_node(2, 9)
     rig.antenna.dead = {2}
     assert not rig.mesh.control.send_heartbeat(9)
     assert rig.routing.empty()
 
 
-def test_a_neighbour_that_cannot_be_informed_is_lost_and_the_rest_learn_of_both():
-    rig = Rig()
+def test_a_neighbour_that_cannot_be_informed_is_lost_and_the_rest_learn_of_both(rig):
     rig.know_neighbour(2, 3, 5)
     rig.antenna.dead = {2, 5}
     rig.hear(ASK)
@@ -272,8 +262,7 @@ def test_losing_two_hundred_neighbours_at_once_is_survived():
 # Missing nodes -------------------------------------------------------------------------------
 
 
-def test_a_missing_node_is_dropped_and_reported_to_all_but_the_sender():
-    rig = Rig()
+def test_a_missing_node_is_dropped_and_reported_to_all_but_the_sender(rig):
     rig.know_neighbour(3, 4)
     rig.hear("09 02 00 01 01", "02 02 05 01 01 09")
     assert rig.sent() == [packet("01 01 05 03 03 09"), packet("01 01 05 04 04 09")]
@@ -292,9 +281,8 @@ def test_a_missing_node_is_dropped_and_reported_to_all_but_the_sender():
     ],
 )
 def test_a_missing_node_that_is_still_reached_or_never_was_is_not_reported_on(
-    missing, neighbours, behind, next_hop
+    rig, missing, neighbours, behind, next_hop
 ):
-    rig = Rig()
     rig.know_neighbour(2, *neighbours)
     for child in behind:
         rig.routing.other_can_communicate_with_node(child, 9)
@@ -311,9 +299,8 @@ def test_a_missing_node_that_is_still_reached_or_never_was_is_not_reported_on(
     ("height", "on_the_air"), [(2.6, "03 00"), (40000.0, "ff 7f"), (-40000.0, "00 80")]
 )
 def test_the_own_location_has_whole_metres_of_height_within_bounds_and_whole_seconds(
-    height, on_the_air
+    rig, height, on_the_air
 ):
-    rig = Rig()
     rig.engine.place = Location(1.5, -2.0, height)
     rig.wait(1.99)
     rig.hear(ASK)
@@ -321,9 +308,8 @@ def test_the_own_location_has_whole_metres_of_height_within_bounds_and_whole_sec
 
 
 @pytest.mark.parametrize("place", [None, Location(float("nan"), 0.0, 0.0)])
-def test_a_drone_that_does_not_know_its_place_sends_none(place):
+def test_a_drone_that_does_not_know_its_place_sends_none(rig, place):
     """It does not invent a place."""
-    rig = Rig()
     rig.engine.place = place
     rig.hear(ASK)
     assert rig.tried() == []
@@ -332,8 +318,7 @@ def test_a_drone_that_does_not_know_its_place_sends_none(place):
     assert rig.sent() == [packet("01 01 01 05 05")]
 
 
-def test_an_answer_takes_the_route_of_the_question_with_the_asker_as_addressee():
-    rig = Rig()
+def test_an_answer_takes_the_route_of_the_question_with_the_asker_as_addressee(rig):
     rig.hear("09 05 02 01 01")
     assert rig.sent() == [packet("01 01 01 05 09")]
 
@@ -341,8 +326,7 @@ def test_an_answer_takes_the_route_of_the_question_with_the_asker_as_addressee()
 # The medium comes back -----------------------------------------------------------------------
 
 
-def test_a_node_that_is_switched_on_introduces_itself_soon_and_one_that_is_off_does_not():
-    rig = Rig()
+def test_a_node_that_is_switched_on_introduces_itself_soon_and_one_that_is_off_does_not(rig):
     rig.antenna.powered = False
     rig.mesh.on_antenna_power(False, rig.now_s)
     rig.mesh.on_antenna_registered(rig.now_s)
@@ -354,8 +338,7 @@ def test_a_node_that_is_switched_on_introduces_itself_soon_and_one_that_is_off_d
     assert rig.broadcasts() == [packet("01 01 03 fe fe ff")]
 
 
-def test_after_the_return_of_the_medium_each_node_waits_for_its_own_part_of_a_second():
-    rig = Rig()
+def test_after_the_return_of_the_medium_each_node_waits_for_its_own_part_of_a_second(rig):
     rig.mesh.on_antenna_registered(rig.now_s)
     rig.wait(0.69)
     assert rig.broadcasts() == []

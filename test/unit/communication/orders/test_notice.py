@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from rig import Rig, packet
 
 from drone_mesh.communication.timing import QUEUED, Medium
@@ -15,16 +16,16 @@ TO_Y_2 = "00 00 00 40 00 00 00 00 00 00"
 Y_1, Y_2 = Location(1.0, 0.0, 0.0), Location(2.0, 0.0, 0.0)
 
 
-def notice_rig():
+@pytest.fixture
+def rig():
     """Router 1, connected through 2; it takes off 0.3 s after its announcement."""
     rig = Rig(medium=Medium(policy=QUEUED, takes_off_after_s=0.3))
     rig.connect_through(2)
     return rig
 
 
-def test_a_router_announces_its_goal_twice_before_it_takes_off():
+def test_a_router_announces_its_goal_twice_before_it_takes_off(rig):
     """A neighbour at the edge is out of reach soon after, and nobody acknowledges a broadcast."""
-    rig = notice_rig()
     rig.hear(f"{ORDER} {TO_Y_1}")
     rig.wait(0.25)
     told = [sent for sent in rig.broadcasts() if sent[2] != PRESENT]
@@ -46,9 +47,8 @@ def test_where_others_learn_at_once_it_takes_off_at_once():
 GOAL_OUT_OF_REACH = "00 00 20 41 00 00 00 00 00 00"  # latitude 10; the range is 9 m
 
 
-def test_all_but_the_next_hop_acknowledge_the_goal_and_those_out_of_its_reach_are_then_lost():
+def test_all_but_the_next_hop_acknowledge_the_goal_and_those_out_of_its_reach_are_then_lost(rig):
     """2 stands at (0, 0), 4 at (8, 0), and where 3 stands is not known."""
-    rig = notice_rig()
     for neighbour, latitude in ((2, "00 00 00 00"), (4, "00 00 00 41")):
         rig.hear(f"{neighbour:02x} {neighbour:02x} 01 01 01 {latitude}")
     rig.know_neighbour(3)
@@ -136,8 +136,7 @@ def test_a_neighbour_that_did_not_take_the_goal_is_told_again_while_it_is_one():
     assert rig.sent(LOCATION) == []
 
 
-def test_another_order_before_the_take_off_gives_notice_anew():
-    rig = notice_rig()
+def test_another_order_before_the_take_off_gives_notice_anew(rig):
     rig.hear(f"{ORDER} {TO_Y_1} 01 00")
     rig.wait(0.2)
     rig.hear(f"{ORDER} {TO_Y_2} 02 00")
@@ -147,8 +146,7 @@ def test_another_order_before_the_take_off_gives_notice_anew():
     assert rig.engine.goals == [Y_2]
 
 
-def test_the_same_order_of_another_gateway_does_not_delay_the_take_off():
-    rig = notice_rig()
+def test_the_same_order_of_another_gateway_does_not_delay_the_take_off(rig):
     rig.hear(f"{ORDER} {TO_Y_1} 01 00")
     rig.wait(0.2)
     rig.hear(f"09 02 06 01 01 {TO_Y_1} 01 00")
@@ -156,23 +154,20 @@ def test_the_same_order_of_another_gateway_does_not_delay_the_take_off():
     assert rig.engine.goals == [Y_1]
 
 
-def test_a_drone_that_is_asked_before_its_take_off_answers_with_its_goal():
-    rig = notice_rig()
+def test_a_drone_that_is_asked_before_its_take_off_answers_with_its_goal(rig):
     rig.hear(f"{ORDER} {TO_Y_1}", "02 02 02 01 01 00 00 00 00 00 00 00 00 01")
     answer = packet("01 01 01 02 02 00 00 80 3f 00 00 00 00 00 00 00 00 00 80")
     assert answer in rig.sent(LOCATION)
 
 
-def test_a_drone_in_flight_turns_without_notice():
-    rig = notice_rig()
+def test_a_drone_in_flight_turns_without_notice(rig):
     rig.hear(f"{ORDER} {TO_Y_1}")
     rig.wait(0.4)
     rig.hear(f"{ORDER} {TO_Y_2}")
     assert rig.engine.goals == [Y_1, Y_2]
 
 
-def test_a_drone_that_cannot_take_off_after_its_notice_gives_its_order_up(caplog):
-    rig = notice_rig()
+def test_a_drone_that_cannot_take_off_after_its_notice_gives_its_order_up(rig, caplog):
     rig.hear(f"{ORDER} {TO_Y_1} 07 00")
     rig.engine.grounded = "battery"
     rig.wait(0.4)
@@ -182,8 +177,7 @@ def test_a_drone_that_cannot_take_off_after_its_notice_gives_its_order_up(caplog
     assert "order given up: drone 1 cannot fly: battery" in caplog.text
 
 
-def test_a_router_that_is_stopped_before_its_take_off_does_not_fly_after_its_start():
-    rig = notice_rig()
+def test_a_router_that_is_stopped_before_its_take_off_does_not_fly_after_its_start(rig):
     rig.hear(f"{ORDER} {TO_Y_1} 07 00")
     rig.mesh.stop()
     rig.mesh.start(rig.now_s)
@@ -196,22 +190,19 @@ def departure_of_2(rig, *, stood, goal):
     rig.hear(f"02 02 01 01 01 {stood}", f"02 02 01 01 fe {goal} 00 00 00 00 00 00 00 00 00 80")
 
 
-def test_a_next_hop_that_flies_far_is_none_even_if_its_goal_is_in_reach():
+def test_a_next_hop_that_flies_far_is_none_even_if_its_goal_is_in_reach(rig):
     """It forgets its routes when it lands."""
-    rig = notice_rig()
     departure_of_2(rig, stood="00 00 00 c0", goal="00 00 00 3f")  # from -2 to 0.5 m
     assert 2 not in rig.mesh.get_neighbours()
 
 
-def test_a_next_hop_counts_as_flying_far_if_nobody_heard_where_it_stood():
-    rig = notice_rig()
+def test_a_next_hop_counts_as_flying_far_if_nobody_heard_where_it_stood(rig):
     rig.hear("02 02 01 01 fe 00 00 00 3f 00 00 00 00 00 00 00 00 00 80")
     assert 2 not in rig.mesh.get_neighbours()
 
 
-def test_a_next_hop_that_landed_unheard_is_left_before_its_next_flight():
+def test_a_next_hop_that_landed_unheard_is_left_before_its_next_flight(rig):
     """It flew from 7 to 8 m, and now leaves for 0.5 m."""
-    rig = notice_rig()
     departure_of_2(rig, stood="00 00 e0 40", goal="00 00 00 41")
     rig.connect_through(2)
     rig.wait(10.0)
@@ -220,40 +211,37 @@ def test_a_next_hop_that_landed_unheard_is_left_before_its_next_flight():
     assert 2 not in rig.mesh.get_neighbours()
 
 
-def test_a_next_hop_that_repeats_its_goal_still_comes_from_where_it_stood():
+def test_a_next_hop_that_repeats_its_goal_still_comes_from_where_it_stood(rig):
     """It flew from 7 to 8 m: its links hold."""
-    rig = notice_rig()
     departure_of_2(rig, stood="00 00 e0 40", goal="00 00 00 41")
     rig.wait(10.0)
     rig.hear("02 02 01 01 fe 00 00 00 41 00 00 00 00 00 00 00 00 00 80")
     assert rig.mesh.get_route_to_gateway() == 2
 
 
-def test_nobody_can_announce_the_flight_of_another_node():
+def test_nobody_can_announce_the_flight_of_another_node(rig):
     """A captured node could end all links around it."""
-    rig = notice_rig()
     rig.know_neighbour(3)
     rig.hear("02 02 01 01 01 00 00 00 c0", f"02 03 01 01 fe {GOAL_OUT_OF_REACH} 00 00 00 80")
     assert rig.mesh.get_route_to_gateway() == 2
 
 
-def test_a_next_hop_that_flies_a_short_way_remains_one():
-    rig = notice_rig()
+def test_a_next_hop_that_flies_a_short_way_remains_one(rig):
     departure_of_2(rig, stood="00 00 80 bf", goal="00 00 80 3f")  # from -1 to 1 m
     assert rig.mesh.get_route_to_gateway() == 2
 
 
-def test_a_neighbour_that_is_no_next_hop_remains_one_while_its_goal_is_in_reach():
-    rig = notice_rig()
+def test_a_neighbour_that_is_no_next_hop_remains_one_while_its_goal_is_in_reach(rig):
     rig.know_neighbour(3)
     rig.connect_through(3)
     departure_of_2(rig, stood="00 00 00 c0", goal="00 00 00 3f")
     assert 2 in rig.mesh.get_neighbours()
 
 
-def test_a_router_does_not_go_back_to_a_next_hop_that_flies_away_while_another_one_has_a_gateway():
+def test_a_router_does_not_go_back_to_a_next_hop_that_flies_away_while_another_one_has_a_gateway(
+    rig,
+):
     """The one that leaves still answers, and offers the way that it had."""
-    rig = notice_rig()
     rig.know_neighbour(3)
     rig.hear("03 03 03 01 fe 02 01")  # 3 introduces itself: two hops from its gateway
     departure_of_2(rig, stood="00 00 00 c0", goal="00 00 20 41")
@@ -265,9 +253,8 @@ def test_a_router_does_not_go_back_to_a_next_hop_that_flies_away_while_another_o
     assert rig.mesh.get_route_to_gateway() == 3
 
 
-def test_a_late_answer_through_a_next_hop_that_flies_away_teaches_no_way_back_to_it():
+def test_a_late_answer_through_a_next_hop_that_flies_away_teaches_no_way_back_to_it(rig):
     """A question before its flight was still under way."""
-    rig = notice_rig()
     rig.know_neighbour(3)
     rig.hear("03 03 03 01 fe 02 01")  # 3 introduces itself: two hops from its gateway
     departure_of_2(rig, stood="00 00 00 c0", goal="00 00 20 41")
@@ -278,8 +265,9 @@ def test_a_late_answer_through_a_next_hop_that_flies_away_teaches_no_way_back_to
     assert rig.mesh.get_route_to_gateway() == 2
 
 
-def test_an_answer_through_a_next_hop_that_flies_away_counts_if_no_other_neighbour_has_a_gateway():
-    rig = notice_rig()
+def test_an_answer_through_a_next_hop_that_flies_away_counts_if_no_other_neighbour_has_a_gateway(
+    rig,
+):
     departure_of_2(rig, stood="00 00 00 c0", goal="00 00 20 41")
     rig.hear("00 02 04 01 01 01 00 01")
     assert rig.mesh.get_route_to_gateway() == 2

@@ -19,7 +19,8 @@ def replies(rig):
     return [(p[5] | p[6] << 8, p[7], p[9:19].rstrip(b"\0").decode()) for p in rig.sent(kind=64)]
 
 
-def drone_rig():
+@pytest.fixture
+def rig():
     """Router 1; gateway 0 is its neighbour."""
     rig = Rig()
     rig.connect_to_gateway()
@@ -37,22 +38,19 @@ def fly_to(rig, place):
 # At the drone ----------------------------------------------------------------------------------
 
 
-def test_an_order_without_a_number_is_flown_and_not_replied_to():
-    rig = drone_rig()
+def test_an_order_without_a_number_is_flown_and_not_replied_to(rig):
     rig.hear(f"00 00 06 01 01 {TO_Y_1}")
     fly_to(rig, Location(1.0, 0.0, 0.0))
     assert rig.engine.goals == [Location(1.0, 0.0, 0.0)]
     assert replies(rig) == []
 
 
-def test_an_accepted_order_is_replied_to_in_these_bytes():
-    rig = drone_rig()
+def test_an_accepted_order_is_replied_to_in_these_bytes(rig):
     rig.hear(f"00 00 06 01 01 {TO_Y_1} 34 12")
     assert rig.sent(kind=64) == [packet("01 01 40 00 00 34 12 01 00")]
 
 
-def test_the_arrival_is_reported_at_the_landing_of_a_short_flight():
-    rig = drone_rig()
+def test_the_arrival_is_reported_at_the_landing_of_a_short_flight(rig):
     rig.hear(f"00 00 06 01 01 {TO_Y_1} 07 00")
     rig.forget()
     rig.engine.place = Location(1.0, 0.0, 0.0)
@@ -60,8 +58,7 @@ def test_the_arrival_is_reported_at_the_landing_of_a_short_flight():
     assert replies(rig) == [(7, 3, "")]
 
 
-def test_the_arrival_after_a_long_flight_is_reported_as_soon_as_there_is_a_route_again():
-    rig = drone_rig()
+def test_the_arrival_after_a_long_flight_is_reported_as_soon_as_there_is_a_route_again(rig):
     rig.hear(f"00 00 06 01 01 {TO_Y_20} 07 00")
     rig.forget()
     rig.engine.place = Location(20.0, 0.0, 0.0)
@@ -76,8 +73,7 @@ def test_the_arrival_after_a_long_flight_is_reported_as_soon_as_there_is_a_route
 
 
 @pytest.mark.parametrize(("waited_s", "told"), [(100.0, [(7, 3, "")]), (140.0, [])])
-def test_the_arrival_waits_two_minutes_for_a_route(waited_s, told):
-    rig = drone_rig()
+def test_the_arrival_waits_two_minutes_for_a_route(rig, waited_s, told):
     rig.hear(f"00 00 06 01 01 {TO_Y_20} 07 00")
     rig.forget()
     rig.engine.place = Location(20.0, 0.0, 0.0)
@@ -88,8 +84,7 @@ def test_the_arrival_waits_two_minutes_for_a_route(waited_s, told):
     assert replies(rig) == told
 
 
-def test_a_drone_has_arrived_if_it_stands_a_metre_from_the_goal():
-    rig = drone_rig()
+def test_a_drone_has_arrived_if_it_stands_a_metre_from_the_goal(rig):
     rig.hear(f"00 00 06 01 01 {TO_Y_1} 07 00")
     rig.forget()
     fly_to(rig, Location(1.0, 1.2, 0.0))
@@ -113,9 +108,8 @@ BACK = Location(-1.0, 0.0, 0.0)
     ],
 )
 def test_a_flight_that_ends_elsewhere_is_given_up_with_reason_and_distance(
-    stands, engine_says, why
+    rig, stands, engine_says, why
 ):
-    rig = drone_rig()
     rig.hear(f"00 00 06 01 01 {TO_Y_2} 07 00")
     rig.forget()
     vars(rig.engine).update(engine_says, place=stands)
@@ -127,8 +121,7 @@ def test_a_flight_that_ends_elsewhere_is_given_up_with_reason_and_distance(
     assert "".join(text for _, _, text in said) == why
 
 
-def test_a_refusal_carries_its_reason_in_as_many_packets_as_it_needs():
-    rig = drone_rig()
+def test_a_refusal_carries_its_reason_in_as_many_packets_as_it_needs(rig):
     rig.engine.grounded = "it stands on the ground"
     rig.hear(f"00 00 06 01 01 {TO_Y_1} 07 00")
     sent = rig.sent(kind=64)
@@ -140,16 +133,14 @@ def test_a_refusal_carries_its_reason_in_as_many_packets_as_it_needs():
     assert all(p[19:] == bytes(13) for p in sent)  # 14 bytes of a body at most
 
 
-def test_an_order_to_a_place_out_of_bounds_is_refused_with_the_reason():
-    rig = drone_rig()
+def test_an_order_to_a_place_out_of_bounds_is_refused_with_the_reason(rig):
     rig.hear("00 00 06 01 01 00 00 80 3f 00 00 00 00 f5 01 07 00")  # 501 m high
     said = replies(rig)
     assert {(number, outcome) for number, outcome, _ in said} == {(7, 2)}
     assert "".join(text for _, _, text in said).startswith("height 501 m is outside")
 
 
-def test_an_order_that_the_engine_refuses_starts_no_flight():
-    rig = drone_rig()
+def test_an_order_that_the_engine_refuses_starts_no_flight(rig):
 
     def refuse(*_goal):
         raise GoalRefused("farther than --max-distance")
@@ -163,8 +154,7 @@ def test_an_order_that_the_engine_refuses_starts_no_flight():
     assert rig.mesh.get_connected_to_gateway()
 
 
-def test_the_same_order_again_is_replied_to_again_and_not_flown_again():
-    rig = drone_rig()
+def test_the_same_order_again_is_replied_to_again_and_not_flown_again(rig):
     order = f"00 00 06 01 01 {TO_Y_1} 07 00"
     rig.hear(order)
     fly_to(rig, Location(1.0, 0.0, 0.0))
@@ -175,22 +165,19 @@ def test_the_same_order_again_is_replied_to_again_and_not_flown_again():
     assert replies(rig) == [(7, 3, "")]
 
 
-def test_the_number_of_a_restarted_gateway_with_another_goal_is_a_new_order():
-    rig = drone_rig()
+def test_the_number_of_a_restarted_gateway_with_another_goal_is_a_new_order(rig):
     rig.hear(f"00 00 06 01 01 {TO_Y_1} 07 00", f"00 00 06 01 01 {TO_Y_2} 07 00")
     assert rig.engine.goals == [Location(1.0, 0.0, 0.0), Location(2.0, 0.0, 0.0)]
 
 
-def test_an_order_that_another_one_replaces_says_by_which():
-    rig = drone_rig()
+def test_an_order_that_another_one_replaces_says_by_which(rig):
     rig.hear(f"00 00 06 01 01 {TO_Y_1} 07 00", f"00 00 06 01 01 {TO_Y_2} 08 00")
     said = replies(rig)
     assert [(number, outcome) for number, outcome, _ in said] == [(7, 1), (7, 6), (8, 1)]
     assert "".join(text for _, _, text in said) == "by order 8"
 
 
-def test_an_order_of_another_gateway_or_without_a_number_is_named_as_such():
-    rig = drone_rig()
+def test_an_order_of_another_gateway_or_without_a_number_is_named_as_such(rig):
     rig.know_neighbour(9)
     rig.hear(f"00 00 06 01 01 {TO_Y_1} 07 00", f"09 09 06 01 01 {TO_Y_2} 02 00")
     assert "".join(text for _, outcome, text in replies(rig) if outcome == 6) == (
@@ -203,8 +190,7 @@ def test_an_order_of_another_gateway_or_without_a_number_is_named_as_such():
     )
 
 
-def test_a_refused_order_does_not_end_the_flight_that_is_under_way():
-    rig = drone_rig()
+def test_a_refused_order_does_not_end_the_flight_that_is_under_way(rig):
     rig.hear(f"00 00 06 01 01 {TO_Y_1} 07 00")
     rig.engine.grounded = "battery at 10 %"
     rig.hear(f"00 00 06 01 01 {TO_Y_2} 08 00")
@@ -214,8 +200,7 @@ def test_a_refused_order_does_not_end_the_flight_that_is_under_way():
     assert replies(rig) == [(7, 3, "")]
 
 
-def test_two_gateways_that_order_the_same_flight_both_get_its_end():
-    rig = drone_rig()
+def test_two_gateways_that_order_the_same_flight_both_get_its_end(rig):
     rig.know_neighbour(9)
     rig.hear(f"00 00 06 01 01 {TO_Y_1} 07 00", f"09 09 06 01 01 {TO_Y_1} 02 00")
     assert rig.engine.goals == [Location(1.0, 0.0, 0.0)]
@@ -226,8 +211,7 @@ def test_two_gateways_that_order_the_same_flight_both_get_its_end():
 
 
 @pytest.mark.parametrize(("number", "outcome"), [("07 00", 1), ("08 00", 5), ("00 00", 5)])
-def test_a_query_is_answered_with_the_state_of_that_order(number, outcome):
-    rig = drone_rig()
+def test_a_query_is_answered_with_the_state_of_that_order(rig, number, outcome):
     rig.hear(f"00 00 06 01 01 {TO_Y_1} 07 00")
     rig.forget()
     rig.hear(f"00 00 41 01 01 {number}")
@@ -236,8 +220,7 @@ def test_a_query_is_answered_with_the_state_of_that_order(number, outcome):
 
 
 @pytest.mark.parametrize(("number", "outcome"), [(1, 5), (2, 6), (9, 1)])
-def test_a_drone_remembers_its_last_eight_orders(number, outcome):
-    rig = drone_rig()
+def test_a_drone_remembers_its_last_eight_orders(rig, number, outcome):
     for other in range(1, 10):
         rig.hear(f"00 00 06 01 01 {(TO_Y_1, TO_Y_2)[other % 2]} {other:02x} 00")
     rig.forget()

@@ -134,8 +134,7 @@ def test_a_goal_farther_away_than_the_next_hop_can_stand_is_no_wrong_place():
     assert not rig.mesh.complaints.counts
 
 
-def test_a_gateway_that_is_the_next_hop_is_followed_to_where_it_flies():
-    rig = Rig()
+def test_a_gateway_that_is_the_next_hop_is_followed_to_where_it_flies(rig):
     rig.connect_to_gateway()
     rig.hear(GATEWAY_AT_0_4)
     assert rig.mesh.get_last_good_known_location_id() == 0
@@ -143,8 +142,7 @@ def test_a_gateway_that_is_the_next_hop_is_followed_to_where_it_flies():
     assert rig.mesh.places.gateway == rig.mesh.places.good == Location(6.0, 0.0, 0.0)
 
 
-def test_a_drone_in_flight_answers_with_its_goal_and_says_so():
-    rig = Rig()
+def test_a_drone_in_flight_answers_with_its_goal_and_says_so(rig):
     rig.know_neighbour(5)
     rig.hear("00 05 06 01 01 00 00 80 3f 00 00 00 c0 07 00")
     rig.antenna.taken.clear()
@@ -159,8 +157,7 @@ def test_a_drone_in_flight_answers_with_its_goal_and_says_so():
     assert not answer[18] & 0x80
 
 
-def test_where_others_saw_a_drone_in_flight_does_not_replace_the_goal_that_it_told():
-    rig = Rig()
+def test_where_others_saw_a_drone_in_flight_does_not_replace_the_goal_that_it_told(rig):
     rig.hear("06 06 02 01 fe 00 00 00 41 00 00 00 00 01 80")  # flies to latitude 8
     rig.hear("05 05 45 01 01 00 00 06 00 00 80 40 00 00 00 00 04 00")  # was at latitude 4, 4 m up
     assert rig.mesh._neighbours.place_of(6).place == Location(8.0, 0.0, 0.0)
@@ -179,8 +176,7 @@ def test_an_order_is_flown_and_ends_the_connection():
     assert "FLIGHT_ORDERED" in rig.kinds()
 
 
-def test_a_drone_that_knows_no_gateway_location_has_no_place_to_step_back_to_after_an_order():
-    rig = Rig()
+def test_a_drone_that_knows_no_gateway_location_has_no_place_to_step_back_to_after_an_order(rig):
     rig.hear(NEIGHBOUR_2_AT_0_8, "02 02 06 01 01 00 00 80 3f")
     assert rig.mesh.get_last_good_known_location_id() == 255
 
@@ -208,8 +204,7 @@ def test_a_flight_of_a_quarter_of_the_range_keeps_the_connection_and_the_routes(
     assert rig.routing.get_direction_to_node(0) == 2
 
 
-def test_after_a_short_flight_it_looks_for_others_and_loses_those_left_behind():
-    rig = Rig()
+def test_after_a_short_flight_it_looks_for_others_and_loses_those_left_behind(rig):
     rig.know_neighbour(3)
     rig.connect_through(2)
     rig.hear("00 02 06 01 01 00 00 00 40")  # latitude 2
@@ -231,8 +226,7 @@ def test_several_orders_in_one_flight_count_from_where_it_began():
     assert not rig.mesh.get_connected_to_gateway()
 
 
-def test_a_router_without_a_gateway_forgets_its_routes_after_a_short_flight_too():
-    rig = Rig()
+def test_a_router_without_a_gateway_forgets_its_routes_after_a_short_flight_too(rig):
     rig.know_neighbour(2)
     rig.hear("02 02 06 01 01 00 00 00 40")
     fly(rig, Location(2.0, 0.0, 0.0))
@@ -255,8 +249,7 @@ def test_a_drone_introduces_itself_as_soon_as_it_has_landed(latitudes):
     assert rig.broadcasts() == [packet("01 01 03 fe fe ff 00")]
 
 
-def test_a_flight_that_goes_on_to_another_goal_is_not_over_at_the_first_one():
-    rig = Rig()
+def test_a_flight_that_goes_on_to_another_goal_is_not_over_at_the_first_one(rig):
     rig.hear("02 02 06 01 01 00 00 a0 41")
     fly(rig, Location(19.0, 0.0, 0.0))
     rig.hear("02 02 06 01 01 00 00 20 41")  # back to latitude 10, which the engine hears late
@@ -271,9 +264,8 @@ def test_a_flight_that_goes_on_to_another_goal_is_not_over_at_the_first_one():
     ("goal", "distance_m"), [("00 00 00 40", 2.0), ("00 00 a0 41", 20.0), ("00 00 fa 43", 500.0)]
 )
 def test_a_drone_that_does_not_set_out_in_a_time_that_fits_the_distance_has_landed(
-    goal, distance_m
+    rig, goal, distance_m
 ):
-    rig = Rig()
     rig.hear(f"02 02 06 01 01 {goal}")
     gone_s = 10.0 + min(distance_m / 2.0, 10.0)
     rig.wait_until(gone_s - 0.5)
@@ -285,8 +277,7 @@ def test_a_drone_that_does_not_set_out_in_a_time_that_fits_the_distance_has_land
 @pytest.mark.parametrize(
     ("trouble", "within_s"), [({"grounded": "battery empty"}, 2.0), ({"place": None}, 30.0)]
 )
-def test_a_drone_that_cannot_fly_or_say_where_it_is_does_not_fly_for_ever(trouble, within_s):
-    rig = Rig()
+def test_a_drone_that_cannot_fly_or_say_where_it_is_does_not_fly_for_ever(rig, trouble, within_s):
     rig.hear("02 02 06 01 01 00 00 a0 41")
     vars(rig.engine).update(trouble)
     rig.wait(within_s)
@@ -294,8 +285,7 @@ def test_a_drone_that_cannot_fly_or_say_where_it_is_does_not_fly_for_ever(troubl
 
 
 @pytest.mark.parametrize("begins_s", [1.0, 5.0])
-def test_an_engine_that_says_whether_it_flies_ends_the_flight_once_it_has_begun(begins_s):
-    rig = Rig()
+def test_an_engine_that_says_whether_it_flies_ends_the_flight_once_it_has_begun(rig, begins_s):
     rig.engine.is_flying = lambda: rig.now_s >= begins_s
     rig.hear("02 02 06 01 01 00 00 a0 41")
     rig.wait_until(8.0)
@@ -305,8 +295,7 @@ def test_an_engine_that_says_whether_it_flies_ends_the_flight_once_it_has_begun(
     assert "LANDED" in rig.kinds()
 
 
-def test_it_asks_for_its_position_once_a_second_and_not_before():
-    rig = Rig()
+def test_it_asks_for_its_position_once_a_second_and_not_before(rig):
     rig.hear("02 02 06 01 01")  # where it stands
     rig.wait(0.9)
     assert "LANDED" not in rig.kinds()
@@ -324,8 +313,7 @@ def test_a_flight_is_not_turned_round_however_long_it_takes():
     assert rig.sent(MISSING) == []
 
 
-def test_after_the_landing_the_time_without_a_gateway_counts_from_the_next_check():
-    rig = Rig()
+def test_after_the_landing_the_time_without_a_gateway_counts_from_the_next_check(rig):
     rig.connect_to_gateway()
     rig.hear(GATEWAY_AT_0_4, "00 00 06 01 01 00 00 a0 41")
     for second in range(52):
@@ -360,15 +348,13 @@ def test_an_order_ends_the_time_without_a_gateway():
         ("00 02 06 01 01 00 00 80 3f", [Location(20.0, 0.0, 0), Location(1.0, 0.0, 0)]),
     ],
 )
-def test_the_same_order_in_flight_is_no_new_one_and_another_replaces_the_first(other, goals):
-    rig = Rig()
+def test_the_same_order_in_flight_is_no_new_one_and_another_replaces_the_first(rig, other, goals):
     rig.hear("00 02 06 01 01 00 00 a0 41", other)
     assert rig.engine.goals == goals
     assert rig.kinds().count("FLIGHT_ORDERED") == len(goals)
 
 
-def test_a_drone_that_cannot_say_where_it_is_now_and_then_flies_on():
-    rig = Rig()
+def test_a_drone_that_cannot_say_where_it_is_now_and_then_flies_on(rig):
     rig.hear("02 02 06 01 01 00 00 fa 43")
     for second in range(30):
         fly(rig, Location(2.0 * second, 0.0, 0.0) if second % 3 == 0 else None)
@@ -401,8 +387,7 @@ def test_a_lost_gateway_is_dropped_and_the_neighbours_are_informed():
     assert rig.routing.get_set_of_children() == {2, 3}
 
 
-def test_a_router_that_never_knew_a_gateway_has_none_to_drop():
-    rig = Rig()
+def test_a_router_that_never_knew_a_gateway_has_none_to_drop(rig):
     rig.know_neighbour(2)
     rig.wait_until(6.0)
     assert rig.sent(MISSING) == []
@@ -503,17 +488,15 @@ def test_a_drone_that_cannot_fly_for_a_repair_stays_and_says_why(hindrance, why)
     assert rig.mesh.get_repair_status().reason == f"cannot fly: {why}"
 
 
-def test_a_router_that_knows_no_place_at_all_stays():
-    rig = Rig()
+def test_a_router_that_knows_no_place_at_all_stays(rig):
     rig.wait_until(400.0)
     assert rig.engine.goals == []
     assert rig.kinds().count("EMERGENCY") > 1
 
 
 @pytest.mark.parametrize("bids", [(), (bid(3, 1.0),)])
-def test_a_router_does_not_fly_while_it_may_still_be_connected_for_the_first_time(bids):
+def test_a_router_does_not_fly_while_it_may_still_be_connected_for_the_first_time(rig, bids):
     """Others tell it where the gateway is before it has a route there itself."""
-    rig = Rig()
     rig.engine.place = Location(60.0, 0.0, 0.0)
     rig.know_neighbour(3)
     where = GatewayPlace(0, Location(4.0, 0.0, 0.0), age_s=1.0)
@@ -753,8 +736,7 @@ def test_scores_are_compared_as_they_are_on_the_air():
     assert len(rig.engine.goals) == 1
 
 
-def test_no_router_flies_without_a_bid():
-    rig = Rig()
+def test_no_router_flies_without_a_bid(rig):
     rig.know_neighbour(3)
     rig.wait_until(FIRST_EMERGENCY_S + 1.1)
     decide(rig, bid(3, -1.0))
@@ -981,8 +963,7 @@ def test_a_bid_that_one_neighbour_brings_and_another_distorts_is_passed_on_once(
     assert sorted(sent[3] for sent in rig.sent(BID) if sent[0] == 9) == [3, 5]
 
 
-def test_a_node_in_flight_does_not_negotiate():
-    rig = Rig()
+def test_a_node_in_flight_does_not_negotiate(rig):
     rig.connect_to_gateway()
     rig.hear(GATEWAY_AT_0_4, "00 00 06 01 01 00 00 fa 43")
     rig.forget()
@@ -1611,8 +1592,7 @@ def test_a_node_that_comes_into_reach_in_flight_is_asked_at_once():
 @pytest.mark.parametrize(
     ("flies", "told"), [("80", [packet("01 01 45 03 03 3c 00 05 00 00 00 41")]), ("00", [])]
 )
-def test_only_a_drone_in_flight_hears_who_was_last_heard_near_its_goal(flies, told):
-    rig = Rig()
+def test_only_a_drone_in_flight_hears_who_was_last_heard_near_its_goal(rig, flies, told):
     rig.know_neighbour(3)
     rig.hear("05 03 02 01 01 00 00 00 41 00 00 00 00 01 00")  # 5 asks, from latitude 8
     rig.hear("06 03 02 01 01 00 00 48 42 00 00 00 00 01 00")  # 6 asks, from latitude 50
@@ -1631,9 +1611,10 @@ def test_only_a_drone_in_flight_hears_who_was_last_heard_near_its_goal(flies, to
     ],
     ids=["5 is silent", "5 is a neighbour", "a question to all"],
 )
-def test_who_asks_this_router_alone_makes_it_tell_all_who_is_silent_beside_it(asked, knows, told):
+def test_who_asks_this_router_alone_makes_it_tell_all_who_is_silent_beside_it(
+    rig, asked, knows, told
+):
     """It may step back to the place of this router one day."""
-    rig = Rig()
     rig.know_neighbour(3)
     rig.hear("05 03 02 01 01 00 00 00 40 00 00 00 00 01 00")  # 5 asks, from latitude 2
     rig.hear("06 03 02 01 01 00 00 80 40 00 00 00 00 01 00")  # 6 asks, from latitude 4
@@ -1649,8 +1630,7 @@ def test_who_asks_this_router_alone_makes_it_tell_all_who_is_silent_beside_it(as
     assert sum(sent[2] == LAST_PLACE for sent in rig.antenna.broadcasts) == 2 * len(told)
 
 
-def test_who_says_again_and_again_that_it_has_just_connected_is_told_once_in_ten_seconds():
-    rig = Rig()
+def test_who_says_again_and_again_that_it_has_just_connected_is_told_once_in_ten_seconds(rig):
     rig.know_neighbour(3)
     rig.hear("05 03 02 01 01 00 00 00 40 00 00 00 00 01 00")  # 5 asks, from latitude 2
     rig.wait(60.0)
@@ -1783,9 +1763,8 @@ def test_no_leg_ends_on_a_drone_whose_place_is_known_or_told_on_the_way():
     assert rig.engine.goals[-1].height == 0.0
 
 
-def test_the_last_leg_ends_at_the_goal_and_not_just_before_it():
+def test_the_last_leg_ends_at_the_goal_and_not_just_before_it(rig):
     """Beside the goal there may be less than the clearance to another drone."""
-    rig = Rig()
     rig.engine.place = Location(11.18, 0.0, 0.0)  # a leg of 6 m would end 8 cm before the goal
     rig.connect_through(2)
     rig.hear("00 02 01 01 01 00 00 80 40")
