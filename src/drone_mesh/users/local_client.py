@@ -12,7 +12,7 @@ import json
 import os
 import socket
 from pathlib import Path
-from typing import Any, Iterator, Mapping, NamedTuple
+from typing import Any, Iterator, NamedTuple
 
 from drone_mesh.arguments import whole
 from drone_mesh.communication.data.outgoing import TO_ALL, TO_GATEWAY
@@ -22,12 +22,12 @@ from drone_mesh.errors import MeshError
 SYSTEM_FOLDER = Path("/run/drone_mesh")  # of the services: RuntimeDirectory=drone_mesh
 
 
-def socket_folder(environment: Mapping[str, str] = os.environ) -> Path:
+def socket_folder() -> Path:
     """The folder for the sockets of nodes that this user starts."""
-    if environment.get("RUNTIME_DIRECTORY"):  # set by systemd
-        return Path(environment["RUNTIME_DIRECTORY"])
-    if environment.get("XDG_RUNTIME_DIR"):
-        return Path(environment["XDG_RUNTIME_DIR"]) / "drone_mesh"
+    if os.environ.get("RUNTIME_DIRECTORY"):  # set by systemd
+        return Path(os.environ["RUNTIME_DIRECTORY"])
+    if os.environ.get("XDG_RUNTIME_DIR"):
+        return Path(os.environ["XDG_RUNTIME_DIR"]) / "drone_mesh"
     return Path(f"/tmp/drone_mesh-{os.getuid()}")
 
 
