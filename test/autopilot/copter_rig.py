@@ -7,7 +7,6 @@ import random
 import socket
 import threading
 from pathlib import Path
-from types import TracebackType
 from typing import Mapping
 
 from arducopter import GCS_TIMEOUT_S, SAFE, ArduCopter
@@ -130,12 +129,7 @@ class CopterRig:
     def __enter__(self) -> CopterRig:
         return self
 
-    def __exit__(
-        self,
-        _type: type[BaseException] | None,
-        _error: BaseException | None,
-        _traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         self.engine.close()
         self.pilot.close()
         self.copter.close()
