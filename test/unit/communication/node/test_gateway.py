@@ -96,12 +96,6 @@ def test_an_order_without_a_route_is_false_and_one_line_names_the_drone(rig, cap
     assert (rig.events[-1].kind.name, rig.events[-1].peer) == ("NO_ROUTE", 77)
 
 
-def test_an_order_without_an_acknowledgement_is_false(rig):
-    rig.know_neighbour(5)
-    rig.antenna.dead = {5}
-    assert not rig.mesh.send_goal_request_to_drone(5, 2.0, 0.0, 0, rig.now_s)
-
-
 # Places of other drones ------------------------------------------------------------------------
 
 NODE_5_AT_0_8 = "05 05 01 01 01 00 00 00 41"  # latitude 8
