@@ -12,7 +12,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Callable, Iterator
+from typing import Any, Callable, Iterator
 
 import pytest
 from playwright.sync_api import Browser, Page, Request, expect, sync_playwright
@@ -302,3 +302,18 @@ def shared_page(nursery: Nursery, browser: Browser) -> Iterator[Visit]:
         page = open_page(start("--skip", "25").url)
         page.wait_for_drones(18)
         yield page
+
+
+def page_of(*arguments: str, **options: object) -> Callable[..., Visit]:
+    """A fixture: the page of a console of 18 drones with these arguments, which shows all."""
+
+    @pytest.fixture
+    def page(start_console: Callable[..., Any], visit: Callable[..., Visit]) -> Visit:
+        opened = visit(start_console(*arguments).url, **options)
+        opened.wait_for_drones(18)
+        return opened
+
+    return page
+
+
+page = page_of("--skip", "25")

@@ -3,17 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from conftest import Visit
 from test_page import PLACES
 
 FAST = ("--skip", "25")
-
-
-@pytest.fixture
-def page(start_console, visit) -> Visit:
-    opened = visit(start_console(*FAST).url)
-    opened.wait_for_drones(len(PLACES))
-    return opened
 
 
 def test_alarms_last_until_they_are_over_and_acknowledged(page):

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
-from conftest import Visit
+from conftest import Visit, page_of
 from test_page import PLACES, X, Y
 
 from drone_mesh.drone.geodesy import EarthPlace, Origin
@@ -37,11 +37,7 @@ def geojson(*features: tuple[str, object, dict[str, object]]) -> str:
     )
 
 
-@pytest.fixture
-def page(start_console, visit) -> Visit:
-    opened = visit(start_console("--skip", "25", "--origin", AT).url)
-    opened.wait_for_drones(len(PLACES))
-    return opened
+page = page_of("--skip", "25", "--origin", AT)
 
 
 def load(page: Visit, path: Path, text: str) -> None:

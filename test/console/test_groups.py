@@ -4,18 +4,10 @@ from __future__ import annotations
 
 import json
 
-import pytest
 from conftest import Visit
 from test_page import PLACES, on_screen
 
 STATE = 2  # column of the table
-
-
-@pytest.fixture
-def page(start_console, visit) -> Visit:
-    opened = visit(start_console("--skip", "25").url)
-    opened.wait_for_drones(len(PLACES))
-    return opened
 
 
 def count(page: Visit) -> str:

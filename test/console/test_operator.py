@@ -14,11 +14,9 @@ FAST = ("--skip", "25")
 
 
 @pytest.fixture
-def page(start_console, visit) -> Visit:
-    opened = visit(start_console(*FAST).url)
-    opened.wait_for_drones(len(PLACES))
-    opened.wait_for("all routes", lambda: opened.drawn("route-links") == 17)
-    return opened
+def page(page: Visit) -> Visit:
+    page.wait_for("all routes", lambda: page.drawn("route-links") == 17)
+    return page
 
 
 def drag(page: Visit, node: int, x: float, y: float) -> None:

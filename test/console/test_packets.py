@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import pytest
 from axe_playwright_python.sync_playwright import Axe
-from conftest import MOVING, Visit
+from conftest import MOVING, Visit, page_of
 
 HASTE = ("--skip", "5", "--haste", "5")
 SPACING_M = 6.0  # of the grid
@@ -43,11 +42,7 @@ def off_whole(value: float) -> float:
     return abs(value - round(value))
 
 
-@pytest.fixture
-def page(start_console, visit) -> Visit:
-    opened = visit(start_console(*HASTE).url, **MOVING)
-    opened.wait_for_drones(18)
-    return opened
+page = page_of(*HASTE, **MOVING)
 
 
 def test_packets_run_along_links_in_the_colours_of_the_legend(page):

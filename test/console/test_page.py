@@ -20,13 +20,6 @@ FAST = ("--skip", "25")
 FAR_FROM_17 = (3.0, 3.0)  # a flight of eleven seconds: a slow page sees it, too
 
 
-@pytest.fixture
-def page(start_console, visit) -> Visit:
-    opened = visit(start_console(*FAST).url)
-    opened.wait_for_drones(len(PLACES))
-    return opened
-
-
 def on_screen(page: Visit, x: float, y: float) -> tuple[float, float]:
     """Where a place of the world is on the screen."""
     box = page.page.locator("#map").bounding_box()

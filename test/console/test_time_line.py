@@ -5,17 +5,13 @@ from __future__ import annotations
 import math
 
 import pytest
-from conftest import MOVING, Visit
+from conftest import MOVING, Visit, page_of
 
 HASTE = ("--skip", "5", "--haste", "5")
 ORDERS = ("#power", "#fly-form", "#pause", "#layout-form", "#demonstrate", "#add", "#remove")
 
 
-@pytest.fixture
-def page(start_console, visit) -> Visit:
-    opened = visit(start_console(*HASTE).url)
-    opened.wait_for_drones(18)
-    return opened
+page = page_of(*HASTE)
 
 
 def clock_s(page: Visit) -> float:
