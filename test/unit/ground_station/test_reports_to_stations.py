@@ -71,8 +71,11 @@ def test_signs_of_life_end_with_the_proof_of_it():
 
 
 def test_without_an_origin_places_are_those_of_the_common_frame():
-    place = told(fleet(drone(3), origin=None))[3, "LOCAL_POSITION_NED"]
+    messages = told(fleet(drone(3), origin=None), second=2)
+    place = messages[3, "LOCAL_POSITION_NED"]
     assert (place.x, place.y, place.z) == (HERE.latitude, HERE.longitude, -HERE.height)
+    assert (3, "SYS_STATUS") in messages  # of that second
+    assert (3, "HOME_POSITION") not in messages
 
 
 def test_what_a_node_did_not_report_is_not_told():

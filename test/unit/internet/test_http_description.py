@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import re
 from html.parser import HTMLParser
+from pathlib import Path
+
+PAGE = Path(__file__).resolve().parents[3] / "docs" / "raspberry-pi.md"
 
 
 class Links(HTMLParser):
@@ -45,3 +48,14 @@ def test_the_description_names_all_operations_and_what_may_come_back(mesh):
             always | {"409", "422"}
         ),
     }
+
+
+def test_the_page_of_the_pi_lists_each_status_of_a_refusal(mesh):
+    text = PAGE.read_text(encoding="utf-8")
+    table = text.partition("| status | reason |\n|---|---|\n")[2].partition("\n\n")[0]
+    rows = [row.split("|")[1] for row in table.splitlines()]
+    listed = {int(status) for row in rows for status in row.split(",")}
+    paths = mesh.client.get("/openapi.json").json()["paths"].values()
+    operations = [operation for path in paths for operation in path.values()]
+    described = {int(status) for operation in operations for status in operation["responses"]}
+    assert listed == described - {200} | {405}
