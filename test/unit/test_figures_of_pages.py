@@ -43,7 +43,7 @@ from drone_mesh.state.condition import SILENT_AFTER_S
 from drone_mesh.state.links import JUST_LOST_S, SOON_S
 from drone_mesh.state.packets import MOST_SAMPLED
 from drone_mesh.web.access import FREE_GUESSES, GUESS_PERIOD_S
-from drone_mesh.world.dynamic_engine import BodyLimits
+from drone_mesh.world.body import BodyLimits
 
 ROOT = Path(__file__).resolve().parents[2]
 WORDS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
