@@ -110,8 +110,11 @@ class Timeline:
             self._seen.setdefault("all connected", sample.now_s)
             if self.first_disruption_s is not None and sample.now_s > self.first_disruption_s:
                 self._seen.setdefault("healed", sample.now_s)
+        died = {(item.at_s, node) for item in self.happened for node in item.nodes}
         for event in self._network.events[self._events_read :]:
-            if event.kind in _FIRST:
+            # A drone that is switched off loses its own connection at that moment: no such loss.
+            is_death = (event.now_s, event.node) in died
+            if event.kind in _FIRST and not is_death:
                 self._seen.setdefault(_FIRST[event.kind], event.now_s)
         self._events_read = len(self._network.events)
 

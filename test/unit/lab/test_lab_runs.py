@@ -415,6 +415,18 @@ def test_a_condition_starts_a_fault(when: str, at_s: float) -> None:
     assert time == pytest.approx(at_s, abs=0.5)
 
 
+@pytest.mark.parametrize(("victim", "others_lose"), [(4, False), (2, True)])
+def test_the_first_loss_is_not_that_of_the_drone_that_was_killed(
+    victim: int, others_lose: bool
+) -> None:
+    then = {"when": "the first loss", "wind": {"speed_factor": 0.5}}
+    winds = [
+        at_s for at_s, what, _ in happened(run(faults=[kill(ids=[victim]), then])) if what == "wind"
+    ]
+    assert len(winds) == others_lose
+    assert all(at_s > 21.0 for at_s in winds)
+
+
 def test_the_shared_channel_counts_its_airtime() -> None:
     layout = {"kind": "grid", "drones": 9}
     measured = measure_all(run(layout=layout, radio={"kind": "shared", "rate": "1M"}))
