@@ -41,6 +41,7 @@ from drone_mesh.users.desk import UsersDesk
 QOS = 1  # at least once
 KEEP_ALIVE_S = 15  # time until a broken connection is noticed and the last will is sent
 MOST_WAITING = 10_000  # messages for an absent broker; then new ones are dropped
+MOST_EVENTS = 1000  # likewise, besides the messages
 STATE_PERIOD_S = 5.0
 RETRY_S = 0.5  # pause after the mesh's queue was full
 RETAINED = "retained messages are not sent: each new connection would send them again"
@@ -104,6 +105,7 @@ class MqttInternet(IInternetConnection):
         # Messages whose acknowledgement the broker has not received, by packet id. Under the lock.
         self._unacknowledged: dict[int, _Unacknowledged] = {}
         self._dropped = 0
+        self._events_waiting = 0
         self._client_id = f"drone_mesh-{broker.mesh}-{self._node}"
         self._client = mqtt.Client(
             CallbackAPIVersion.VERSION2,
@@ -111,7 +113,7 @@ class MqttInternet(IInternetConnection):
             clean_session=False,  # the broker keeps messages while this program is offline
             manual_ack=True,
         )
-        self._client.max_queued_messages_set(MOST_WAITING)
+        self._client.max_queued_messages_set(MOST_WAITING + MOST_EVENTS)
         self._client.reconnect_delay_set(*_DELAYS_S)
         if broker.user:
             self._client.username_pw_set(broker.user, broker.password or None)
@@ -279,6 +281,9 @@ class MqttInternet(IInternetConnection):
                 self._unacknowledged.pop(message.mid, None)
 
     def _say(self, node: str, event: dict[str, Any]) -> None:
+        self._events_waiting = 0 if self._client.is_connected() else self._events_waiting + 1
+        if self._events_waiting > MOST_EVENTS:
+            return
         self._client.publish(self._topics.event(node), json.dumps(event), QOS)
 
     # The connection ----------------------------------------------------------------------------

@@ -24,7 +24,7 @@ from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.execution import MeshExecutor
 from drone_mesh.inprocess import Network
-from drone_mesh.internet.mqtt_internet import MqttInternet
+from drone_mesh.internet.mqtt_internet import MOST_EVENTS, MOST_WAITING, MqttInternet
 from drone_mesh.internet.mqtt_topics import Broker
 from drone_mesh.users.desk import UsersDesk
 
@@ -555,6 +555,19 @@ def test_nothing_acknowledged_is_lost_when_the_broker_is_killed_in_mid_transfer(
         received.add(client.next(is_topic("1/rx")).payload)
     assert received == {b"up %d" % number for number in range(20)}
     gateway.wait_for_all_at_node_1({b"down %d" % number for number in range(10)})
+
+
+def test_events_take_no_room_from_messages_while_the_broker_is_away(broker, gateway, client):
+    broker.stop()
+    for second in range(MOST_WAITING + MOST_EVENTS):
+        lost = MeshEvent(MeshEventKind.NEIGHBOUR_LOST, 1, float(second), peer=2)
+        gateway.internet.observe(lost)
+    gateway.from_node_1(b"21.5")
+    data = gateway.network.nodes[0].component.data
+    gateway.wait_for("the message", lambda: data.figures().messages_received == 1)
+    broker.start()
+    assert client.next(is_topic("1/event")).payload
+    assert client.next(is_topic("1/rx")).payload == b"21.5"
 
 
 def test_nothing_is_lost_while_the_broker_is_away(broker, gateway, client, caplog):
