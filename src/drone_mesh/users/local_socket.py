@@ -66,7 +66,8 @@ class LocalSocket:
             self._server.shutdown()
             self._thread.join()
         self._server.server_close()
-        with contextlib.suppress(FileNotFoundError):
+        # It may be gone, or the folder be another user's now; what is left is taken for unserved.
+        with contextlib.suppress(OSError):
             self.path.unlink()
 
 

@@ -10,12 +10,13 @@ import socket
 import sys
 import threading
 import time
+from pathlib import Path
 
 import pytest
 
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.users import commands, local_socket
-from drone_mesh.users.local_client import LocalClient, socket_path
+from drone_mesh.users.local_client import LocalClient, is_served, socket_path
 from drone_mesh.users.local_socket import LocalSocket, warn_of_unreachable
 
 
@@ -185,6 +186,19 @@ def test_one_line_names_all_nodes_that_the_commands_cannot_reach(caplog):
     warn_of_unreachable({4: "socket four"})
     what = "mesh_ping, mesh_send and the other commands cannot reach"
     assert caplog.messages == [f"{what} nodes 0..2: socket zero", f"{what} node 4: socket four"]
+
+
+def test_a_node_ends_also_if_its_socket_cannot_be_removed(rig, tmp_path, monkeypatch):
+    """As if systemd has given the folder to the service of a second node on this Pi."""
+
+    def refuse(_path):
+        raise PermissionError(13, "Permission denied")
+
+    served = LocalSocket(rig.desks[0], tmp_path / "node-9.sock")
+    served.start()
+    monkeypatch.setattr(Path, "unlink", refuse)
+    served.stop()
+    assert not is_served(tmp_path / "node-9.sock")
 
 
 def test_a_socket_that_a_dead_program_left_is_replaced(rig, tmp_path):
