@@ -280,6 +280,7 @@ def test_a_jammed_circle_loses_packets_only_while_it_is_jammed() -> None:
     assert simulation.impairments.lost > 0
     assert not simulation.impairments.jams
     assert record.samples[-1].share == 1.0
+    assert measure_all(record)["split"] == 0.0  # no link is missing
 
 
 def test_a_battery_ends_after_its_metres_or_its_minutes() -> None:
