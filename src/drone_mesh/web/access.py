@@ -50,9 +50,14 @@ class Allowance:
 
 
 def client_of(address: str) -> str:
-    """The client of an address: the address itself, of IPv6 its whole /64."""
+    """The client of an address: the address itself, of IPv6 its whole /64.
+
+    On a socket for both protocols, an IPv4 address comes as one of IPv6: all in a single /64.
+    """
     parsed = numeric_address(address)
-    return str(int(parsed) >> 64) if isinstance(parsed, ipaddress.IPv6Address) else address
+    if not isinstance(parsed, ipaddress.IPv6Address):
+        return address
+    return str(parsed.ipv4_mapped or int(parsed) >> 64)
 
 
 def numeric_address(text: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:

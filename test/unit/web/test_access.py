@@ -117,3 +117,15 @@ def test_a_token_that_can_be_guessed_is_refused():
 
 def test_this_machine_itself_needs_no_token():
     assert access_for("127.0.0.1", "").token is None
+
+
+def test_on_a_socket_for_both_protocols_each_ipv4_client_has_guesses_of_its_own():
+    access = Access(TOKEN)
+    for _ in range(FREE_GUESSES):
+        assert not access.is_right("wrong", "::ffff:192.0.2.1")
+    with pytest.raises(TooManyGuesses):
+        access.is_right(TOKEN, "::ffff:192.0.2.1")
+    assert access.is_right(TOKEN, "::ffff:198.51.100.7")
+    assert access.is_right(TOKEN, "::1")
+    with pytest.raises(TooManyGuesses):
+        access.is_right(TOKEN, "192.0.2.1")
