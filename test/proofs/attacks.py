@@ -46,11 +46,13 @@ def order_gateway_away(stranger: Stranger) -> None:
 
 
 def order_all_away(stranger: Stranger) -> None:
-    """Send an order to fly to each drone, far ones first."""
+    """Send an order to fly to each drone, far ones first, then one to all in range."""
     near = stranger.in_range()
     for node in sorted(stranger.network.nodes, reverse=True):
         _order(stranger, node if node in near else near[-1], node)
         stranger.network.run_for(0.1)
+    for node in near:
+        _order(stranger, node, BROADCAST)
     stranger.network.run_for(ATTACK_S)
 
 
@@ -65,7 +67,8 @@ def false_gateway(stranger: Stranger) -> None:
 
     stranger.on_packet = answer
     for node in stranger.targets(1.0, ATTACK_S):
-        stranger.say(MessageType.HEARTBEAT, me, node, node, bytes((1, me, 0)))
+        for addressee in (node, BROADCAST):
+            stranger.say(MessageType.HEARTBEAT, me, node, addressee, bytes((1, me, 0)))
 
 
 def black_hole(stranger: Stranger) -> None:

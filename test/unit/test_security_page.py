@@ -252,8 +252,8 @@ LAYOUT = [
     f"| reports 64..124, for one node | 5..{_PLACE.at - 1} | {_proof(_PLACE)} | |",
     f"| ACK ({data.ACK:d}) | 5..{seal.SEAL_AT - message_seal.ACK_TAG_BYTES - 1} | tag "
     f"{_range(seal.SEAL_AT - message_seal.ACK_TAG_BYTES, message_seal.ACK_TAG_BYTES)} | |",
-    f"| MOVEMENT_NEGOTIATION, MISSING, broadcast LOCATION and LAST_PLACE, techniques' own types, "
-    f"other packets of users' data | 5..{seal.SEAL_AT - 1} | none | |",
+    f"| MOVEMENT_NEGOTIATION, MISSING, broadcast LOCATION, NODE_SEARCH and LAST_PLACE, "
+    f"techniques' own types, other packets of users' data | 5..{seal.SEAL_AT - 1} | none | |",
 ]
 
 

@@ -56,6 +56,10 @@ _MISSING = int(MessageType.MISSING)
 _ORDER = int(MessageType.MOVE_TO_LOCATION)
 _PLACES = (int(MessageType.LOCATION), int(MessageType.GATEWAY_PLACE))
 _REPORTS = range(64, 125)  # 125..127 are sent only in a mesh with a key
+# Of the types with a proof those that nodes also tell all in range, where nothing proves them.
+_ALSO_TO_ALL = frozenset(
+    map(int, (MessageType.LOCATION, MessageType.NODE_SEARCH, MessageType.LAST_PLACE))
+)
 
 # As in seal.py: each takes the whole packet but keeps only its first bytes.
 _with_nonce = struct.Struct(f"<{_NONCE_AT}sI{PAYLOAD_BYTES - _NONCE_AT - _NONCE_BYTES}x").pack
@@ -263,10 +267,12 @@ class EndToEnd:
             self._heard[creator] = _nonce_of(payload)[0]
             return _without_nonce(payload)
         for_one = payload[FORWARD_AT] <= MAX_NODE_ID and creator <= MAX_NODE_ID
-        if kind == _HEARTBEAT:
-            self._open_heartbeat(payload, creator, for_one)
-            return _without_nonce(payload)
         form = _FORMS.get(kind)
+        if form is not None and not for_one and kind not in _ALSO_TO_ALL:
+            raise _unproven(kind)  # any captured node has the key of broadcasts
+        if kind == _HEARTBEAT:
+            self._open_heartbeat(payload, creator)
+            return _without_nonce(payload)
         if form is not None and for_one:
             self._check(payload, form)
             return form.without_proof(payload)
@@ -276,23 +282,22 @@ class EndToEnd:
             raise NotProven("a relayed MISSING")  # only sent to gateways, about orders
         return payload
 
-    def _open_heartbeat(self, payload: bytes, creator: int, for_one: bool) -> None:
+    def _open_heartbeat(self, payload: bytes, creator: int) -> None:
         """Learn the nonce. Raises NotProven if it claims to be a gateway's and is not."""
         nonce = _nonce_of(payload)[0]
         form = self._form(payload)
         assert form is not None, "heartbeats have a form"
-        if for_one:
-            try:
-                self._check(payload, form)
-            except NotProven:
-                if form is not _OF_ROUTER:
-                    raise
-            else:
-                self._proved[creator] = nonce
-                self._ways[creator] = payload[FROM_AT]
-                self._orders[creator] = 0
-                if form is not _OF_ROUTER:
-                    self._gateways.add(creator)
+        try:
+            self._check(payload, form)
+        except NotProven:
+            if form is not _OF_ROUTER:
+                raise
+        else:
+            self._proved[creator] = nonce
+            self._ways[creator] = payload[FROM_AT]
+            self._orders[creator] = 0
+            if form is not _OF_ROUTER:
+                self._gateways.add(creator)
         self._heard[creator] = nonce
 
     def _check(self, payload: bytes, form: _Form) -> None:
@@ -313,10 +318,7 @@ class EndToEnd:
                 return
         if any(compare_digest(_tag(state, old, sequence, what), tag) for old in self._expired):
             raise Expired("a packet that came late")
-        kind = payload[TYPE_AT]
-        if kind == _HEARTBEAT:
-            raise NotProven("a heartbeat without the proof of a gateway")
-        raise NotProven("an order without proof" if kind == _ORDER else "a packet without proof")
+        raise _unproven(payload[TYPE_AT])
 
     # Both ------------------------------------------------------------------------------------
 
@@ -331,6 +333,12 @@ class EndToEnd:
         state = hashlib.blake2s(key=key, digest_size=form.tag_bytes, person=b"end2end")
         self._states[form][node] = state
         return state
+
+
+def _unproven(kind: int) -> NotProven:
+    if kind == _HEARTBEAT:
+        return NotProven("a heartbeat without the proof of a gateway")
+    return NotProven("an order without proof" if kind == _ORDER else "a packet without proof")
 
 
 def _what(payload: bytes, form: _Form) -> bytes:

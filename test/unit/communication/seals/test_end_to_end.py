@@ -235,3 +235,30 @@ def test_a_restarted_drone_takes_the_second_try_of_an_order(pair):
     with pytest.raises(NotProven):
         restarted.open(relayed(gateway.seal(ORDER, 21.0)))
     assert restarted.open(relayed(gateway.seal(ORDER, 23.0)))
+
+
+@pytest.mark.parametrize(
+    "made",
+    [
+        packet("00 07 06 05 fe 00 00 80 3f 00 00 00 40 03 00 2a 00"),  # an order to fly
+        packet("07 07 04 05 fe 01 07 00"),  # a heartbeat of "gateway" 7
+        packet("03 07 40 05 fe 2a 00 03 00"),  # a reply: drone 3 has arrived
+        packet("00 07 41 05 fe 2a 00"),  # a question for an order
+        packet("03 07 42 05 fe 04 01 00 00 00 00 00 00 00 05 02 0a"),  # a report: battery 5 %
+        packet("03 07 43 05 fe 00"),  # and its words
+        packet("07 07 7d 05 fe 01 00 00 00 00 80 3f 00 00 00 40 03 00"),  # place of a gateway
+    ],
+    ids=["order", "heartbeat", "reply", "query", "report", "words", "gateway's place"],
+)
+def test_what_needs_a_proof_is_not_accepted_as_a_broadcast_which_has_none(pair, made):
+    """Any captured node has the key of broadcasts."""
+    _, drone = pair
+    with pytest.raises(NotProven, match="without (the )?proof"):
+        drone.open(made)
+
+
+@pytest.mark.parametrize("kind", ["01", "44", "45"], ids=["place", "search", "last place"])
+def test_what_nodes_tell_all_their_neighbours_needs_no_proof(pair, kind):
+    _, drone = pair
+    made = packet(f"03 07 {kind} 05 fe 00 00 80 3f 00 00 00 40 03 00")
+    assert drone.open(made) == made
