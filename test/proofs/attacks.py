@@ -93,7 +93,7 @@ def missing_storm(stranger: Stranger) -> None:
     for node in stranger.targets(1.0, ATTACK_S):
         for creator in stranger.network.nodes:
             if creator != node:
-                stranger.say(MessageType.MISSING, creator, node, node, bytes((0,)))
+                stranger.say(MessageType.MISSING, creator, node, BROADCAST, bytes((0,)))
 
 
 def invented_ids(stranger: Stranger) -> None:
@@ -202,6 +202,7 @@ ATTACKS: Mapping[str, Attack] = {
     "packets in receivers' own names": claims.own_names,
     "nonces in drones' names": claims.claimed_nonces,
     "false departures": claims.false_departures,
+    "resignations in the gateway's name": claims.resigned_gateway,
     "beacons of a black hole": claims.beacon_black_hole,
     "beacons with numbers ahead": claims.beacons_ahead,
     "beacons that list all drones": claims.beacons_of_all,

@@ -176,6 +176,19 @@ def wormhole(stranger: Stranger) -> None:
     air.carries = None
 
 
+def resigned_gateway(stranger: Stranger) -> None:
+    """Say once a second, in the gateway's name, that it has no internet, to every node."""
+    near = stranger.in_range()
+    for _ in stranger.every(1.0, CLAIMING_S):
+        for node in stranger.network.nodes:
+            if node:
+                to = node if node in near else near[-1]
+                stranger.say(MessageType.HEARTBEAT, 0, to, node, bytes((0, NO_ROUTE, 0)))
+        for node in near:
+            if node:
+                stranger.say(MessageType.PRESENT, 0, node, BROADCAST, bytes((NO_ROUTE, 0)))
+
+
 def false_departures(stranger: Stranger) -> None:
     """Say once a second, in the name of each neighbour, that it is about to fly far away."""
     for _ in stranger.every(1.0, CLAIMING_S):

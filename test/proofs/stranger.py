@@ -146,14 +146,27 @@ class Stranger(IMeshNetwork):
     ) -> None:
         """Hand the neighbour `to` a packet of `creator` that `relay` (default: it) seems to send.
 
-        A captured node cannot pose as another sender: it has no key for that, and is the relay.
+        A captured node can pose as another sender in a broadcast only. Otherwise it has no key for
+        that, and is the relay.
         """
-        if self._is_inside and not self.mute:
+        sender = creator if relay is None else relay
+        if self._is_inside and forward == BROADCAST and sender in self.network.nodes:
+            claim = messages.packet(kind, creator, sender, to, forward, body)
+            self.play(to, self._sealed_as(sender, claim))
+        elif self._is_inside and not self.mute:
             packet = messages.packet(kind, creator, self.node_id, to, forward, body)
             self.antenna.send_message_to(packet)
         else:
-            sender = creator if relay is None else relay
             self.play(to, messages.packet(kind, creator, sender, to, forward, body))
+
+    def _sealed_as(self, node: int, payload: bytes) -> bytes:
+        """A broadcast with the next count of this node, whose epoch and counts it has heard."""
+        receiver = self.network.nodes[node].receiver
+        while isinstance(receiver, Tap):
+            receiver = receiver.tapped
+        assert isinstance(receiver, SealedAntenna)
+        seal = receiver._seal
+        return self.sealed_to_all(payload, seal._epoch, seal._count + 1)
 
     def epochs(self) -> dict[int, tuple[int, int]]:
         """Epoch and counter of the nodes whose answers to challenges it has recorded."""

@@ -123,6 +123,13 @@ def test_a_relay_that_forwards_heartbeats_only_is_avoided_in_a_mesh_with_a_key()
     assert captured.later == 0.0
 
 
+def test_in_a_mesh_with_a_key_only_the_gateway_itself_says_that_it_has_no_internet():
+    """A captured node kept 86 % of the mesh unconnected while nothing proved it."""
+    name = "resignations in the gateway's name"
+    assert outcome(name, Threat.WITHOUT_KEY).cut_off > 0.5
+    assert outcome(name, Threat.CAPTURED).cut_off < 0.15
+
+
 @pytest.mark.parametrize("name", ["bids of 1e9", "bids of 100 m"])
 def test_the_bids_of_a_captured_node_delay_a_repair_and_do_not_prevent_it(name):
     attacked = outcome(name, Threat.CAPTURED)

@@ -236,7 +236,10 @@ class GatewayConnection:
     def on_present(self, neighbour: int, hops: int, know_gateway: bool) -> bool:
         """A neighbour introduced itself. Returns whether to send it a heartbeat."""
         if neighbour == self.gateway and hops != 0:
-            self.gateway_resigned()
+            if not self._has_key:
+                self.gateway_resigned()
+            elif self._states.connected:  # any node with the key can say so: its answer proves it
+                self.send_heartbeat()
         if know_gateway and hops and self.passes_by_leaving(neighbour):
             return False
         if know_gateway and hops <= self.hops:

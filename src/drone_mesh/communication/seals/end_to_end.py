@@ -184,7 +184,7 @@ class EndToEnd:
                 self._nonces.appendleft(_Nonce(self._rng.getrandbits(32)))
                 self._changed_s = now_s
             payload = _with_nonce(payload, self._nonces[0].value)
-            if gateway != self._node_id and forward != gateway:
+            if not (is_gateway or forward == gateway or self._is_gateway):
                 return payload
         elif kind == _REQUEST:
             return _with_nonce(payload, self._nonces[0].value)
@@ -283,14 +283,17 @@ class EndToEnd:
         return payload
 
     def _open_heartbeat(self, payload: bytes, creator: int) -> None:
-        """Learn the nonce. Raises NotProven if it claims to be a gateway's and is not."""
+        """Learn the nonce. Raises NotProven if it claims to be a gateway's and is not.
+
+        So does one in the name of a gateway, which says to a router that it is none now.
+        """
         nonce = _nonce_of(payload)[0]
         form = self._form(payload)
         assert form is not None, "heartbeats have a form"
         try:
             self._check(payload, form)
         except NotProven:
-            if form is not _OF_ROUTER:
+            if form is not _OF_ROUTER or (creator in self._gateways and not self._is_gateway):
                 raise
         else:
             self._proved[creator] = nonce

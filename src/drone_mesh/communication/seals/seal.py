@@ -158,9 +158,7 @@ class HopSeal:
         window, count = _place(payload, peer)
         if not _is_authentic(payload, peer, count):
             return None
-        if now_s >= window.turn_s:
-            window.turn(now_s)
-        if not window.use(count):
+        if window.is_old(count, now_s) or not window.use(count):
             return None
         peer.heard_s = now_s
         return _unsealed(payload)

@@ -262,3 +262,32 @@ def test_what_nodes_tell_all_their_neighbours_needs_no_proof(pair, kind):
     _, drone = pair
     made = packet(f"03 07 {kind} 05 fe 00 00 80 3f 00 00 00 40 03 00")
     assert drone.open(made) == made
+
+
+RESIGNS = packet("00 00 04 01 05 00 ff 00")  # heartbeat of gateway 0, which is none now
+
+
+def test_a_captured_node_cannot_say_in_a_gateways_name_that_it_is_none_now(pair):
+    gateway, drone = pair
+    beats(gateway, drone, 0.0)
+    captured = end(7, KEY.for_node(7))
+    captured.open(drone.seal(PRESENT, 0.0))
+    with pytest.raises(NotProven, match="without the proof of a gateway"):
+        drone.open(captured.seal(RESIGNS, 1.0))
+
+
+def test_a_gateway_proves_to_those_that_know_it_that_it_is_none_now(pair):
+    gateway, drone = pair
+    beats(gateway, drone, 0.0)
+    assert drone.open(gateway.seal(RESIGNS, 1.0)) == RESIGNS
+
+
+def test_a_gateway_believes_another_one_that_is_none_now_without_a_proof():
+    """It may have been restarted, and needs an answer to know the nonce for one."""
+    gateway, other = end(1), end(0)
+    other.open(gateway.seal(packet("01 01 03 fe fe 00 01"), 0.0))
+    gateway.seal(packet("01 01 04 00 00 01 01 00"), 0.0)  # it acts as a gateway
+    gateway.open(other.seal(packet("00 00 04 01 01 01 00 00"), 0.0))
+    restarted = end(0, seed=1)
+    beat = packet("00 00 04 01 01 00 01 00")
+    assert gateway.open(restarted.seal(beat, 1.0)) == beat

@@ -131,6 +131,19 @@ def test_a_withheld_packet_is_worthless_after_a_silence(link):
     assert receiver.open(kept, FRESH_S + 0.1) is None
 
 
+@pytest.mark.parametrize("made", [HEARTBEAT, PRESENT], ids=["to one", "to all"])
+def test_a_withheld_packet_is_worthless_twenty_seconds_after_a_later_one(link, made):
+    """Somebody may jam one packet and let the others of its sender pass."""
+    receiver, sender = link
+    kept, slow = sender.seal(made), sender.seal(made)
+    assert receiver.open(sender.seal(made), 5.0) is not None
+    assert receiver.open(slow, 14.9) is not None  # it waited in a queue
+    for now_s in (15.0, 25.0):
+        assert receiver.open(sender.seal(made), now_s) is not None
+    assert receiver.open(kept, 25.0) is None
+    assert receiver.why_not(kept, 25.0) is NotOpened.REPLAYED
+
+
 def test_a_node_is_not_challenged_again_at_once():
     receiver = node(1)
     assert receiver.challenge(5, 0.0) is not None
