@@ -155,9 +155,12 @@ def _bid(stranger: Stranger, score: float) -> None:
     stranger.network.power(1, False)
     body = MovementNegotiationMessage.BODY.pack(score)
     for bid, _ in enumerate(stranger.every(3.0, BIDDING_S)):
-        for node in stranger.in_range():
-            absent = 100 + bid % 100
+        absent, near = 100 + bid % 100, stranger.in_range()
+        for place, node in enumerate(near):
             stranger.say(MessageType.MOVEMENT_NEGOTIATION, absent, node, node, body)
+            # Of who brings too many winners that do not fly: now in a neighbour's name.
+            relay = near[place - 1]
+            stranger.say(MessageType.MOVEMENT_NEGOTIATION, absent, node, BROADCAST, body, relay)
 
 
 def replayed_order(stranger: Stranger) -> None:

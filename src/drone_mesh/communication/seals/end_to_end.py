@@ -54,6 +54,7 @@ _REQUEST = int(MessageType.REQUESTLOCATION)
 _PRESENT = int(MessageType.PRESENT)
 _MISSING = int(MessageType.MISSING)
 _ORDER = int(MessageType.MOVE_TO_LOCATION)
+_BID = int(MessageType.MOVEMENT_NEGOTIATION)
 _PLACES = (int(MessageType.LOCATION), int(MessageType.GATEWAY_PLACE))
 _REPORTS = range(64, 125)  # 125..127 are sent only in a mesh with a key
 # Of the types with a proof those that nodes also tell all in range, where nothing proves them.
@@ -268,8 +269,9 @@ class EndToEnd:
             return _without_nonce(payload)
         for_one = payload[FORWARD_AT] <= MAX_NODE_ID and creator <= MAX_NODE_ID
         form = _FORMS.get(kind)
-        if form is not None and not for_one and kind not in _ALSO_TO_ALL:
-            raise _unproven(kind)  # any captured node has the key of broadcasts
+        # Any captured node has the key of broadcasts. A bid has no proof, but who brings it counts.
+        if (form or kind == _BID) and not for_one and kind not in _ALSO_TO_ALL:
+            raise _unproven(kind)
         if kind == _HEARTBEAT:
             self._open_heartbeat(payload, creator)
             return _without_nonce(payload)

@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 from rig import FROM_0, AlwaysHalf, Rig, packet
 
+from drone_mesh.communication.interfaces import NO_SEALS, IMeshSeals
 from drone_mesh.communication.routing.techniques.etx_tree import EtxTree
 from drone_mesh.communication.timing import QUEUED, Medium, MeshTiming
 from drone_mesh.drone.location import Location
@@ -32,6 +33,29 @@ def distant_rig(*heard):
     rig.connect_through(2, hops=4)
     rig.hear(*heard)
     return rig
+
+
+class WithKey(IMeshSeals):
+    has_key = True
+
+
+GATEWAY_IS_NONE = "00 00 03 01 fe ff 00"  # its PRESENT, with 255 hops and no gateway
+
+
+@pytest.mark.parametrize(
+    ("seals", "connected", "asked"),
+    [(NO_SEALS, False, []), (WithKey(), True, [packet("01 01 04 00 00 01 00 00")])],
+    ids=["no key", "key"],
+)
+def test_with_a_key_a_gateway_is_asked_whether_it_is_none_now(seals, connected, asked):
+    """Any captured node can broadcast in its name."""
+    rig = Rig(seals=seals)
+    rig.connect_to_gateway()
+    rig.wait(1.0)
+    rig.forget()
+    rig.hear(GATEWAY_IS_NONE)
+    assert rig.mesh.get_connected_to_gateway() is connected
+    assert rig.sent(HEARTBEAT) == asked
 
 
 # Becoming connected --------------------------------------------------------------------------

@@ -247,8 +247,9 @@ def test_a_restarted_drone_takes_the_second_try_of_an_order(pair):
         packet("03 07 42 05 fe 04 01 00 00 00 00 00 00 00 05 02 0a"),  # a report: battery 5 %
         packet("03 07 43 05 fe 00"),  # and its words
         packet("07 07 7d 05 fe 01 00 00 00 00 80 3f 00 00 00 40 03 00"),  # place of a gateway
+        packet("07 03 07 05 fe 00 00 c8 42"),  # a bid, for which neighbour 3 would answer
     ],
-    ids=["order", "heartbeat", "reply", "query", "report", "words", "gateway's place"],
+    ids=["order", "heartbeat", "reply", "query", "report", "words", "gateway's place", "bid"],
 )
 def test_what_needs_a_proof_is_not_accepted_as_a_broadcast_which_has_none(pair, made):
     """Any captured node has the key of broadcasts."""
