@@ -79,7 +79,6 @@ class Stranger(IMeshNetwork):
         self.mute = False  # True: it does nothing
         self.record: list[RecordedPacket] = []
         self.swallows: set[int] = set()  # nodes that drop packets for other nodes
-        self._claimed: dict[int, tuple[int, int]] = {}  # by node: epoch and last count in its name
         self.ordered: dict[int, Location] = {}  # where the owner sent drones during the attack
         self.on_packet: Callable[[bytes], object] = len  # called with packets to its own address
         self.drone = InProcessDrone(
@@ -161,16 +160,16 @@ class Stranger(IMeshNetwork):
             self.play(to, messages.packet(kind, creator, sender, to, forward, body))
 
     def _sealed_as(self, node: int, payload: bytes) -> bytes:
-        """A broadcast with a count that this node has not used, whose epoch it has heard."""
+        """A broadcast with the next count of this node, whose epoch and counts it has heard.
+
+        So the node's own next one seems to have come before.
+        """
         receiver = self.network.nodes[node].receiver
         while isinstance(receiver, Tap):
             receiver = receiver.tapped
         assert isinstance(receiver, SealedAntenna)
         seal = receiver._seal
-        epoch, count = self._claimed.get(node, (0, 0))
-        count = 1 + (max(count, seal._count) if epoch == seal._epoch else seal._count)
-        self._claimed[node] = seal._epoch, count
-        return self.sealed_to_all(payload, seal._epoch, count)
+        return self.sealed_to_all(payload, seal._epoch, seal._count + 1)
 
     def epochs(self) -> dict[int, tuple[int, int]]:
         """Epoch and counter of the nodes whose answers to challenges it has recorded."""
