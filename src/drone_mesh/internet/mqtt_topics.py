@@ -16,7 +16,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from typing import NamedTuple
-from urllib.parse import urlsplit
+from urllib.parse import unquote, urlsplit
 
 from drone_mesh.arguments import is_up_to
 from drone_mesh.communication.data.outgoing import TO_ALL
@@ -44,7 +44,8 @@ class Broker:
     @property
     def url(self) -> str:
         """Address without user and password."""
-        return f"{'mqtts' if self.tls else 'mqtt'}://{self.host}:{self.port}"
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"{'mqtts' if self.tls else 'mqtt'}://{host}:{self.port}"
 
 
 def parse_broker(url: str, password: str = "") -> Broker:
@@ -73,7 +74,7 @@ def parse_broker(url: str, password: str = "") -> Broker:
         port or _PORTS[parts.scheme],
         parts.scheme == "mqtts",
         mesh,
-        parts.username or "",
+        unquote(parts.username or ""),
         password,
     )
 

@@ -10,6 +10,8 @@ from drone_mesh.internet.mqtt_topics import Broker, Destination, Topics, parse_b
         ("mqtt://broker/", Broker("broker", 1883, False, "mesh")),
         ("mqtt://broker:1884/field", Broker("broker", 1884, False, "field")),
         ("mqtts://me@10.0.0.1/", Broker("10.0.0.1", 8883, True, "mesh", "me", "secret")),
+        ("mqtt://a%3Ab%25@broker/", Broker("broker", 1883, False, "mesh", "a:b%", "secret")),
+        ("mqtt://a@b@broker/", Broker("broker", 1883, False, "mesh", "a@b", "secret")),
     ],
 )
 def test_an_address_names_the_broker(url, broker):
@@ -30,6 +32,10 @@ def test_an_address_names_the_broker(url, broker):
 def test_a_bad_address_is_refused_with_the_reason(url, password, why):
     with pytest.raises(ConfigurationError, match=why):
         parse_broker(url, password)
+
+
+def test_an_address_of_ipv6_is_written_as_it_is_given():
+    assert parse_broker("mqtt://[::1]:1884/field").url == "mqtt://[::1]:1884"
 
 
 def test_the_topics_of_a_node():
