@@ -38,11 +38,10 @@ def stands_beside(network, node, x, y):
     return 1.0 <= math.dist(horizontally(network, node), (x, y)) < 1.2
 
 
-def diamond(radio="disc", seed=0):
+def diamond(radio="disc"):
     """Gateway 0, router 3 behind routers 1 and 2, and router 4 behind it."""
-    network = placed(
-        [(0.0, 0.0), (5.0, 4.0), (5.0, -4.0), (10.0, 0.0), (18.0, 0.0)], seed=seed, radio=radio
-    )
+    places = [(0.0, 0.0), (5.0, 4.0), (5.0, -4.0), (10.0, 0.0), (18.0, 0.0)]
+    network = placed(places, seed=0, radio=radio)
     network.run_for(20.0)
     assert [network.hops(node) for node in range(1, 5)] == [1, 1, 2, 3]
     return network
