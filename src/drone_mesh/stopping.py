@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import functools
 import io
 import math
@@ -107,8 +108,9 @@ def ignored(*signals: signal.Signals) -> Iterator[None]:
 def ends_as(program: str, failed: int = 1) -> Callable[[Main], Main]:
     """Decorates `main` of a program, which returns its exit status.
 
-    A MeshError becomes one line, and the status `failed`. The program ends quietly on Ctrl-C, and
-    when the reader of its output has ended. During its imports, SIGINT may have ended it at once.
+    A MeshError or a full disk becomes one line, and the status `failed`. The program ends quietly
+    on Ctrl-C, and when the reader of its output has ended. During its imports, SIGINT may have
+    ended it at once.
     """
 
     def decorate(main: Main) -> Main:
@@ -130,10 +132,15 @@ def ends_as(program: str, failed: int = 1) -> Callable[[Main], Main]:
                 finally:
                     if out is not None:
                         out.flush()
-            except BrokenPipeError:
+            except OSError as error:
+                if out is None or error.errno not in (errno.EPIPE, errno.ENOSPC):
+                    raise
                 # Or else the interpreter would try once more to write what is left, and complain.
                 os.dup2(os.open(os.devnull, os.O_WRONLY), out.fileno())
-                return CLOSED_PIPE
+                if error.errno == errno.EPIPE:
+                    return CLOSED_PIPE
+                print(f"{program}: {error.strerror}", file=sys.stderr)
+                return failed
 
         return cast(Main, ending_main)
 

@@ -72,3 +72,16 @@ def test_what_a_terminal_cannot_show_is_written_as_its_number(tmp_path, encoding
     )
     assert (ended.returncode, ended.stderr) == (0, b"")
     assert ended.stdout == b"raspberry_key: new mesh key in %s/%s\n" % (os.fsencode(tmp_path), told)
+
+
+def test_a_full_disk_under_the_output_ends_a_program_with_one_line(tmp_path):
+    code = "from drone_mesh.raspberry.key_command import main; raise SystemExit(main())"
+    with open("/dev/full", "w") as full:
+        ended = subprocess.run(
+            [sys.executable, "-c", code, "new", tmp_path / "key"],
+            env={**os.environ, "PYTHONPATH": str(ROOT / "src")},
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+    assert (ended.returncode, ended.stderr) == (1, "raspberry_key: No space left on device\n")
