@@ -305,12 +305,12 @@ def test_two_gateways_with_one_client_id_do_not_throw_each_other_out_for_ever(
         other = mqtt.Client(CallbackAPIVersion.VERSION2, "drone_mesh-field-0")
         other.connect("127.0.0.1", broker.port)
         other.loop_start()
-        gateway.wait_for("it is out", lambda: not gateway.internet._client.is_connected())
+        wait_for("it is out", lambda: not gateway.internet._client.is_connected())
         other.disconnect()
         other.loop_stop()
 
     for _ in range(3):
-        gateway.wait_for("a connection", gateway.internet._client.is_connected)
+        wait_for("a connection", gateway.internet._client.is_connected)
         throws_it_out()
     time.sleep(4.0)
     assert not gateway.internet._client.is_connected()
@@ -433,18 +433,18 @@ def test_a_message_of_a_lost_session_does_not_acknowledge_the_one_that_has_its_n
 
     try:
         first = broker.connect(b"old")
-        gateway.wait_for("the old message", lambda: queued() == 1)
+        wait_for("the old message", lambda: queued() == 1)
         ends_s = now.now_s + LIFETIME_S
         run_until(now.now_s + 60.0)
         first.shutdown(socket.SHUT_RDWR)
         second = broker.connect(new)
-        gateway.wait_for("the new message", lambda: queued() == 2)
+        wait_for("the new message", lambda: queued() == 2)
         run_until(ends_s + 5.0)
-        gateway.wait_for("the end of the old one", lambda: queued() == 1)
+        wait_for("the end of the old one", lambda: queued() == 1)
         time.sleep(0.5)
         assert broker.acknowledged == 0
         run_until(ends_s + 80.0)
-        gateway.wait_for("the end of the new one", lambda: broker.acknowledged == 1)
+        wait_for("the end of the new one", lambda: broker.acknowledged == 1)
         second.close()
     finally:
         gateway.close()
@@ -564,7 +564,7 @@ def test_events_take_no_room_from_messages_while_the_broker_is_away(broker, gate
         gateway.internet.observe(lost)
     gateway.from_node_1(b"21.5")
     data = gateway.network.nodes[0].component.data
-    gateway.wait_for("the message", lambda: data.figures().messages_received == 1)
+    wait_for("the message", lambda: data.figures().messages_received == 1)
     broker.start()
     assert client.next(is_topic("1/event")).payload
     assert client.next(is_topic("1/rx")).payload == b"21.5"
