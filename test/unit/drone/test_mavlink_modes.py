@@ -11,8 +11,9 @@ from dataclasses import replace
 from typing import Any, Callable
 
 import pytest
-from mavlink_rig import ALL, ARDUPILOT, STEP_S, Rig, in_flight, lift
+from mavlink_rig import ALL, ARDUPILOT, ORIGIN, STEP_S, Rig, in_flight, lift
 from mavlink_vehicle.modes import Mode, mode_number
+from mavlink_vehicle.vehicle import MavlinkVehicle
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from drone_mesh.drone.location import Location
@@ -306,6 +307,28 @@ def test_a_disarmed_drone_is_given_back_by_choosing_guided_again() -> None:
     rig.vehicle.choose_mode(Mode.PILOT)
     rig.run(2.0)
     assert refuses(rig, rig.goal)
+    rig.vehicle.choose_mode(Mode.FOLLOW)
+    rig.run(2.0)
+    rig.goal(50.0, 0.0, 8.0)
+    rig.reach(Phase.HOLDING)
+
+
+@BOTH
+def test_the_mode_that_an_autopilot_restarts_in_is_its_pilots_as_is_one_that_others_chose(
+    autopilot: Autopilot,
+) -> None:
+    """The engine cannot tell them apart, and does not take a drone that is being handled."""
+    rig = in_flight(autopilot)
+    rig.goal(30.0, 0.0, 0.0, lands=True)
+    rig.reach(Phase.LANDING)
+    rig.reach(Phase.IDLE)
+    rig.run(10.0)
+    rig.up.broken = True
+    rig.run(5.0)
+    rig.up.broken = False
+    rig.vehicle = MavlinkVehicle(autopilot, ORIGIN, rig.up.send)
+    rig.ready()
+    assert "flown by its pilot" in rig.status().why_not_fly
     rig.vehicle.choose_mode(Mode.FOLLOW)
     rig.run(2.0)
     rig.goal(50.0, 0.0, 8.0)
