@@ -37,7 +37,7 @@ PAUSE_S = seal.CHALLENGE_AGAIN_S
 WORDS = ("no", "one", "two", "three")
 
 SENTENCES = [
-    f"came for three check periods ({antenna.FRESH_PERIODS * CHECK_S:.0f} s) nor "
+    f"came for six check periods ({antenna.FRESH_PERIODS * CHECK_S:.0f} s) nor "
     f"{2 * replay.LATELY_S:g} s after a later one",
     f"after {WORDS[election.WINNERS_WITHOUT_FLIGHT]} winners that do not fly",
     f"at most once in {complaints.COMPLAINT_PERIOD_S:g} s per kind",

@@ -94,9 +94,13 @@ def test_also_between_more_nodes(nodes, radio, technique):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("technique", ["child_table_tree", "beacon"])
-def test_also_between_a_hundred_nodes_on_a_shared_channel(technique):
-    network = scenarios.fleet(99, 10, 2, radio="shared", routing=technique)
+@pytest.mark.parametrize(
+    ("technique", "key", "seed"),
+    [("child_table_tree", None, 2), ("beacon", None, 2), ("child_table_tree", KEY, 10)],
+)
+def test_also_between_a_hundred_nodes_on_a_shared_channel(technique, key, seed):
+    """With a key a next hop may not have heard the sender since it chose another way up itself."""
+    network = scenarios.fleet(99, 10, seed, radio="shared", routing=technique, key=key)
     network.run_for(120.0)
     pairs = random.Random(3).sample(list(itertools.permutations(sorted(network.nodes), 2)), 300)
     delays = send_each(network, pairs, every_s=0.5)

@@ -35,7 +35,7 @@ TURNS = pytest.mark.xfail(strict=True, reason="handshakes take seconds, in which
         ("child_table_tree", None, 2),
         ("beacon", None, 2),
         ("child_table_tree", KEY, 4),
-        pytest.param("child_table_tree", KEY, 2, marks=TURNS),
+        pytest.param("child_table_tree", KEY, 6, marks=TURNS),
         ("beacon", KEY, 2),
     ],
 )

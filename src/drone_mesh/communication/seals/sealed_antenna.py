@@ -41,7 +41,10 @@ from drone_mesh.communication.wire import messages
 from drone_mesh.communication.wire.messages import CREATOR_AT, FORWARD_AT, TO_AT, TYPE_AT
 from drone_mesh.communication.wire.packet_types import MessageType
 
-FRESH_PERIODS = 3.0  # a neighbour sends something once per check period
+# A neighbour on this node's way up or down sends something once per check period. A former one, to
+# which routes may still lead, is silent for longer: a packet that begins with a handshake is easily
+# lost on a shared channel (docs/shared-channel.md).
+FRESH_PERIODS = 6.0
 FOREIGN_AFTER_S = 20.0  # two check periods; a restarted neighbour answers by then
 FORGOTTEN_S = 60.0  # then the counts start again
 LEAST_PACKETS = 3  # damage that a checksum does not show is rarer

@@ -324,10 +324,10 @@ def test_a_neighbour_that_has_answered_gets_the_same_time_again_before_it_is_nam
     layer.on_msg(without_seal, 0.0)
     (challenge,) = rig.antenna.taken
     layer.on_msg(HopSeal(7, KEY, random.Random(7), 30.0).answer(challenge, 0.0), 0.0)
-    for now_s in (40.0, 41.0, 42.0, 59.9):
+    for now_s in (70.0, 71.0, 72.0, 89.9):
         layer.on_msg(without_seal, now_s)
         assert not layer.complaints.counts
-    layer.on_msg(without_seal, 60.0)
+    layer.on_msg(without_seal, 90.0)
     assert "node 7, sends packets without a seal" in next(iter(layer.complaints.counts))
 
 
@@ -421,12 +421,12 @@ def test_another_radio_with_this_nodes_id_and_no_key_is_named_and_challenged_by_
 
 
 @pytest.mark.parametrize("radio", ["disc", "shared"])
-def test_a_message_arrives_over_a_neighbour_that_was_silent_for_three_check_periods(radio):
+def test_a_message_arrives_over_a_neighbour_that_was_silent_for_six_check_periods(radio):
     """It acknowledges the packet, but has to ask for the epoch before it can open another one."""
     network = line(3, node_keys, radio)
     network.run_for(60.0)
     relay = network.nodes[1].receiver
-    relay._seal._peers[2].heard_s -= 31.0
+    relay._seal._peers[2].heard_s -= 61.0
     network.send(2, 0, b"once", reliable=False)
     network.run_for(1.0)
     assert [message.payload for message in network.received.get(0, [])] == [b"once"]
