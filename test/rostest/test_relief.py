@@ -23,7 +23,7 @@ from drone_mesh.ros.views.console_controls import RosControls
 from drone_mesh.srv import OrderFormation
 
 POSTS = {3: (5.0, 4.0, 4), 4: (5.0, 8.0, 4)}  # x, y, z
-POSTS_KEPT_S = 280.0  # simulated; a battery lasts for 120 s
+POSTS_KEPT_S = 420.0  # simulated; a battery lasts for 180 s
 HOLDS_M = 2.2  # of the place or the one beside it
 
 
