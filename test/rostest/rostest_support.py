@@ -145,7 +145,7 @@ class LogWatch:
 
 
 class StateWatch:
-    """`/mesh/state`, without a subscription for each report of it: that takes 20 ms."""
+    """`/mesh/state`, without a subscription for each report, which costs both sides a handshake."""
 
     def __init__(self) -> None:
         self._reports: queue.SimpleQueue[MeshState] = queue.SimpleQueue()
