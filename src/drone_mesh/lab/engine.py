@@ -78,6 +78,9 @@ def _client(workers: int, cluster: str | None) -> Iterator[Client]:
         {
             "distributed.scheduler.allowed-failures": DEATHS_ALLOWED,
             "distributed.comm.timeouts.connect": "10s",
+            # Local workers are forks of one process that has imported dask already: as processes
+            # that begin with nothing, each takes two seconds of a core until its first run.
+            "distributed.worker.multiprocessing-method": "forkserver",
         }
     )
     with contextlib.ExitStack() as stack:

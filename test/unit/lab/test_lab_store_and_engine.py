@@ -60,12 +60,11 @@ def slow(record):
     return 1.0
 
 def deadly(record):
-    os.kill(os.getpid(), signal.SIGKILL)
-
-def deadly_once(record):
-    marker = os.environ["LAB_TEST_MARKER"]
-    if not os.path.exists(marker):
+    drones, marker = len(record.start.places), os.environ["LAB_TEST_MARKER"]
+    if drones == 3 and not os.path.exists(marker):
         open(marker, "w").close()
+        os.kill(os.getpid(), signal.SIGKILL)
+    if drones == 4:
         os.kill(os.getpid(), signal.SIGKILL)
     return 1.0
 """
@@ -407,21 +406,9 @@ def slow_rows(slow: Path, tmp_path: Path) -> bytes:
 
 
 @pytest.mark.slow
-def test_any_number_of_workers_writes_the_same_bytes(
-    experiment: Callable[..., Path], tmp_path: Path
-) -> None:
-    path = experiment()
-    run(path, tmp_path / "reference")
-    process = start(path, tmp_path / "out", "--workers", "3")
-    output = finish(process)
-    assert process.returncode == 0, output
-    assert measured(tmp_path / "out") == measured(tmp_path / "reference")
-
-
-@pytest.mark.slow
 def test_a_killed_client_loses_nothing(slow: Path, slow_rows: bytes, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    process = start(slow, out, "--workers", "2")
+    process = start(slow, out, "--workers", "1")
     wait_for_rows(out, 5, process)
     process.kill()
     process.wait()
@@ -432,31 +419,23 @@ def test_a_killed_client_loses_nothing(slow: Path, slow_rows: bytes, tmp_path: P
 
 
 @pytest.mark.slow
-def test_a_killed_worker_loses_nothing(
+def test_runs_that_kill_their_workers_lose_nothing_and_one_that_always_does_is_a_failure(
     experiment: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """One run kills its own worker, the first time it is executed."""
-    marker = tmp_path / "marker"
-    path = experiment("metrics: ['own_lab_parts:deadly_once']\n")
-    process = start(path, tmp_path / "out", "--workers", "2", LAB_TEST_MARKER=str(marker))
-    output = finish(process)
-    assert process.returncode == 0, output
-    assert marker.exists()
-    monkeypatch.setenv("LAB_TEST_MARKER", str(marker))
-    run(path, tmp_path / "reference")
-    assert measured(tmp_path / "out") == measured(tmp_path / "reference")
-
-
-@pytest.mark.slow
-def test_a_run_that_always_kills_its_worker_is_a_failure_and_the_others_continue(
-    experiment: Callable[..., Path], tmp_path: Path
-) -> None:
+    """That of three drones kills its worker the first time, that of four drones each time."""
+    monkeypatch.setenv("LAB_TEST_MARKER", str(tmp_path / "marker"))
     path = experiment("metrics: ['own_lab_parts:deadly']\n")
-    process = start(path, tmp_path / "out", "--workers", "1", "seeds=1", "sweep.radio.loss=[0]")
+    few = ("seeds=1", "sweep.radio.loss=[0]")
+    process = start(
+        path, tmp_path / "out", "--workers", "2", *few, "sweep.layout.drones=[3, 4, 5, 6, 7]"
+    )
     output = finish(process)
     assert process.returncode == 1, output
+    assert (tmp_path / "marker").exists()
     (failure,) = read_rows(tmp_path / "out/failures.csv")
-    assert failure["kind"] == "worker died"
+    assert (failure["kind"], failure["cell"]) == ("worker died", "radio.loss=0 layout.drones=4")
+    run(path, tmp_path / "reference", *few, "sweep.layout.drones=[3, 5, 6, 7]")
+    assert measured(tmp_path / "out") == measured(tmp_path / "reference")
 
 
 @pytest.mark.slow
@@ -565,14 +544,21 @@ def test_jobs_of_slurm_do_the_runs_and_are_cancelled_at_the_end(
 
 @pytest.mark.slow
 def test_a_missing_part_of_slurm_gives_one_line(
-    slow: Path, slurm: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    slow: Path,
+    slurm: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.delenv("DASK_JOBQUEUE__SLURM__CORES")
-    output = finish(start(slow, tmp_path / "out", "--cluster", "slurm"))
-    assert "lab: --cluster slurm: describe a job (cores, memory, queue, walltime) in" in output
+    on_slurm = ("run", slow, "--out", tmp_path / "out", "--cluster", "slurm")
+    assert lab(*on_slurm) == 1
+    error = capsys.readouterr().err
+    assert "lab: --cluster slurm: describe a job (cores, memory, queue, walltime) in" in error
     (slurm / "sbatch").unlink()
-    output = finish(start(slow, tmp_path / "out", "--cluster", "slurm"))
-    assert "lab: --cluster slurm: sbatch not found; use a machine that can submit jobs" in output
+    assert lab(*on_slurm) == 1
+    error = capsys.readouterr().err
+    assert "lab: --cluster slurm: sbatch not found; use a machine that can submit jobs" in error
 
 
 @pytest.mark.slow
