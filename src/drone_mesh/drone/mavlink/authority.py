@@ -10,6 +10,7 @@ such as a crash.
 from __future__ import annotations
 
 import enum
+import functools
 import math
 
 from drone_mesh.drone.geodesy import EarthPlace, Origin
@@ -28,22 +29,24 @@ class FlightArea:
 
     def __init__(self, telemetry: Telemetry, origin: Origin, limits: FlightLimits) -> None:
         self._telemetry = telemetry
-        self._origin = origin
         self._limits = limits
+        # Each tick asks several times for the same places: the drone's, its home and its target.
+        self._to_frame = functools.lru_cache(maxsize=4)(origin.to_frame)
+        self._to_earth = functools.lru_cache(maxsize=1)(origin.to_earth)
 
     def here(self, now_s: float) -> Location | None:
         """The drone's position; None if the telemetry does not have it."""
         place = self._telemetry.place(now_s)
-        return None if place is None else self._origin.to_frame(place)
+        return None if place is None else self._to_frame(place)
 
     def home(self) -> Location | None:
         """The autopilot's home; None: not reported yet."""
         home = self._telemetry.home
-        return None if home is None else self._origin.to_frame(home)
+        return None if home is None else self._to_frame(home)
 
     def is_in_frame(self, place: EarthPlace) -> bool:
         """Whether a position is near enough to the origin for goals."""
-        location = self._origin.to_frame(place)
+        location = self._to_frame(place)
         reach_m = max(abs(location.latitude), abs(location.longitude))
         return reach_m <= MAX_COORDINATE_M and abs(location.height) <= MAX_HEIGHT_M
 
@@ -74,7 +77,7 @@ class FlightArea:
 
     def to_earth(self, place: Location) -> EarthPlace:
         """A position, moved into the limits, in degrees."""
-        return self._origin.to_earth(self.within(place))
+        return self._to_earth(self.within(place))
 
 
 FELL_M = 1.5  # above the noise of a height at rest
