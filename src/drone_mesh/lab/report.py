@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Sequence
+from typing import Callable, Sequence
 
 import jinja2
 
@@ -38,6 +38,8 @@ def write_report(folder: Path, out: Path | None, formats: Sequence[str]) -> list
     results = load_results(folder)
     if not results.rows:
         raise ReportError(f"{folder}: no run is finished yet")
+    if "parquet" in formats:
+        _parquet_writer()  # a package that is missing ends it before all is drawn
     tables = all_tables(results)
     drawings = axis_drawings(results)
     drawings += [d for d in (phases_drawing(results), survival_drawing(results)) if d is not None]
@@ -92,7 +94,7 @@ def _export(
                 drawing.figure.savefig(path, format=kind, dpi=PNG_DPI, metadata=metadata)
                 written.append(path)
         elif kind == "parquet":
-            written += _parquet(results, target)
+            written += _parquet_writer()(results, target)
         else:
             for table in tables:
                 path = target / f"{table.name}.{'tex' if kind == 'latex' else 'csv'}"
@@ -102,13 +104,13 @@ def _export(
     return written
 
 
-def _parquet(results: Results, target: Path) -> list[Path]:
+def _parquet_writer() -> Callable[[Results, Path], list[Path]]:
     try:
         from drone_mesh.lab.parquet import write_parquet
     except ImportError as error:
         what = f"--export parquet needs the Python package {error.name}"
         raise ReportError(f"{what}: pip install 'drone_mesh[parquet]'") from None
-    return write_parquet(results, target)
+    return write_parquet
 
 
 def draw_alone(results: Results, name: str, out: Path) -> None:

@@ -65,11 +65,12 @@ def test_a_folder_may_have_a_name_in_any_bytes(results_folder: Path, tmp_path: P
 
 @pytest.mark.slow
 def test_the_same_rows_give_the_same_page(results_folder: Path, tmp_path: Path) -> None:
-    pages = []
-    for name in ("a", "b"):
-        main(["report", str(results_folder), "--out", str(tmp_path / name)])
-        text = (tmp_path / name).read_text()
-        pages.append(re.sub(r'(id="|#|url\(#)\w+', "", text))  # matplotlib draws ids at random
+    first, second = results_folder / "report.html", tmp_path / "again.html"
+    if not first.exists():  # of another test
+        main(["report", str(results_folder)])
+    main(["report", str(results_folder), "--out", str(second)])
+    # matplotlib draws ids at random
+    pages = [re.sub(r'(id="|#|url\(#)\w+', "", page.read_text()) for page in (first, second)]
     assert pages[0] == pages[1]
 
 
@@ -205,7 +206,8 @@ def test_a_cell_whose_value_is_a_list_can_be_named(
 ) -> None:
     speeds = "mobility.kind: [random_waypoint]\n  mobility.speed_m_s: [1.0, [0.5, 1.0]]"
     text = HEALING.replace("layout.drones: [5, 6]", speeds)
-    (tmp_path / "speeds.yaml").write_text(text.replace("seeds: 4", "seeds: 2"))
+    text = text.replace("seeds: 4", "seeds: 2").replace("duration_s: 90", "duration_s: 15")
+    (tmp_path / "speeds.yaml").write_text(text)
     out = tmp_path / "results"
     assert main(["run", str(tmp_path / "speeds.yaml"), "--out", str(out), "--workers", "0"]) == 0
     cells = [f"connection_lost_after_s={s},mobility.speed_m_s=[0.5,1.0]" for s in (30, 5)]
