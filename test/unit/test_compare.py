@@ -137,7 +137,8 @@ def test_growth_measures_all_arms_and_draws_them(
     monkeypatch.setattr(growth, "PICTURE", tmp_path / "growth.svg")
     monkeypatch.setattr(growth, "SETTLE_S", 1.0)
     monkeypatch.setattr(growth, "SLICE_S", 1.0)
-    growth.growth((10, 50, 60))
+    monkeypatch.setattr(growth, "LARGE", 8)
+    growth.growth((4, 8, 12))
     rows = [line for line in capsys.readouterr().out.splitlines() if line.startswith("| ")]
     assert len(rows) == 2 + 8
     assert (tmp_path / "growth.svg").read_text().startswith("<svg")

@@ -67,7 +67,8 @@ def called(call: ast.Call) -> str:
 
 def parsing_modules() -> Iterator[str]:
     for path in sorted(PACKAGE.rglob("*.py")):
-        nodes = ast.walk(ast.parse(path.read_text("utf-8")))
+        text = path.read_text("utf-8")
+        nodes = ast.walk(ast.parse(text)) if PARSERS.search(text) else ()
         if any(PARSERS.fullmatch(called(node)) for node in nodes if isinstance(node, ast.Call)):
             yield path.relative_to(PACKAGE).with_suffix("").as_posix()
 

@@ -9,6 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pip
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -40,12 +41,13 @@ def installed(tmp_path):
     for name in ("config", "nodes", "requirements", "src"):
         ignored = shutil.ignore_patterns("*.egg-info", "__pycache__")
         shutil.copytree(ROOT / name, checkout / name, ignore=ignored)
-    pip = (sys.executable, "-m", "pip", "--disable-pip-version-check")
+    pip_here = (sys.executable, "-m", "pip", "--disable-pip-version-check")
     no_network = ("--no-deps", "--no-build-isolation", "--no-index")
-    run(*pip, "wheel", *no_network, "--wheel-dir", checkout / "dist", checkout, cwd=checkout)
+    run(*pip_here, "wheel", *no_network, "--wheel-dir", checkout / "dist", checkout, cwd=checkout)
     (wheel,) = (checkout / "dist").glob("drone_mesh-*-py3-none-any.whl")
-    run(sys.executable, "-m", "venv", venv, cwd=tmp_path)
-    run(venv / "bin/pip", "install", "--no-deps", "--no-index", "--no-compile", wheel, cwd=venv)
+    run(sys.executable, "-m", "venv", "--without-pip", venv, cwd=tmp_path)
+    pip_there = (venv / "bin/python", Path(pip.__file__).parent, "--disable-pip-version-check")
+    run(*pip_there, "install", "--no-deps", "--no-index", "--no-compile", wheel, cwd=venv)
     return venv
 
 

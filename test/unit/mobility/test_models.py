@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import itertools
 import math
 import random
@@ -34,6 +35,7 @@ def speed(track, t_s):
 # Random waypoint -----------------------------------------------------------------------------
 
 
+@functools.lru_cache(maxsize=None)
 def steady_state_distance():
     """Mean distance from the middle: a point is on a segment, the longer the likelier."""
     rng, weights, total = random.Random(5), 0.0, 0.0
