@@ -146,21 +146,28 @@ def _run_on(client: Client, waiting: deque[RunSpec]) -> Iterator[Outcome]:
     under_way: dict[Future, list[RunSpec]] = {}
     done = as_completed(loop=client.loop)
     lengths_s: deque[float] = deque(maxlen=50)
-    alone: deque[RunSpec] = deque()  # runs of batches whose worker died: retried one by one
+    # Runs whose worker died too often, perhaps by another run that it had: they are repeated with
+    # nothing beside them, and the one that then kills its worker is to blame.
+    suspects: deque[RunSpec] = deque()
+    tried_alone: set[str] = set()  # keys of their futures
+
+    def start(batch: list[RunSpec]) -> Future:
+        future = client.submit(execute_batch, batch, pure=False)
+        under_way[future] = batch
+        done.add(future)
+        return future
 
     def submit() -> None:
+        if suspects:
+            if not under_way:
+                tried_alone.add(start([suspects.popleft()]).key)
+            return
         size = 1
         if lengths_s:
             size = int(BATCH_S / max(statistics.mean(lengths_s), 1e-6))
             size = max(1, min(LARGEST_BATCH, size))
-        while alone or waiting:
-            if len(under_way) >= TASKS_PER_WORKER * max(1, len(client.nthreads())):
-                return
-            source, most = (alone, 1) if alone else (waiting, size)
-            batch = [source.popleft() for _ in range(min(most, len(source)))]
-            future = client.submit(execute_batch, batch, pure=False)
-            under_way[future] = batch
-            done.add(future)
+        while waiting and len(under_way) < TASKS_PER_WORKER * max(1, len(client.nthreads())):
+            start([waiting.popleft() for _ in range(min(size, len(waiting)))])
 
     submit()
     try:
@@ -169,11 +176,9 @@ def _run_on(client: Client, waiting: deque[RunSpec]) -> Iterator[Outcome]:
             try:
                 outcomes = future.result()
             except KilledWorker as error:
-                outcomes = []
-                if len(batch) > 1:
-                    alone.extend(batch)
-                else:
-                    outcomes = [_died(batch[0], str(error))]
+                is_to_blame = future.key in tried_alone
+                outcomes = [_died(batch[0], str(error))] if is_to_blame else []
+                suspects.extend(() if is_to_blame else batch)
             except no_worker as error:
                 raise EngineError(f"all workers are gone for {WORKERLESS_S:.0f} s") from error
             except (CancelledError, CommClosedError) as error:

@@ -46,7 +46,7 @@ def test_after_any_number_of_missed_messages_the_next_ones_arrive(reliable, miss
 @pytest.mark.parametrize("reliable", [True, False], ids=["reliable", "best effort"])
 def test_who_hears_all_of_them_gets_each_once(reliable):
     link = Link(reliable)
-    assert all(link.send() == [number] for number in range(66_000))
+    assert all(link.send() == [number] for number in range(33_000))  # past the end of a session
 
 
 def test_a_new_session_waits_for_the_acknowledgements_of_the_last():
