@@ -1,18 +1,38 @@
-"""StopRequest, as signal handlers and threads use it."""
+"""How programs start; StopRequest, as signal handlers and threads use it."""
 
 from __future__ import annotations
 
+import gc
 import os
 import resource
 import signal
 import threading
 import time
+from pathlib import Path
 
 import pytest
 
-from drone_mesh.stopping import StopRequest
+from drone_mesh.stopping import StopRequest, loading
 
 LONG_S = 60.0
+PROGRAMS = Path(__file__).resolve().parents[2] / "nodes"
+
+
+def test_no_garbage_is_looked_for_in_what_a_program_imports():
+    frozen = gc.get_freeze_count()
+    with loading():
+        during = gc.isenabled()
+    try:
+        assert not during
+        assert gc.isenabled()
+        assert gc.get_freeze_count() > frozen
+    finally:
+        gc.unfreeze()
+
+
+def test_each_program_loads_so():
+    for program in PROGRAMS.iterdir():
+        assert "\nwith loading():\n    from drone_mesh." in program.read_text(), program.name
 
 
 def test_a_request_that_was_not_made_is_waited_for_no_longer_than_asked():
