@@ -83,19 +83,19 @@ class Damage(NamedTuple):
     """The damage of one attack on one mesh."""
 
     cut_off: float  # share of routers without a working path, mean during the attack
-    later: float  # the same, one minute after the attack
+    later: float  # the same, one minute after the attack, if not said otherwise
     lured: int  # drones more than LURED_M from their proper positions
     metres: float  # distance of the farthest of them
 
 
-def harm(case: Case, seed: int) -> Damage:
+def harm(case: Case, seed: int, recovery_s: float = RECOVERY_S) -> Damage:
     """What the attack costs more than the same time without one."""
-    attacked = trial(case, seed)
+    attacked = trial(case, seed, recovery_s=recovery_s)
     if not any(attacked):
         return attacked  # no worse than whatever happens without one
     # An attacker that does nothing is the same everywhere, with the keys of a node or without.
     threat = Threat.WITHOUT_KEY if case.threat is Threat.WITHOUT_KEY else Threat.WITH_KEY
-    quiet = trial(Case(case.name, threat, moment=case.moment), seed, mute=True)
+    quiet = trial(Case(case.name, threat, moment=case.moment), seed, True, recovery_s)
     lured = attacked.lured - quiet.lured
     metres = attacked.metres if lured > 0 else 0.0
     return Damage(attacked.cut_off - quiet.cut_off, attacked.later - quiet.later, lured, metres)
@@ -110,7 +110,7 @@ def mesh_size(name: str) -> int:
 
 
 @functools.lru_cache(maxsize=None)  # the search for the worst case has made some of them
-def trial(case: Case, seed: int, mute: bool = False) -> Damage:
+def trial(case: Case, seed: int, mute: bool = False, recovery_s: float = RECOVERY_S) -> Damage:
     """One attack, or the same time with an attacker that does nothing."""
     attack = ATTACKS[case.name]
     nodes = mesh_size(case.name)
@@ -145,7 +145,7 @@ def trial(case: Case, seed: int, mute: bool = False) -> Damage:
     cut_off = statistics.fmean(shares)
     lured = _away(network, proper, stranger.ordered)
     stranger.antenna.stop_antenna()
-    network.run_for(RECOVERY_S)
+    network.run_for(recovery_s)
     later = share_cut_off(network, stranger.swallows, is_down)
     return Damage(cut_off, later, len(lured), max(lured, default=0.0))
 

@@ -16,7 +16,6 @@ from drone_mesh.communication.control.router_states import ConnectionState, Repa
 from drone_mesh.errors import GoalRefused
 from drone_mesh.inprocess import Network
 
-OTHERS = ["nearest", "follow"]
 PERIODS_S = 30.0  # three check periods
 NEIGHBOUR = {1: 0, 3: 2, 4: 2}  # from which each router hears orders and claims
 LATER_S = (0.0, 0.15, 0.45, 2.0)  # after the beginning of a state
@@ -45,8 +44,8 @@ def mesh(strategy):
     network.add_gateway(0, 0.0, 0.0)
     for router, x in ((1, 7.0), (2, 14.0), (3, 20.0), (4, 21.5)):
         network.add_router(router, x, 0.0)
-    network.clock.call_at(20.0, lambda _: network.power(2, False), None)
-    network.clock.call_at(22.0, lambda _: give_order(network, 1, 6.0, 3.0), None)
+    network.clock.call_at(10.0, lambda _: network.power(2, False), None)
+    network.clock.call_at(12.0, lambda _: give_order(network, 1, 6.0, 3.0), None)
     return network
 
 
@@ -153,7 +152,7 @@ def test_the_cases_contain_each_declared_state():
         ("thesis", antenna_off, 0.7),
         *(
             pytest.param(strategy, event, lasts_s, marks=pytest.mark.slow)
-            for strategy in ("thesis", *OTHERS)
+            for strategy in ("thesis", "follow")
             for event, lasts_s in [*((e, 0.7) for e in EVENTS), *((e, 12.0) for e in THAT_END)]
             if (strategy, event, lasts_s) != ("thesis", antenna_off, 0.7)
         ),
@@ -162,8 +161,14 @@ def test_the_cases_contain_each_declared_state():
 def test_a_router_with_a_path_is_connected_again_within_three_check_periods(
     strategy, event, lasts_s
 ):
+    """Of `follow` only those moments in which a strategy has something to decide.
+
+    Its other base, `nearest`, has no states of its own.
+    """
     failed = []
     for moment in moments(strategy):
+        if strategy != "thesis" and moment.repair is RepairState.AT_REST:
+            continue
         for later_s, awaits, relay_returns in WAYS:
             network = mesh(strategy)
             network.run_for(moment.at_s + later_s)
