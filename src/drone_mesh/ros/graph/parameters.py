@@ -44,7 +44,8 @@ def factory_configuration(*keys: str) -> FactoryConfiguration:
     """
     from drone_mesh.configuration import load_configuration
 
-    given = {key: rospy.get_param(f"~{key}", "") for key in keys}
+    private = rospy.get_param("~", {})  # one call of the master instead of fifty
+    given = {key: private.get(key, "") for key in keys}
     return _read("~config", "factory.yaml", lambda path: load_configuration(path, given))
 
 
