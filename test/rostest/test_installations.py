@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import signal
@@ -12,6 +13,7 @@ import tempfile
 import time
 import unittest
 from pathlib import Path
+from xmlrpc.client import ServerProxy
 
 import rostest
 from rostest_support import WALL_LIMIT_S, free_port, wait_for
@@ -23,6 +25,8 @@ from fenced_blocks import blocks  # noqa: E402
 CHECKOUT = Path(__file__).resolve().parents[2]
 LEFT_OUT = (".*", "build", "logs", "__pycache__")
 CONNECTED = "2 of 2 routers connected"
+SOON_CONNECTED = "routers:=2 spacing:=6 real_time_factor:=3"
+ASK_AGAIN_AFTER_S = 0.5
 LOOK_AGAIN_AFTER_S = 3.0  # each look costs seconds of processor time
 
 
@@ -51,10 +55,21 @@ class InstallationsTest(unittest.TestCase):
     def output(self, command: str, cwd: Path) -> str:
         return self.start(command, cwd, subprocess.PIPE).communicate(timeout=WALL_LIMIT_S)[0]
 
+    def shows_its_state(self) -> bool:
+        with contextlib.suppress(OSError):
+            master = ServerProxy(self.environment["ROS_MASTER_URI"])
+            _code, _text, (publishers, *_others) = master.getSystemState("/installations")
+            return "/mesh/state" in dict(publishers)
+        return False
+
     def run_until_connected(self, simulation: str, setup: str, cwd: Path, also: str = "") -> None:
         """Start a simulation, and look at it in another terminal, until it shows `also` too."""
-        run = self.start(f"{simulation} routers:=2 spacing:=6", cwd)
+        run = self.start(f"{simulation} {SOON_CONNECTED}", cwd)
         shown = ""
+
+        def begun() -> bool:
+            time.sleep(ASK_AGAIN_AFTER_S)
+            return self.shows_its_state() or run.poll() is not None
 
         def connected() -> bool:
             nonlocal shown
@@ -63,6 +78,7 @@ class InstallationsTest(unittest.TestCase):
             return CONNECTED in shown or run.poll() is not None
 
         try:
+            wait_for("a state of the mesh", 4 * WALL_LIMIT_S, begun)
             wait_for(CONNECTED, 4 * WALL_LIMIT_S, connected)
             self.assertIsNone(run.poll(), "it ended")
             self.assertIn(also, shown)
@@ -83,7 +99,7 @@ class InstallationsTest(unittest.TestCase):
     def test_the_installed_package_needs_its_setup_and_nothing_else(self) -> None:
         # Not into the checkout: rospack would find the package twice.
         subprocess.run(
-            ["cmake", "--build", str(CHECKOUT / "build"), "--target", "install"],
+            ["cmake", "--install", str(CHECKOUT / "build")],
             env={**os.environ, "DESTDIR": str(self.folder)},
             stdout=subprocess.DEVNULL,
             timeout=4 * WALL_LIMIT_S,
