@@ -23,9 +23,9 @@ import rospkg
 import rospy
 from rosgraph_msgs.msg import Log
 
-from drone_mesh.msg import NRF24, DroneInfo, MeshState, NodeDebugInfo
+from drone_mesh.msg import NRF24, DroneInfo, Location, MeshState, NodeDebugInfo
 from drone_mesh.ros.graph.resting_clock import RestingClock
-from drone_mesh.srv import Casus, PowerSwitch, RequestGPS, WirelessMessage
+from drone_mesh.srv import Casus, PowerSwitch, RequestGPS, RequestGPSResponse, WirelessMessage
 
 PAYLOAD_BYTES = 32
 STANDSTILL_S = 20.0  # wall; if simulated time has begun and stands still, the world has died
@@ -33,8 +33,7 @@ POLL_PERIOD_S = 0.05  # many conditions call a service, which takes both sides m
 WALL_LIMIT_S = 60.0  # for what takes a moment on an idle machine
 NODES = Path(rospkg.RosPack().get_path("drone_mesh")) / "nodes"
 FORKS = multiprocessing.get_context("forkserver")
-PRELOADED = ["__main__", "drone_mesh.ros.views.report", "matplotlib.pyplot"]
-FORKS.set_forkserver_preload(PRELOADED)
+FORKS.set_forkserver_preload(["__main__"])
 # The package of a devel space puts src/ first, where the messages are missing. Python 3.13 gives
 # this path to the process that forks.
 sys.path[:] = [path for path in sys.path if path != str(NODES.parent / "src")]
@@ -71,7 +70,7 @@ def program(name: str, *arguments: str) -> list[str]:
 def run_program(name: str, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
     """Run a program of the package until its end, in a fork of one process.
 
-    That process has imported what most of them need: nearly all of their time.
+    That process has imported what the test needs and `preload` names: nearly all of their time.
     """
     words = [str(NODES / name), *arguments]
     with tempfile.TemporaryDirectory() as folder:
@@ -83,6 +82,11 @@ def run_program(name: str, *arguments: str, **environment: str) -> subprocess.Co
         return subprocess.CompletedProcess(
             words, process.exitcode, out.read_text("utf-8"), errors.read_text("utf-8")
         )
+
+
+def preload(*modules: str) -> None:
+    """Let these modules be imported once, before the first fork."""
+    FORKS.set_forkserver_preload(["__main__", *modules])
 
 
 def _run_fork(words: list[str], environment: dict[str, str], out: Path, errors: Path) -> None:
@@ -125,6 +129,18 @@ def kill_and_wait_for_respawn(node: str) -> None:
     assert old_pid is not None, f"{node} is not running, so it cannot be killed"
     os.kill(old_pid, signal.SIGKILL)
     wait_for(f"{node} was not respawned", WALL_LIMIT_S, lambda: pid_of(node) not in (None, old_pid))
+
+
+def send_home(*places: tuple[float, float]) -> None:
+    """Let the engines fly drones 1, 2 and so on to these places, for the next test of a launch."""
+    goals = {f"/Drones/{drone}": place for drone, place in enumerate(places, start=1)}
+    for drone, (longitude, latitude) in goals.items():
+        goal = rospy.Publisher(f"{drone}/goal", Location, queue_size=1, latch=True)
+        goal.publish(Location(latitude, longitude, 0))
+    for drone, (longitude, latitude) in goals.items():
+        there = RequestGPSResponse(latitude, longitude, 0)
+        asked = (f"{drone}/gps", RequestGPS)
+        wait_for(f"{drone} at its start", WALL_LIMIT_S, lambda: call(*asked) == there)  # noqa: B023
 
 
 class LogWatch:
@@ -290,6 +306,10 @@ class Stranger:
 
         wait_for(f"stranger {self.node_id} was not registered", WALL_LIMIT_S, reachable)
         self.heard.clear()
+
+    def leave(self) -> None:
+        """Switch it off: the world waits for each packet to it, as no host reports that it came."""
+        self.announce(self._place, self._topic, on=False)
 
     def send(self, packet: bytes) -> bool:
         """Send to the node in byte 3; True: that node received it."""

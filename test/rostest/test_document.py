@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """A client that knows only what the original design names sees the same mesh in every world.
 
-document.test runs it against this package's own simulator and engines, document_strangers.test
-against those of others.
+three_routers.test runs it against this package's own simulator and engines,
+document_strangers.test against those of others.
 """
 
 from __future__ import annotations
@@ -38,7 +38,6 @@ MD5_SUMS = {  # of 2019: programs built against those definitions still work
 class DocumentTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls) -> None:
-        rospy.init_node("test_document")
         cls.debug: dict[int, NodeDebugInfo] = {}
         for node in range(4):
             rospy.Subscriber(f"/Nodes/{node}/debug", NodeDebugInfo, cls.heard)
@@ -94,9 +93,11 @@ class DocumentTest(unittest.TestCase):
     def test_4_a_foreign_antenna_gets_the_place_of_its_neighbour(self) -> None:
         stranger = Stranger(STRANGER, "/some/topic", (4.0, 6.0, 0.5))
         stranger.register()
+        self.addCleanup(stranger.leave)
         self.assertTrue(stranger.send(bytes((STRANGER, STRANGER, REQUESTLOCATION, 3, 3))))
         stranger.wait_for_packet(bytes((3, 3, LOCATION, STRANGER, STRANGER)), "no location")
 
 
 if __name__ == "__main__":
+    rospy.init_node("test_document")
     rostest.rosrun("drone_mesh", "document", DocumentTest)

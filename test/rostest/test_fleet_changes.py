@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """Drones are ordered through actions, added to a running simulation and removed from it."""
 
 from __future__ import annotations
@@ -11,9 +10,8 @@ from pathlib import Path
 import actionlib
 import rosgraph
 import rospy
-import rostest
 from actionlib_msgs.msg import GoalStatus
-from rostest_support import WALL_LIMIT_S, LogWatch, MeshWatch, call, in_order, run_program, wait_for
+from rostest_support import WALL_LIMIT_S, LogWatch, MeshWatch, call, run_program, wait_for
 
 from drone_mesh.msg import FlyAction, FlyFeedback, FlyGoal, FlyResult, MeshState, NodeState
 from drone_mesh.srv import AddDrone, OrderFlight, RemoveDrone, RequestDroneFlight, SetSpeed
@@ -274,12 +272,3 @@ class FleetChangesTest(unittest.TestCase):
         self.assertIn("drone 9 does not exist", self.refusal_of(remove, RemoveDrone, 9))
         self.assertIn("the last gateway", self.refusal_of(remove, RemoveDrone, 0))
         self.assertEqual(set(rospy.get_param("/drone_mesh/drones")["routers"]), {1, 2})
-
-
-def suite() -> unittest.TestSuite:
-    return in_order(FlyActionsTest, FleetChangesTest)
-
-
-if __name__ == "__main__":
-    rospy.init_node("test_fleet_changes")
-    rostest.rosrun("drone_mesh", "fleet_changes", "__main__.suite")

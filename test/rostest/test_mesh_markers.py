@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """The frames and markers for rviz, and rviz itself with our configuration."""
 
 from __future__ import annotations
@@ -12,7 +11,6 @@ import unittest
 import rosgraph
 import rospkg
 import rospy
-import rostest
 from rostest_support import WALL_LIMIT_S, call, wait_for
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
@@ -25,8 +23,6 @@ RVIZ_LIMIT_S = 40.0  # software rendering is slow
 
 class MeshMarkersTest(unittest.TestCase):
     def setUp(self) -> None:
-        if not rospy.core.is_initialized():
-            rospy.init_node("test_mesh_markers")
         self.markers: dict[tuple[str, int], Marker] = {}
         self.frames: dict[str, tuple[float, float, float]] = {}
         self.stamps: list[tuple[str, rospy.Time]] = []  # of frames, in the order they came
@@ -129,6 +125,8 @@ class MeshMarkersTest(unittest.TestCase):
         goals.publish(latitude=0.0, longitude=6.0, height=20)
         wait_for("turning rotors", WALL_LIMIT_S, rotors_turn)
         wait_for("rotors at rest", WALL_LIMIT_S, lambda: ("rotors", 0) not in self.markers)
+        goals.publish(latitude=0.0, longitude=6.0, height=0)
+        wait_for("2 lands", WALL_LIMIT_S, lambda: self.frames["drone_2"] == (6.0, 0.0, 0.0))
         goals.unregister()
 
     def test_4_a_paused_mesh_sends_no_frame_twice_and_shows_itself_to_newcomers(self) -> None:
@@ -146,7 +144,7 @@ class MeshMarkersTest(unittest.TestCase):
             )
             self.assertIn("drone_0", shown.stdout)
         finally:
-            call("/DroneFactory/setSpeed", SetSpeed, False, 4.0)
+            call("/DroneFactory/setSpeed", SetSpeed, False, 2.0)
 
     @unittest.skipUnless(shutil.which("rviz") and shutil.which("Xvfb"), "rviz or Xvfb is missing")
     def test_5_rviz_runs_with_the_shipped_configuration_and_looks_at_the_mesh(self) -> None:
@@ -175,7 +173,3 @@ class MeshMarkersTest(unittest.TestCase):
     def _rviz_looks(self) -> bool:
         _publishers, subscribers, _services = rosgraph.Master("/test").getSystemState()
         return "/test_rviz" in dict(subscribers).get("/mesh/markers", [])
-
-
-if __name__ == "__main__":
-    rostest.rosrun("drone_mesh", "mesh_markers", MeshMarkersTest)

@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """/mesh/state, /mesh/events and /diagnostics."""
 
 from __future__ import annotations
@@ -7,7 +6,6 @@ import re
 import unittest
 
 import rospy
-import rostest
 from diagnostic_msgs.msg import DiagnosticArray
 from rostest_support import WALL_LIMIT_S, LogWatch, call, wait_for
 
@@ -17,8 +15,6 @@ from drone_mesh.srv import PowerSwitch, RequestDroneFlight, SetSpeed
 
 class MeshStateTest(unittest.TestCase):
     def setUp(self) -> None:
-        if not rospy.core.is_initialized():
-            rospy.init_node("test_mesh_state")
         self.state: MeshState | None = None
         self.events: list[MeshEvent] = []
         self.diagnostics: DiagnosticArray | None = None
@@ -105,7 +101,3 @@ class MeshStateTest(unittest.TestCase):
         wait_for("3 landed", WALL_LIMIT_S, lambda: len(self.state.nodes[3].path) == 0)
         self.assertEqual(self.state.real_time_factor, 8.0)
         self.assertEqual(self.log.failures(), [])
-
-
-if __name__ == "__main__":
-    rostest.rosrun("drone_mesh", "mesh_state", MeshStateTest)

@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """A foreign node sends random packets; users' data, and the examples."""
 
 from __future__ import annotations
@@ -10,14 +9,12 @@ import unittest
 from pathlib import Path
 
 import rospy
-import rostest
 from rostest_support import (
     WALL_LIMIT_S,
     LogWatch,
     MeshWatch,
     Stranger,
     call,
-    in_order,
     receives,
     wait_for,
 )
@@ -55,6 +52,7 @@ class StrangersTest(unittest.TestCase):
         places = [mesh.place(node_id) for node_id in range(3)]
         stranger = Stranger(RANDOM, "/stranger", (0.5, 0.5, 0.1))
         stranger.register()
+        self.addCleanup(stranger.leave)
 
         rng = random.Random(SEED)
         service = rospy.ServiceProxy("/SignalSimulator/message", WirelessMessage, persistent=True)
@@ -147,7 +145,7 @@ class ExamplesTest(unittest.TestCase):
         return process
 
     def test_1_an_order_is_followed_until_the_drone_has_arrived(self) -> None:
-        follower = self.start("fly_and_follow.py", "2", "6", "3")
+        follower = self.start("fly_and_follow.py", "2", "6", "-1")
         printed, _ = follower.communicate(timeout=WALL_LIMIT_S)
         self.assertEqual(follower.returncode, 0, printed)
         self.assertIn("the drone has accepted it", printed)
@@ -163,12 +161,3 @@ class ExamplesTest(unittest.TestCase):
         call("/Nodes/1/powerSwitch", PowerSwitch, False)
         wait_for("1 is off", WALL_LIMIT_S, lambda: self.state and not self.state.nodes[1].on)
         wait_for("1 is on again", WALL_LIMIT_S, lambda: self.state.nodes[1].on)
-
-
-def suite() -> unittest.TestSuite:
-    return in_order(StrangersTest, UsersDataTest, ExamplesTest)
-
-
-if __name__ == "__main__":
-    rospy.init_node("test_strangers")
-    rostest.rosrun("drone_mesh", "strangers", "__main__.suite")

@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """status, snapshot and report: live, from a bag that record.launch made, and without a master."""
 
 from __future__ import annotations
@@ -16,12 +15,10 @@ from typing import Callable, Iterator
 import genpy.dynamic
 import rosbag
 import rospy
-import rostest
 from rostest_support import (
-    FORKS,
-    PRELOADED,
     WALL_LIMIT_S,
     call,
+    preload,
     receives,
     run_program,
     wait_for,
@@ -32,6 +29,7 @@ from drone_mesh.ros.views.bag import RecordedMesh
 from drone_mesh.srv import PowerSwitch, SetSpeed
 
 TOOLS = ("status", "snapshot", "report")
+PLOTTING = ("drone_mesh.ros.views.report", "matplotlib.pyplot")
 ROS_NODES = {
     "drone_factory": "world.drone_factory_node",
     "drone_manager": "services.drone_manager",
@@ -42,7 +40,6 @@ ROS_NODES = {
     "mesh_markers": "views.markers_node",
     "console": "views.console_node",
 }
-FORKS.set_forkserver_preload([*PRELOADED, *(f"drone_mesh.ros.{m}" for m in ROS_NODES.values())])
 OLD_DETAIL = "order 7 to x 1.00 m, y 2.00 m, z 3 m: battery at 9 %"
 
 
@@ -102,9 +99,13 @@ def lost(node_id: int) -> Callable[[MeshState], bool]:
 
 
 class ToolsTest(unittest.TestCase):
+    """The first stops the time: the others need no mesh, and cost less without it."""
+
+    @classmethod
+    def setUpClass(cls) -> None:
+        preload(*PLOTTING, *(f"drone_mesh.ros.{module}" for module in ROS_NODES.values()))
+
     def setUp(self) -> None:
-        if not rospy.core.is_initialized():
-            rospy.init_node("test_tools")
         self.state: MeshState | None = None
         self.came: Counter[str] = Counter()
         rospy.Subscriber("/mesh/state", MeshState, self._on_state)
@@ -146,14 +147,14 @@ class ToolsTest(unittest.TestCase):
     def go_on(self, factor: float = 0.0) -> None:
         call("/DroneFactory/setSpeed", SetSpeed, False, factor)
 
-    def test_1_each_tool_explains_itself(self) -> None:
+    def test_2_each_tool_explains_itself(self) -> None:
         for tool in TOOLS:
             finished = run_program(tool, "--help")
             self.assertEqual(finished.returncode, 0, finished.stderr)
             self.assertIn(f"usage: rosrun drone_mesh {tool}", finished.stdout)
             self.assertIn("Exit code", finished.stdout)
 
-    def test_1_each_node_explains_itself_and_leaves_the_one_that_runs_alone(self) -> None:
+    def test_2_each_node_explains_itself_and_leaves_the_one_that_runs_alone(self) -> None:
         for node in ROS_NODES:
             finished = run_program(node, "--help")
             self.assertEqual(finished.returncode, 0, finished.stderr)
@@ -229,7 +230,7 @@ class ToolsTest(unittest.TestCase):
             [mesh.stamp_s for mesh in RecordedMesh(bag).states()], [1.0, 2.0, 3.0, 4.0, 5.0]
         )
 
-    def test_3_a_run_is_seen_live_and_recorded_and_told(self) -> None:
+    def test_1_a_run_is_seen_live_and_recorded_and_told(self) -> None:
         recorder = subprocess.Popen(
             ["roslaunch", "drone_mesh", "record.launch", f"bag:={self.folder}/run"],
             stdout=subprocess.DEVNULL,
@@ -298,7 +299,7 @@ class ToolsTest(unittest.TestCase):
         self.assertTrue("<td>2 off</td>" in page, f"the page lacks the cause of the loss: {events}")
         self.assertIn("flight decided", events)
 
-    def test_4_what_is_no_bag_is_refused_in_one_line(self) -> None:
+    def test_2_what_is_no_bag_is_refused_in_one_line(self) -> None:
         nonsense = self.folder / "nonsense.bag"
         nonsense.write_bytes(b"\x89 this is not a bag")
         for path in (nonsense, self.folder / "missing.bag"):
@@ -310,7 +311,3 @@ class ToolsTest(unittest.TestCase):
                 )
                 self.assertIn("'roslaunch drone_mesh record.launch' records one", finished.stderr)
                 self.assertNotIn("Traceback", finished.stderr)
-
-
-if __name__ == "__main__":
-    rostest.rosrun("drone_mesh", "tools", ToolsTest)
