@@ -18,10 +18,11 @@ from dataclasses import fields
 from pathlib import Path
 from unittest import mock
 
+import rosgraph
 import roslaunch
 import rostest
 import yaml
-from rostest_support import WALL_LIMIT_S, free_port, in_order, run_program
+from rostest_support import WALL_LIMIT_S, free_port, in_order, preload, program, run_program
 
 from drone_mesh.configuration import FactoryConfiguration
 from drone_mesh.ros.graph import launching
@@ -179,18 +180,25 @@ def refused(*arguments: str, uri: str = "") -> object:
 
 class BadArgumentsTest(unittest.TestCase):
     def test_a_node_that_refuses_its_arguments_ends_the_whole_launch(self) -> None:
-        for argument, line in (
-            ("max_distance:=-1", "argument: invalid max_distance '-1': expected metres"),
-            ("casus:=/no/such.yaml", "casus:=/no/such.yaml: No such file or directory"),
-        ):
-            launch = launched(argument)
-            self.assertIn(f"/DroneFactory: {line}", launch.stdout)
-            self.assertIn("exit code 1", launch.stdout)
-            self.assertEqual(launch.returncode, 1)
-            # A node that is stopped while Python itself is starting prints a traceback.
-            until_failure, shutdown, _ = launch.stdout.partition("Initiating shutdown!")
-            self.assertTrue(shutdown, launch.stdout)
-            self.assertNotIn("Traceback", until_failure)
+        launch = launched("max_distance:=-1")
+        line = "/DroneFactory: argument: invalid max_distance '-1': expected metres"
+        self.assertIn(line, launch.stdout)
+        self.assertIn("exit code 1", launch.stdout)
+        self.assertEqual(launch.returncode, 1)
+        # A node that is stopped while Python itself is starting prints a traceback.
+        until_failure, shutdown, _ = launch.stdout.partition("Initiating shutdown!")
+        self.assertTrue(shutdown, launch.stdout)
+        self.assertNotIn("Traceback", until_failure)
+
+    def test_layouts_that_the_manager_cannot_read_are_refused_by_the_factory(self) -> None:
+        """roslaunch would start the manager again and again, but ends with the factory."""
+        master = rosgraph.Master("/test_arguments")
+        master.setParam("/DroneManager/casus", "/no/such.yaml")
+        self.addCleanup(master.deleteParam, "/DroneManager/casus")
+        factory = run_program("drone_factory", "__name:=f")
+        line = "/f: casus:=/no/such.yaml: No such file or directory"
+        self.assertIn(line, factory.stdout + factory.stderr)
+        self.assertEqual(factory.returncode, 1)
 
     def test_the_factory_names_what_it_refuses_in_one_line(self) -> None:
         # Each with a name of its own: what was given remains on the master, as a parameter.
@@ -211,20 +219,21 @@ class BadArgumentsTest(unittest.TestCase):
         name = "must be letters, digits and _, and begin with a letter"
         address = "is no address of a master: it must look like http://localhost:11311"
         for argument, uri, line in (
+            ("namespace:=site-a", "", f"invalid namespace 'site-a': {name}"),
             ("namespace:=01", "", f"invalid namespace '01': {name}"),
             ("namespace:=site a", "", f"invalid namespace 'site a': {name}"),
             ("routers:=2", "localhost:11311", f"ROS_MASTER_URI=localhost:11311 {address}"),
         ):
             self.assertEqual(refused(argument, uri=uri), f"roslaunch: {line}")
-        launch = ended(*OUR_LAUNCH, "drone_mesh", "factory.launch", "namespace:=site-a")
-        line = f"roslaunch: invalid namespace 'site-a': {name}\n"
-        self.assertEqual((launch.stdout, launch.returncode), (line, 1))
 
     def test_the_nodes_themselves_refuse_such_a_namespace(self) -> None:
-        launch = launched("namespace:=site-a", by=("roslaunch",))
-        said = [line for line in launch.stdout.splitlines() if "invalid namespace" in line]
-        self.assertEqual(len(said), 1, said)
-        self.assertIn("drone_factory: invalid namespace '/site-a/'", said[0])
+        factory = ended(*program("drone_factory", "__ns:=/site-a"))
+        self.assertIn("drone_factory: invalid namespace '/site-a/'", factory.stdout)
+        self.assertEqual(factory.returncode, 2)
+        # Beside the factory, which says it for both.
+        manager = program("drone_manager", "__ns:=/site-a")
+        silent = ended(*manager, DRONE_MESH_SPEAKER="DroneFactory")
+        self.assertEqual((silent.stdout, silent.returncode), ("", 2))
 
     def test_what_the_console_cannot_use_is_said_before_anything_starts(self) -> None:
         port = "invalid port 99999: must be a whole number 0..65535"
@@ -236,11 +245,12 @@ class BadArgumentsTest(unittest.TestCase):
                 ("origin:=abc", "invalid origin 'abc'"),
             ):
                 self.assertIn(line, str(refused(*WITH_CONSOLE, argument)))
-        for number in ("99999", "abc"):
-            launch = launched(*WITH_CONSOLE, f"console_port:={number}", by=("roslaunch",))
-            (said,) = [line for line in launch.stdout.splitlines() if line.startswith("console: ")]
-            self.assertIn(f"invalid port {number}", said)
-            self.assertNotIn("espawning", launch.stdout)
+        launch = launched(*WITH_CONSOLE, "console_port:=abc", by=("roslaunch",))
+        (said,) = [line for line in launch.stdout.splitlines() if line.startswith("console: ")]
+        self.assertIn("invalid port abc", said)
+        self.assertNotIn("espawning", launch.stdout)
+        console = run_program("console", "_port:=99999")
+        self.assertIn(f"console: {port}", console.stderr)
 
 
 def suite() -> unittest.TestSuite:
@@ -248,4 +258,5 @@ def suite() -> unittest.TestSuite:
 
 
 if __name__ == "__main__":
+    preload("drone_mesh.ros.world.drone_factory_node", "drone_mesh.ros.views.console_node")
     rostest.rosrun("drone_mesh", "arguments", "__main__.suite")

@@ -55,7 +55,7 @@ class DocumentationTest(unittest.TestCase):
 
     def test_each_command_beside_a_simulation_works(self) -> None:
         rospy.init_node("test_documentation")
-        mesh = MeshWatch(18)
+        mesh = MeshWatch(6)
         mesh.wait("not all nodes are connected", CONNECTED_WITHIN_S, mesh.connected)
         tested = [block for block in blocks("bash") if block.test == "simulation"]
         commands = [command for block in tested for command in block.commands()]

@@ -88,7 +88,15 @@ def launched(namespace: str, address: str, *arguments: str) -> Iterator[None]:
 
 class NamespacesTest(unittest.TestCase):
     def test_all_are_connected_over_the_cable(self) -> None:
-        world = ("-p", PORT, "drone_mesh", "factory.launch", "hosts:=0", "routers:=5")
+        world = (
+            "-p",
+            PORT,
+            "drone_mesh",
+            "factory.launch",
+            "hosts:=0",
+            "routers:=5",
+            "manager:=false",
+        )
         first = ("--wait", "drone_mesh", "host.launch", "first:=0", "last:=2")
         second = ("--wait", "drone_mesh", "host.launch", "first:=3", "last:=5")
         with contextlib.ExitStack() as stack:

@@ -23,8 +23,8 @@ import websockets.exceptions
 import websockets.sync.client
 from mcap.reader import make_reader
 from rosgraph_msgs.msg import Clock
-from rostest_support import WALL_LIMIT_S, in_order, run_program, wait_for
-from test_tools import gateway_record
+from rostest_support import WALL_LIMIT_S, in_order, preload, run_program, wait_for
+from test_tools import PLOTTING, gateway_record
 
 from drone_mesh.drone.roles import Role
 from drone_mesh.msg import MeshState, NodeState, PacketSample
@@ -76,9 +76,9 @@ class ReplayTest(unittest.TestCase):
     def test_1_what_is_no_recording_of_a_mesh_is_refused_in_one_line(self) -> None:
         with rosbag.Bag(str(self.bag), "w") as bag:
             bag.write("/clock", Clock(genpy.Time(1)), genpy.Time(1))
-        output, _ = self.launch(f"bag:={self.bag}").communicate(timeout=60)
-        self.assertIn(f"replay: {self.bag}: contains no /mesh/state", output)
-        self.assertNotIn("Traceback", output)
+        refused = run_program("replay", str(self.bag))
+        self.assertIn(f"replay: {self.bag}: contains no /mesh/state", refused.stderr)
+        self.assertNotIn("Traceback", refused.stderr)
 
     def test_2_time_moves_forwards_from_the_first_state_to_the_last(self) -> None:
         ticks: list[float] = []
@@ -93,8 +93,8 @@ class ReplayTest(unittest.TestCase):
         heard = list(ticks)  # more may arrive while this list is looked at
         self.assertEqual(heard, sorted(heard))
         self.assertGreaterEqual(heard[0], BEGIN_S - 0.1)
-        refused, _ = self.launch(f"bag:={self.bag}").communicate(timeout=60)
-        self.assertIn("/mesh_replay already publishes /clock", refused)
+        refused = run_program("replay", str(self.bag))
+        self.assertIn("/mesh_replay already publishes /clock", refused.stderr)
 
     def test_3_the_page_has_all_of_the_bag_on_its_time_line_while_it_is_played(self) -> None:
         record(self.bag)
@@ -225,5 +225,6 @@ def suite() -> unittest.TestSuite:
 
 
 if __name__ == "__main__":
+    preload(*PLOTTING, "drone_mesh.ros.views.ros_programs")
     rospy.init_node("test_recordings")
     rostest.rosrun("drone_mesh", "recordings", "__main__.suite")

@@ -22,6 +22,7 @@ from rostest_support import (
     MeshWatch,
     call,
     pid_of,
+    preload,
     program,
     run_program,
     wait_for,
@@ -42,18 +43,19 @@ DRAWN = (
     ("drone 1", [5.1213562, 52.0907270]),  # x -3, y 3
     ("the old oak", [5.1213708, 52.0907270]),  # x -2, y 3
 )
-FLIGHTS_S = 120  # wall; the longest takes less than 30 simulated seconds
+FLIGHTS_S = 120  # wall; the longest takes less than 15 simulated seconds
+CASES = Layouts.load(Path(__file__).with_name("standing_layouts.yaml"))
 
 
-def waits_for_17(progress: LayoutProgress) -> bool:
-    return bytes(progress.waiting) == bytes([17])
+def waits_for_5(progress: LayoutProgress) -> bool:
+    return bytes(progress.waiting) == bytes([5])
 
 
 class StandingLayoutsTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls) -> None:
         cls.log = LogWatch()
-        cls.mesh = MeshWatch(18)
+        cls.mesh = MeshWatch(6)
         cls.progress: dict[int, LayoutProgress] = {}
         rospy.Subscriber("/DroneManager/layouts", LayoutProgress, cls.heard)
         cls.mesh.wait("all connected at the start", 60, cls.mesh.connected)
@@ -75,7 +77,7 @@ class StandingLayoutsTest(unittest.TestCase):
         self.mesh.pass_time(3.0)
         second = self.order(202)
         done = self.wait_until_over(second)
-        drones = sorted(dict(Layouts.shipped().orders(202)))
+        drones = sorted(dict(CASES.orders(202)))
         self.assertEqual(sorted(done.arrived), drones)
         self.assertEqual(sorted(self.wait_until_over(first).replaced), drones)
         states: list[MeshState] = []
@@ -90,38 +92,38 @@ class StandingLayoutsTest(unittest.TestCase):
         client.send_goal(LayoutGoal(0, False), feedback_cb=heard.append)
         self.assertTrue(client.wait_for_result(rospy.Duration(600)), "the layout did not end")
         self.assertEqual(client.get_state(), GoalStatus.SUCCEEDED, client.get_goal_status_text())
-        self.assertEqual(client.get_result().message, "17 of 17 at their places")
+        self.assertEqual(client.get_result().message, "5 of 5 at their places")
         self.assertTrue(any(feedback.flying for feedback in heard))
 
     def test_3_a_subscriber_that_comes_late_still_gets_the_goal(self) -> None:
         """The engine's connection may take a second more than the order."""
-        goal = rospy.wait_for_message("/Drones/13/goal", Location, FLIGHTS_S)
-        self.assertEqual((goal.longitude, goal.latitude, goal.height), (9.0, 7.0, 0))
-        self.mesh.wait_at(13, 9.0, 7.0, within_s=5.0)
+        goal = rospy.wait_for_message("/Drones/5/goal", Location, FLIGHTS_S)
+        self.assertEqual((goal.longitude, goal.latitude, goal.height), (-4.0, 6.0, 0))
+        self.mesh.wait_at(5, -4.0, 6.0, within_s=5.0)
 
     def test_3_a_drone_is_not_replaced_by_its_own_order_whatever_its_decimals(self) -> None:
         """Whose third decimal is 5: as float32, in an order, it rounds to other hundredths."""
-        places = [Location(23.515, -12.535, 0), Location(26.015, 8.025, 0)]
-        formation = ("a", [1, 17], places, False, [])
+        places = [Location(-2.205, -3.145, 0), Location(3.315, 6.135, 0)]
+        formation = ("a", [1, 2], places, False, [])
         number = call("/DroneManager/orderFormation", OrderFormation, *formation).id
         done = self.wait_until_over(number)
-        self.assertEqual(bytes(done.arrived), bytes([1, 17]), done.message)
+        self.assertEqual(bytes(done.arrived), bytes([1, 2]), done.message)
 
     def test_4_a_restarted_manager_goes_on_and_a_withdrawn_layout_ends(self) -> None:
-        self.mesh.switch(17, False)
+        self.mesh.switch(5, False)
         number = self.order(100)
-        wait_for("it waits for 17", FLIGHTS_S, lambda: bytes([17]) == self.waiting(number))
-        self.assertEqual(self.stored(number), ["17"])
+        wait_for("it waits for 5", FLIGHTS_S, lambda: bytes([5]) == self.waiting(number))
+        self.assertEqual(self.stored(number), ["5"])
         before = pid_of("/DroneManager")
         os.kill(before, signal.SIGKILL)
         wait_for("another manager", 60, lambda: pid_of("/DroneManager") not in (None, before))
-        self.mesh.switch(17, True)
-        self.assertEqual(self.wait_until_over(number).arrived, bytes([17]))
-        self.mesh.switch(17, False)
+        self.mesh.switch(5, True)
+        self.assertEqual(self.wait_until_over(number).arrived, bytes([5]))
+        self.mesh.switch(5, False)
         number = self.order(0)
-        wait_for("it waits for 17", FLIGHTS_S, lambda: bytes([17]) == self.waiting(number))
+        wait_for("it waits for 5", FLIGHTS_S, lambda: bytes([5]) == self.waiting(number))
         self.assertTrue(call("/DroneManager/withdrawLayout", WithdrawLayout, number).success)
-        self.assertEqual(bytes(self.wait_until_over(number).waiting), bytes([17]))
+        self.assertEqual(bytes(self.wait_until_over(number).waiting), bytes([5]))
         self.assertFalse(call("/DroneManager/withdrawLayout", WithdrawLayout, number).success)
 
     def test_5_the_commands_show_progress_and_withdraw_on_ctrl_c(self) -> None:
@@ -135,14 +137,14 @@ class StandingLayoutsTest(unittest.TestCase):
         drawn = run_program("layout", "--file", self.drawing())
         self.assertEqual(drawn.returncode, 0, drawn.stdout + drawn.stderr)
         self.assertIn("2 of 2 at their places", drawn.stdout)
-        self.mesh.wait_at(9, -2.0, 3.0, within_s=5.0)
-        self.assertIn("drone 1 to x -3, y 3, z 0 m\ndrone 9 to x -2, y 3, z 0 m\n", drawn.stdout)
+        self.mesh.wait_at(4, -2.0, 3.0, within_s=5.0)
+        self.assertIn("drone 1 to x -3, y 3, z 0 m\ndrone 4 to x -2, y 3, z 0 m\n", drawn.stdout)
         self.missions_and_gateways_stay()
-        layout = subprocess.Popen(  # 17 is off and elsewhere, since the test before
-            program("layout", "--at-once", "17"), stdout=subprocess.PIPE, text=True
+        layout = subprocess.Popen(  # 5 is off and elsewhere, since the test before
+            program("layout", "--at-once", "5"), stdout=subprocess.PIPE, text=True
         )
         self.assertIn("ordered", layout.stdout.readline())
-        wait_for("it waits for 17", FLIGHTS_S, lambda: any(map(waits_for_17, self.open())))
+        wait_for("it waits for 5", FLIGHTS_S, lambda: any(map(waits_for_5, self.open())))
         (number,) = (progress.id for progress in self.open())
         (kept,) = self.stored_orders()
         self.assertTrue(kept["at_once"])
@@ -170,7 +172,7 @@ class StandingLayoutsTest(unittest.TestCase):
         self.assertNotEqual(moved.returncode, 2)
 
     def drawing(self, points: Sequence[tuple[str, object]] = DRAWN, *geometries: object) -> str:
-        """A file of another program: a place for drone 1, and one for the nearest, which is 9."""
+        """A file of another program: a place for drone 1, and one for the nearest, which is 4."""
         drawn = [(name, {"type": "Point", "coordinates": place}) for name, place in points]
         features = [
             {"type": "Feature", "properties": {"name": name}, "geometry": geometry}
@@ -202,5 +204,6 @@ class StandingLayoutsTest(unittest.TestCase):
 
 
 if __name__ == "__main__":
+    preload("drone_mesh.ros.views.order_commands")
     rospy.init_node("test_standing_layouts")
     rostest.rosrun("drone_mesh", "standing_layouts", StandingLayoutsTest)
