@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import importlib
 import multiprocessing
 import os
 import queue
@@ -94,6 +95,8 @@ def _run_fork(words: list[str], environment: dict[str, str], out: Path, errors: 
         os.dup2(os.open(path, os.O_WRONLY | os.O_CREAT), number)
     os.environ.update(environment)
     sys.argv = words
+    if any(word.startswith("__ns:=") for word in words):
+        importlib.reload(sys.modules["rospy.names"])  # which takes it when it is imported
     try:
         runpy.run_path(words[0], run_name="__main__")
     finally:

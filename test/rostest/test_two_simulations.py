@@ -15,7 +15,15 @@ import rosgraph
 import rospy
 import rostest
 from rosgraph_msgs.msg import Clock
-from rostest_support import WALL_LIMIT_S, call, pid_of, program, receives, wait_for
+from rostest_support import (
+    WALL_LIMIT_S,
+    call,
+    pid_of,
+    program,
+    receives,
+    run_program,
+    wait_for,
+)
 
 from drone_mesh.msg import MeshState
 from drone_mesh.srv import Casus, RequestGPS, SetSpeed
@@ -23,8 +31,8 @@ from drone_mesh.srv import Casus, RequestGPS, SetSpeed
 SITE_B = """<launch><group ns="site_b"><include file="$(find drone_mesh)/launch/factory.launch">
   <arg name="routers" value="2"/><arg name="spacing" value="6"/><arg name="hosts" value="2"/>
 </include></group></launch>"""
-LAYOUT_1 = (-13.0, 24.0)
-LAYOUT_2 = (-11.0, 20.0)  # the places of drones 1 and 2 in config/casus.yaml
+LAYOUT_1 = (1.0, 2.0)
+LAYOUT_2 = (7.0, 2.0)  # the places of drones 1 and 2 in two_simulations.yaml
 FAILED = 2
 
 
@@ -65,13 +73,6 @@ def names_of(nodes: str) -> set[str]:
     return found - {"/rosout", "/rosout_agg"}
 
 
-def run(name: str, *words: str) -> subprocess.CompletedProcess[str]:
-    """In a process of its own: rospy takes the namespace of the process when it is imported."""
-    return subprocess.run(
-        program(name, *words), capture_output=True, timeout=WALL_LIMIT_S, check=False, text=True
-    )
-
-
 class TwoSimulationsTest(unittest.TestCase):
     def test_each_lives_in_its_namespace_with_all_tools_until_its_own_end(self) -> None:
         rospy.init_node("test_two_simulations", argv=["/clock:=/site_a/clock"])
@@ -89,14 +90,16 @@ class TwoSimulationsTest(unittest.TestCase):
         self.times_are_apart()
         self.orders_are_apart()
         self.tools_take_the_namespace()
-        self.a_recording_is_read_and_played_elsewhere()
-        self.a_second_start_is_refused()
+        recorded_s = self.one_is_recorded()
 
         second.send_signal(signal.SIGINT)
         second.wait(WALL_LIMIT_S)
         self.assertEqual(names_of("/site_b/"), set())
         call("/site_a/SetToCasus", Casus, 1)
         wait_for("drone 1 at its place", WALL_LIMIT_S, lambda: self.a.place(1) == LAYOUT_1)
+
+        self.the_recording_is_read_and_played_elsewhere(recorded_s)
+        self.a_second_start_is_refused()
 
     def names_are_apart(self) -> None:
         for site in ("/site_a/", "/site_b/"):
@@ -107,39 +110,45 @@ class TwoSimulationsTest(unittest.TestCase):
     def times_are_apart(self) -> None:
         call("/site_b/DroneFactory/setSpeed", SetSpeed, True, 0.0)
         stood_s, passed_s = self.b.now_s, self.a.now_s
-        wait_for("time passes at site a", WALL_LIMIT_S, lambda: self.a.now_s > passed_s + 5.0)
+        wait_for("time passes at site a", WALL_LIMIT_S, lambda: self.a.now_s > passed_s + 3.0)
         self.assertLess(self.b.now_s, stood_s + 1.0)
-        call("/site_b/DroneFactory/setSpeed", SetSpeed, False, 2.0)
+        call("/site_b/DroneFactory/setSpeed", SetSpeed, False, 1.0)
 
     def orders_are_apart(self) -> None:
         before = self.b.place(1)
-        flown = run("fly", "1", "3.0", "3.0", "__ns:=site_a")
+        flown = subprocess.run(  # not in a fork, which imported rospy before
+            program("fly", "1", "2.0", "2.0", "__ns:=site_a"),
+            capture_output=True,
+            timeout=WALL_LIMIT_S,
+            check=False,
+            text=True,
+        )
         self.assertEqual(flown.returncode, 0, flown.stderr)
         x, y = self.a.place(1)
-        self.assertLess(abs(x - 3.0) + abs(y - 3.0), 0.2)
+        self.assertLess(abs(x - 2.0) + abs(y - 2.0), 0.2)
         self.assertEqual(self.b.place(1), before)
-        ordered = run("layout", "2", "__ns:=/site_a")
+        ordered = run_program("layout", "2", "__ns:=/site_a")
         self.assertEqual(ordered.returncode, 0, ordered.stderr)
         self.assertEqual(self.a.place(2), LAYOUT_2)
         self.assertEqual(self.b.place(2), (6.0, 0.0))
 
     def tools_take_the_namespace(self) -> None:
         for site, drones in (("site_a", 4), ("site_b", 3)):
-            table = run("status", f"__ns:={site}")
+            table = run_program("status", f"__ns:={site}")
             self.assertEqual(
                 len(re.findall(r"^\d+ +(?:gateway|router)", table.stdout, re.M)), drones
             )
-        missing = run("status")
+        missing = run_program("status")
         self.assertEqual(missing.returncode, FAILED)
         self.assertIn("no state on /mesh/state", missing.stderr)
-        drawn = run("snapshot", str(self.folder / "b.png"), "__ns:=site_b")
+        drawn = run_program("snapshot", str(self.folder / "b.png"), "__ns:=site_b")
         self.assertEqual(drawn.returncode, 0, drawn.stderr)
         self.assertTrue(
             receives("/site_a/mesh_console", "/site_a/mesh/state", "/site_a/DroneFactory")
         )
 
-    def a_recording_is_read_and_played_elsewhere(self) -> None:
-        """Of the namespace alone; from a namespace to another."""
+    def one_is_recorded(self) -> float:
+        """Of the namespace alone. Returns a simulated time in the recording."""
         recorder = self.launch(
             "drone_mesh", "record.launch", f"bag:={self.folder}/run", "__ns:=site_b"
         )
@@ -148,6 +157,10 @@ class TwoSimulationsTest(unittest.TestCase):
         wait_for("some of it is recorded", WALL_LIMIT_S, lambda: self.b.now_s > begun_s + 4.0)
         recorder.send_signal(signal.SIGINT)
         recorder.wait(WALL_LIMIT_S)
+        return begun_s
+
+    def the_recording_is_read_and_played_elsewhere(self, recorded_s: float) -> None:
+        """From a namespace to another."""
         (bag,) = self.folder.glob("run*.bag")
         with rosbag.Bag(str(bag)) as recorded:
             topics = set(recorded.get_type_and_topic_info().topics)
@@ -157,14 +170,17 @@ class TwoSimulationsTest(unittest.TestCase):
         )
         trace = str(self.folder / "trace.csv")
         for tool in (("status", "--bag", str(bag)), ("flight_trace", str(bag), trace)):
-            finished = run(*tool)
+            finished = run_program(*tool)
             self.assertEqual(finished.returncode, 0, finished.stderr)
-        again = Site("/again", 3)
+        site = Site("/again", 3)
         player = self.launch(
             "drone_mesh", "replay.launch", f"bag:={bag}", "console:=false", "__ns:=again"
         )
-        again.wait_until_connected()
-        wait_for("the recorded time", WALL_LIMIT_S, lambda: again.now_s > begun_s)
+        site.wait_until_connected()
+        wait_for("the recorded time", WALL_LIMIT_S, lambda: site.now_s > recorded_s)
+        published, _subscribed, _offered = rosgraph.Master("/rostest").getSystemState()
+        again = {topic for topic, nodes in published if "/again/mesh_replay" in nodes}
+        self.assertEqual([t for t in again - {"/rosout"} if not t.startswith("/again/")], [])
         player.send_signal(signal.SIGINT)
         player.wait(WALL_LIMIT_S)
 
@@ -182,7 +198,7 @@ class TwoSimulationsTest(unittest.TestCase):
     def a_second_start_is_refused(self) -> None:
         pid = pid_of("/site_a/DroneFactory")
         for name, node in (("drone_factory", "DroneFactory"), ("drone_manager", "DroneManager")):
-            refused = run(name, "__ns:=site_a")
+            refused = run_program(name, "__ns:=site_a")
             self.assertEqual(refused.returncode, FAILED)
             lines = [line for line in refused.stderr.splitlines() if "pybullet" not in line]
             self.assertEqual(len(lines), 1, refused.stderr)
