@@ -23,8 +23,8 @@ from drone_mesh.errors import MeshError
 def loading() -> Iterator[None]:
     """What is imported meanwhile stays until the program ends, so no garbage is looked for in it.
 
-    Python would look through all modules several times while they load, and again at the end: a
-    quarter of the processor time of a short program with ROS.
+    Python would look through the new modules again and again while they load, and through all at
+    the end: a quarter of the processor time of a short program with ROS.
     """
     gc.disable()
     try:
