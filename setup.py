@@ -45,6 +45,22 @@ HOT = {
     "inprocess": "clock drone node radio shared_air shared_antenna",
     "nrf24/emulator": "links space",
 }
+BUILD = Path("build/compiled/c")
+FILES_AT_ONCE = 8
+
+
+def batches(sources: list[str]) -> list[str]:
+    """C files that include these: each start of the compiler reads Python's and mypyc's headers.
+
+    Not all in one, for which a small machine has too little memory.
+    """
+    found = []
+    for first in range(0, len(sources), FILES_AT_ONCE):
+        batch = BUILD / f"batch_{first}.c"
+        names = [Path(source).name for source in sources[first : first + FILES_AT_ONCE]]
+        batch.write_text("".join(f'#include "{name}"\n' for name in names), encoding="utf-8")
+        found.append(str(batch))
+    return found
 
 
 def compiled_core() -> dict[str, Any]:
@@ -59,16 +75,17 @@ def compiled_core() -> dict[str, Any]:
     options.append("--cache-dir=build/compiled/cache")
     extensions = mypycify(
         [*options, *modules],
-        opt_level="1",
+        opt_level="g",
         debug_level="0",
         multi_file=True,
-        target_dir="build/compiled/c",
+        target_dir=str(BUILD),
         group_name="drone_mesh",
     )
     # A fused multiplication rounds otherwise than Python does; warnings are for who writes C.
     flags = [*extensions[-1].extra_compile_args, "-ffp-contract=off", "-Wno-error"]
     for extension in extensions:
         extension.extra_compile_args = flags
+    extensions[0].sources = batches(extensions[0].sources)
     return {"ext_modules": extensions}
 
 
