@@ -1,5 +1,8 @@
 #!/usr/bin/env python3
-"""Drones that are cut off: one of a line flies after the one that died, jammed ones stay."""
+"""Drones that are cut off: one of a line flies after the one that died, jammed ones stay.
+
+Before, the demonstration of a repair: at its end the fleet is as it was.
+"""
 
 from __future__ import annotations
 
@@ -8,34 +11,75 @@ import unittest
 
 import rospy
 import rostest
-from rostest_support import LogWatch, MeshWatch, in_order
+from rostest_support import LogWatch, MeshWatch, StateWatch, in_order
 from std_msgs.msg import Bool
 
+from drone_mesh.console.controls import OrderRefused
+from drone_mesh.console.demonstration import RepairDemonstration
 from drone_mesh.msg import MeshState
+from drone_mesh.ros.graph.conversions import mesh_status
+from drone_mesh.ros.views.console_controls import RosControls
+from drone_mesh.state.model import MeshStatus
+
+AT_PLACE_M = 0.5
+ROUTERS = range(1, 8)
+
+
+class DemonstrationTest(unittest.TestCase):
+    def test_when_it_says_that_all_is_put_back_all_is_as_before(self) -> None:
+        log, states = LogWatch(), StateWatch()
+
+        def next_state() -> MeshStatus:
+            return mesh_status(states.next())
+
+        MeshWatch(8).wait("all connected at the start", 30, lambda: all_connected(next_state()))
+        before, controls, demonstration = next_state(), RosControls(), RepairDemonstration()
+        mesh = before
+        while not demonstration.is_over:
+            try:
+                for order in demonstration.advance(mesh):
+                    order(controls)
+            except OrderRefused as error:
+                self.assertFalse(demonstration.is_leaving, error)
+                demonstration.leave(str(error), mesh.stamp_s)
+            mesh = next_state()
+        told = [step.text for step in demonstration.story.steps]
+        self.assertTrue(any("are connected again" in text for text in told), told)
+        self.assertEqual(told[-1], "Everything is put back: power, places and speed", told)
+        self.assertEqual(mesh.real_time_factor, before.real_time_factor)
+        for was, now in zip(before.nodes, mesh.nodes):
+            self.assertTrue(now.on and now.connected, now.id)
+            self.assertLess(math.dist(now.position, was.position), AT_PLACE_M, now.id)
+        self.assertEqual(log.failures(), [])
+
+
+def all_connected(mesh: MeshStatus) -> bool:
+    return all(node.connected for node in mesh.nodes)
 
 
 class JammerTest(unittest.TestCase):
     def test_jammed_drones_stay_say_so_and_connect_again(self) -> None:
         log = LogWatch()
-        mesh = MeshWatch(4)
+        mesh = MeshWatch(8)
         states: list[MeshState] = []
         rospy.Subscriber("/mesh/state", MeshState, states.append, queue_size=1)
         jammer = rospy.Publisher("/jammer", Bool, latch=True, queue_size=1)
         mesh.wait("all connected at the start", 30, mesh.connected)
-        before = [mesh.place(node) for node in (1, 2, 3)]
+        before = [mesh.place(node) for node in ROUTERS]
         jammer.publish(True)
-        mesh.wait("all routers are cut off", 60, lambda: mesh.lost(1, 2, 3))
+        mesh.wait("all routers are cut off", 60, lambda: mesh.lost(*ROUTERS))
 
         def all_say_so() -> bool:
             routers = [node for node in states[-1].nodes if node.id != 0] if states else []
-            return len(routers) == 3 and all("is jammed" in node.repair for node in routers)
+            words = [node.repair for node in routers]
+            return len(words) == len(ROUTERS) and all("is jammed" in repair for repair in words)
 
         mesh.wait("all say that their channel is jammed", 90, all_say_so)
         self.assertTrue(all(node.jammed for node in states[-1].nodes if node.id != 0))
-        mesh.pass_time(60.0)
+        mesh.pass_time(20.0)
         jammer.publish(False)
         mesh.wait("all connected again", 30, mesh.connected)
-        self.assertEqual([mesh.place(node) for node in (1, 2, 3)], before)
+        self.assertEqual([mesh.place(node) for node in ROUTERS], before)
         self.assertEqual(log.failures(), [])
 
 
@@ -77,7 +121,7 @@ class RepairTest(unittest.TestCase):
 
 
 def suite() -> unittest.TestSuite:
-    return in_order(JammerTest, RepairTest)
+    return in_order(DemonstrationTest, JammerTest, RepairTest)
 
 
 if __name__ == "__main__":
