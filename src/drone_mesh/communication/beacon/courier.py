@@ -35,6 +35,7 @@ class Transit:
     seen_s: float
     sent_s: dict[int, float] = field(default_factory=dict)  # neighbours that have it, since when
     failed_s: dict[int, float] = field(default_factory=dict)  # that did not take it, and when
+    again: set[int] = field(default_factory=set)  # of these, those that were asked again
     tries: int = 0
 
     def __post_init__(self) -> None:

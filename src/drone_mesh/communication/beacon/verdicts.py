@@ -83,6 +83,7 @@ HELD_S: Final = 2.5  # a packet without a next hop waits this long
 RETRY_S: Final = 0.15  # so often it asks again, beside each beacon that arrives
 MOST_WAYS: Final = 3  # to which one node sends a packet down; after that it searches
 SEARCHES_S: Final = 0.6  # a relay without a way searches for so long, then returns a packet
+BURST_S: Final = 0.4  # longer than a burst of collisions, which takes all tries of a packet
 SUSPECTED_S: Final = 30.0  # an order is repeated within 16 s, a POLL within 30 s
 NOT_HELD = (MessageType.MOVEMENT_NEGOTIATION, MessageType.FOUND)  # soon sent again
 
@@ -106,21 +107,26 @@ class Verdicts:
         if asks or (is_up and self._asked.get(transit.addressee)):
             ways = self._answered_first(transit.addressee, ways, asks)
         most = None if is_up or len(transit.sent_s) < MOST_WAYS else 1
+        again_s = math.inf  # when a neighbour that did not take it may have it once more
         for to, shown_s in itertools.islice(ways, most):
             if to == transit.came_from or shown_s <= transit.sent_s.get(to, -math.inf):
                 continue
-            failed_s = transit.failed_s.get(to)
-            if failed_s is None or routes.neighbours[to].alive_s > failed_s:
+            at_s = self._may_have_it_s(transit, to)
+            if at_s <= now_s:
+                if to in transit.failed_s:
+                    transit.again.add(to)
                 if asks and to != transit.addressee:
                     self._asked.setdefault(transit.addressee, {})[to] = now_s
                 return to
+            again_s = min(again_s, at_s)
         if now_s - transit.seen_s >= HELD_S or transit.kind in NOT_HELD:
             return DROP
         if not is_up:
             back, is_own = transit.came_from, transit.came_from == NO_ROUTE
             knows_back = back in routes.neighbours  # who may know another way
             is_tried = back in transit.sent_s or back in transit.failed_s
-            if now_s - transit.seen_s >= SEARCHES_S and knows_back and not is_tried:
+            is_time = now_s - transit.seen_s >= SEARCHES_S and again_s == math.inf
+            if is_time and knows_back and not is_tried:
                 return back
             self._searches.search(transit.addressee, MOST_HOPS if is_own else HOPS_AROUND)
         if self.retry_s <= now_s:
@@ -128,6 +134,20 @@ class Verdicts:
         due_s = min(self.retry_s, self._deadlines.at_s[Due.ROUTING])
         self._deadlines.set(Due.ROUTING, due_s)
         return HOLD
+
+    def _may_have_it_s(self, transit: Transit, to: int) -> float:
+        """When a neighbour may have a packet: after it did not take it, once more or never.
+
+        Once more only users' messages: the others are sent again by their creators, and at the
+        start of a mesh they would fill the channel.
+        """
+        failed_s, neighbour = transit.failed_s.get(to), self._routes.neighbours[to]
+        if failed_s is None or neighbour.alive_s > failed_s:
+            return -math.inf
+        is_once_more = messages.is_data(transit.payload) and to not in transit.again
+        if self._routes.one_loss_counts or not neighbour.usable or not is_once_more:
+            return math.inf
+        return failed_s + BURST_S
 
     def retries(self) -> None:
         """All held packets ask again now."""

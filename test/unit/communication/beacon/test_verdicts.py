@@ -102,6 +102,39 @@ def test_a_neighbour_that_did_not_take_the_packet_gets_it_again_after_a_sign_of_
     assert node.verdict(own, 0.2) == 2
 
 
+def shared(node, text):
+    """Neighbour 1, from which a packet came, and 2, which did not take it after 0.5 s."""
+    node.routes.one_loss_counts = False
+    node.hear(1, 0.3)
+    node.hear(2, 0.3, below=(50,))
+    of_5 = transit(text)
+    of_5.failed_s[2] = 0.5
+    return of_5
+
+
+USERS = "05 01 80 09 32"
+
+
+def test_on_a_shared_channel_it_gets_a_users_message_once_more_after_a_burst_and_then_it_goes_back(
+    node,
+):
+    of_5 = shared(node, USERS)
+    assert node.verdict(of_5, 0.8) == HOLD
+    assert node.verdict(of_5, 0.95) == 2
+    of_5.failed_s[2] = 1.0
+    assert node.verdict(of_5, 1.5) == 1
+
+
+def test_what_its_creator_repeats_goes_back_at_once(node):
+    assert node.verdict(shared(node, FROM_5_THROUGH_1), 0.95) == 1
+
+
+def test_on_a_shared_channel_who_counts_as_gone_does_not_get_it_once_more(node):
+    of_5 = shared(node, USERS)
+    node.routes.neighbours[2].failed_s = 0.5
+    assert node.verdict(of_5, 0.95) == 1
+
+
 @pytest.mark.parametrize(
     ("text", "sent_to", "to"), [(OWN, (3, 4), 5), (OWN, (3, 4, 5), HOLD), (UP, (3, 4, 5), 6)]
 )
