@@ -78,6 +78,7 @@ class History:
         self._events: list[EventRecord] = []  # oldest first
         self._event_times: list[float] = []
         self._events_forgotten = 0
+        self.begins_s = -math.inf  # what was before it is forgotten
         self._packets: list[RecordedDots] = []  # oldest first
         self._packet_times: list[float] = []
         self.marks: list[dict[str, Any]] = []  # what a time line shows: t, node and kind
@@ -186,7 +187,8 @@ class History:
         self._bytes -= sum(map(len, self._states[:states]))
         for kept in (self._states, self.times, self._samples):
             del kept[:states]
-        old = bisect.bisect_left(self._event_times, self.times[0])
+        self.begins_s = self.times[0]
+        old = bisect.bisect_left(self._event_times, self.begins_s)
         self._events_forgotten += old
         del self._events[:old], self._event_times[:old]
-        self.marks = [mark for mark in self.marks if mark["t"] >= self.times[0]]
+        self.marks = [mark for mark in self.marks if mark["t"] >= self.begins_s]

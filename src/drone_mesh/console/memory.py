@@ -137,7 +137,7 @@ class ConsoleMemory:
         if not states and not events and noted == self._noted:
             return
         self._saved_s, self._events, self._noted = history.times[-1], count, noted
-        begins_s, is_new, self._is_new = history.times[0], self._is_new, False
+        begins_s, is_new, self._is_new = history.begins_s, self._is_new, False
         self._unsaved.append(
             _News(self._run, self.seen, noted, states, list(events), begins_s, is_new)
         )

@@ -107,6 +107,15 @@ def test_what_another_run_has_left_is_neither_shown_nor_kept(path):
     assert Console(path).frame["events"] == []
 
 
+def test_events_from_before_the_first_state_stay_when_more_is_saved(tmp_path):
+    console = Console(tmp_path / "console.sqlite")
+    console.store.add_events([EventRecord(0.5, 3, "connected", (0,))])
+    for second in (1.0, 2.0):
+        console.update(second)
+        console.save()
+    assert [event["t"] for event in Console(tmp_path / "console.sqlite").frame["events"]] == [0.5]
+
+
 def test_events_that_come_before_the_first_state_are_shown(path):
     store = FrameStore(History())
     memory = ConsoleMemory(store, path)
