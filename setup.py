@@ -75,7 +75,7 @@ def compiled_core() -> dict[str, Any]:
     options.append("--cache-dir=build/compiled/cache")
     extensions = mypycify(
         [*options, *modules],
-        opt_level="g",
+        opt_level="1",
         debug_level="0",
         multi_file=True,
         target_dir=str(BUILD),
