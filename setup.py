@@ -32,8 +32,8 @@ def requirements(name: str) -> list[str]:
 HOT = {
     "channel": "access_rules medium_access packet_queue statistics trains",
     "communication": "neighbours timing",
-    "communication/beacon": "connection courier disputes neighbour own_beacons packets plane routes"
-    " times verdicts",
+    "communication/beacon": "connection courier disputes neighbour neighbourhood own_beacons"
+    " packets plane routes times verdicts way_up",
     "communication/control": "delivery node_part pilot places router_states",
     "communication/events": "complaints",
     "communication/heartbeats": "connection delivery detours forwarding gateway_plane introduction"

@@ -12,10 +12,10 @@ from proofs import attacks, claims, damage
 from drone_mesh.channel.access_rules import AccessRules
 from drone_mesh.communication.beacon.connection import AGAIN_S, NEW_S, PERIOD_S
 from drone_mesh.communication.beacon.disputes import REMEMBERED_S
-from drone_mesh.communication.beacon.routes import IN_VAIN, PARDONED, STALE
-from drone_mesh.communication.beacon.routes import REMEMBERED_S as ASKED_S
 from drone_mesh.communication.beacon.times import JITTER
 from drone_mesh.communication.beacon.verdicts import SUSPECTED_S
+from drone_mesh.communication.beacon.way_up import IN_VAIN, PARDONED, STALE
+from drone_mesh.communication.beacon.way_up import REMEMBERED_S as ASKED_S
 from drone_mesh.communication.data import packets as data
 from drone_mesh.communication.events import complaints
 from drone_mesh.communication.heartbeats import detours, node_search

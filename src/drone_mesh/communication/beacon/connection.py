@@ -10,8 +10,9 @@ from typing import Final
 from drone_mesh.communication.beacon.courier import Courier
 from drone_mesh.communication.beacon.own_beacons import OwnMotion
 from drone_mesh.communication.beacon.packets import newer
-from drone_mesh.communication.beacon.routes import PROVEN_S, BeaconRoutes
+from drone_mesh.communication.beacon.routes import BeaconRoutes
 from drone_mesh.communication.beacon.times import JITTER
+from drone_mesh.communication.beacon.way_up import PROVEN_S
 from drone_mesh.communication.control.control_plane import IControlHost
 from drone_mesh.communication.control.places import KnownPlaces, PlaceRequests
 from drone_mesh.communication.control.router_states import RepairState, RouterEvent, RouterStates

@@ -11,7 +11,8 @@ from drone_mesh.communication.beacon.packets import (
     Beacon,
     Below,
 )
-from drone_mesh.communication.beacon.routes import STALE, BeaconRoutes
+from drone_mesh.communication.beacon.routes import BeaconRoutes
+from drone_mesh.communication.beacon.way_up import STALE
 from drone_mesh.communication.timing import Deadlines
 
 ME, LIAR, LEFT, RIGHT = 0, 1, 2, 3
