@@ -154,7 +154,7 @@ it costs only 2 bytes per message more
 
 each cell is the mean of seeds 0 to 2
 
-Figures of 2026-11-28 and 29.
+Figures of 2026-11-29 (2cd620c9).
 
 Of the 100 drones of the grid, all ordered at once on a channel of 250 kbit/s, some get no order
 
