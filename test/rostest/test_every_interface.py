@@ -25,6 +25,7 @@ from rostest_support import WALL_LIMIT_S, LogWatch, MeshWatch, call, wait_for
 from std_msgs.msg import Bool, Float32, String
 
 from drone_mesh import msg, srv
+from drone_mesh.ros.graph.resting_clock import RestingClock
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = ("README.md", "docs/ros.md", "docs/observing.md", "docs/data.md")
@@ -65,6 +66,7 @@ class EveryInterfaceTest(unittest.TestCase):
         cls.log = LogWatch()
         cls.used: dict[str, str] = {}
         cls.heard: dict[str, list[Any]] = defaultdict(list)
+        cls.topics: dict[str, rospy.Subscriber] = {}
         cls.mesh = MeshWatch(7, every_tick=True)
         cls.listen("/mesh/state", msg.MeshState)
         cls.listen("/mesh/events", msg.MeshEvent)
@@ -86,8 +88,13 @@ class EveryInterfaceTest(unittest.TestCase):
     def listen(cls, name: str, of: type) -> None:
         """Keep what is published from now on; returns when a publisher is connected."""
         cls.note(name, of)
-        topic = rospy.Subscriber(name, of, cls.heard[name].append)
+        cls.topics[name] = topic = rospy.Subscriber(name, of, cls.heard[name].append)
         wait_for(f"a publisher of {name}", WALL_LIMIT_S, lambda: topic.get_num_connections() > 0)
+
+    def leave(self, *names: str) -> None:
+        """Listen no more: busy topics cost both sides time."""
+        for name in names:
+            self.topics.pop(name).unregister()
 
     def wait_heard(self, name: str, **fields: object) -> Any:
         """The first message with these fields that was or will be heard."""
@@ -166,7 +173,8 @@ class EveryInterfaceTest(unittest.TestCase):
         ticks = [tick.clock.to_sec() for tick in self.heard["/clock"][:100]]
         steps = [after - before for before, after in zip(ticks, ticks[1:])]
         self.assertAlmostEqual(min(steps), 0.01, places=6)
-        self.assertGreater(self.wait_heard("/DroneFactory/real_time_factor").data, 0.0)
+        factors = self.heard["/DroneFactory/real_time_factor"]  # 0: a busy machine stood for 1 s
+        wait_for("the factor", WALL_LIMIT_S, lambda: any(factor.data > 0.0 for factor in factors))
         self.mesh.wait(
             "diagnostics without trouble",
             60,
@@ -176,6 +184,8 @@ class EveryInterfaceTest(unittest.TestCase):
                 for status in array.status
             ),
         )
+        self.leave("/debug", "/mesh/progress", "/clock", "/WirelessSignalSimulator")
+        RestingClock()
 
     def test_01_the_simulator_carries_packets_while_nobody_jams_them(self) -> None:
         self.listen("/Node/2", msg.NRF24)
@@ -204,6 +214,7 @@ class EveryInterfaceTest(unittest.TestCase):
         wait_for("a packet is jammed", WALL_LIMIT_S, lambda: not send())
         jammer.publish(False)
         wait_for("a packet arrives", WALL_LIMIT_S, send)
+        self.leave("/Node/2")
 
     def test_02_packets_are_sampled(self) -> None:
         self.listen("/mesh/packets", msg.PacketSample)
@@ -213,6 +224,7 @@ class EveryInterfaceTest(unittest.TestCase):
         sample = next(sample for sample in self.heard["/mesh/packets"] if len(sample.types))
         self.assertLessEqual(set(sample.senders) | set(sample.receivers), set(STARTS))
         self.assertGreaterEqual(sample.carried, len(sample.types))
+        self.leave("/mesh/packets")
 
     def test_03_a_message_reaches_the_gateway(self) -> None:
         sent = self.ask(

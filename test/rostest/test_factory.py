@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 import unittest
+from pathlib import Path
 
 import numpy as np
 import rospy
 from rosgraph_msgs.msg import Clock
-from rostest_support import LogWatch, MeshWatch, call, wait_for
+from rostest_support import LogWatch, MeshWatch, call, pid_of, wait_for
 
 from drone_mesh.msg import DroneInfo, Location
 from drone_mesh.ros.graph.resting_clock import RestingClock
@@ -58,6 +59,12 @@ class FactoryTest(unittest.TestCase):
         self.addCleanup(clock.unregister)
         self.mesh.wait("ticks", 10, lambda: read_s and read_s[-1] > read_s[0] + simulated_s)
         return read_s
+
+    def test_no_process_spends_time_and_memory_on_numpy_which_none_of_them_needs(self) -> None:
+        for node in ("/DroneFactory", "/WirelessSignalSimulator", "/fly_actions"):
+            libraries = Path(f"/proc/{pid_of(node)}/maps").read_text("utf-8")
+            self.assertIn("python", libraries)
+            self.assertNotIn("numpy", libraries, node)
 
     def test_a_speed_out_of_bounds_is_refused_with_the_bounds(self) -> None:
         for factor in (math.nan, math.inf, -1.0, 1e-300, 1e-5, 100_000.0):

@@ -23,7 +23,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from fenced_blocks import blocks  # noqa: E402
 
 CHECKOUT = Path(__file__).resolve().parents[2]
-LEFT_OUT = (".*", "build", "logs", "__pycache__")
+LEFT_OUT = (".*", "build", "logs")
 CONNECTED = "2 of 2 routers connected"
 SOON_CONNECTED = "routers:=2 spacing:=6 real_time_factor:=3"
 ASK_AGAIN_AFTER_S = 0.5

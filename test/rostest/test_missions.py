@@ -9,7 +9,15 @@ from pathlib import Path
 
 import rospy
 import rostest
-from rostest_support import WALL_LIMIT_S, LogWatch, call, run_program, wait_for
+from rostest_support import (
+    WALL_LIMIT_S,
+    LogWatch,
+    call,
+    preload,
+    rest_between_ticks,
+    run_program,
+    wait_for,
+)
 
 from drone_mesh.msg import Location, MeshEvent, MeshState
 from drone_mesh.srv import FlyMission, FlyMissionRequest, RequestDroneFlight
@@ -118,5 +126,7 @@ class MissionsTest(unittest.TestCase):
 
 
 if __name__ == "__main__":
+    preload("drone_mesh.ros.views.mission_command")
     rospy.init_node("test_missions")
+    rest_between_ticks()
     rostest.rosrun("drone_mesh", "missions", MissionsTest)

@@ -7,7 +7,7 @@ import unittest
 
 import rospy
 import rostest
-from rostest_support import in_order, send_home
+from rostest_support import in_order, rest_between_ticks, send_home
 from test_document import DocumentTest
 from test_mesh_state import MeshStateTest
 from test_tools import ToolsTest
@@ -24,4 +24,5 @@ def suite() -> unittest.TestSuite:
 
 if __name__ == "__main__":
     rospy.init_node("test_three_routers")
+    rest_between_ticks()
     rostest.rosrun("drone_mesh", "three_routers", "__main__.suite")

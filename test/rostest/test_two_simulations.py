@@ -7,6 +7,7 @@ import re
 import signal
 import subprocess
 import tempfile
+import time
 import unittest
 from pathlib import Path
 
@@ -16,9 +17,11 @@ import rospy
 import rostest
 from rosgraph_msgs.msg import Clock
 from rostest_support import (
+    CLOCK_REST_S,
     WALL_LIMIT_S,
     call,
     pid_of,
+    preload,
     program,
     receives,
     run_program,
@@ -34,6 +37,7 @@ SITE_B = """<launch><group ns="site_b"><include file="$(find drone_mesh)/launch/
 LAYOUT_1 = (1.0, 2.0)
 LAYOUT_2 = (7.0, 2.0)  # the places of drones 1 and 2 in two_simulations.yaml
 FAILED = 2
+PROGRAMS = ("views.order_commands", "views.status", "world.drone_factory_node")
 
 
 class Site:
@@ -44,13 +48,14 @@ class Site:
         self._state = MeshState()
         self.now_s = 0.0
         rospy.Subscriber(f"{namespace}/mesh/state", MeshState, self._on_state)
-        rospy.Subscriber(f"{namespace}/clock", Clock, self._on_clock)
+        rospy.Subscriber(f"{namespace}/clock", Clock, self._on_clock, queue_size=1)
 
     def _on_state(self, state: MeshState) -> None:
         self._state = state
 
     def _on_clock(self, tick: Clock) -> None:
         self.now_s = tick.clock.to_sec()
+        time.sleep(CLOCK_REST_S)
 
     def wait_until_connected(self) -> None:
         wait_for(f"{self.namespace} connected", 2 * WALL_LIMIT_S, self._is_connected)
@@ -218,4 +223,5 @@ class TwoSimulationsTest(unittest.TestCase):
 
 
 if __name__ == "__main__":
+    preload(*(f"drone_mesh.ros.{module}" for module in PROGRAMS))
     rostest.rosrun("drone_mesh", "two_simulations", TwoSimulationsTest)

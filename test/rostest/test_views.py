@@ -7,7 +7,7 @@ import unittest
 
 import rospy
 import rostest
-from rostest_support import in_order
+from rostest_support import in_order, rest_between_ticks
 from test_mesh_console import MeshConsoleTest
 from test_mesh_markers import MeshMarkersTest
 
@@ -18,4 +18,5 @@ def suite() -> unittest.TestSuite:
 
 if __name__ == "__main__":
     rospy.init_node("test_views")
+    rest_between_ticks()
     rostest.rosrun("drone_mesh", "views", "__main__.suite")

@@ -64,14 +64,14 @@ def loaded_by(program: Path) -> set[str]:
 @pytest.mark.parametrize(
     ("program", "unwanted"),
     [
-        ("drone_factory", WEB | REPORT),  # internet:=mock, the default
-        ("mesh_host", WEB | REPORT),
+        ("drone_factory", WEB | REPORT | {"numpy"}),  # internet:=mock, the default
+        ("mesh_host", WEB | REPORT | {"numpy"}),
         ("drone_manager", NODE | WEB | REPORT),
-        ("wireless_signal_simulator", NODE | TECHNIQUES | WEB | REPORT),
-        ("status", NODE | TECHNIQUES | WEB | REPORT | {"rosbag"}),
+        ("wireless_signal_simulator", NODE | TECHNIQUES | WEB | REPORT | {"numpy"}),
+        ("status", NODE | TECHNIQUES | WEB | REPORT | {"numpy", "rosbag"}),
         ("layout", NODE | TECHNIQUES | WEB | REPORT | {"rosbag"}),
-        ("fly_actions", NODE | WEB | REPORT),
-        ("mesh_markers", NODE | TECHNIQUES | WEB | REPORT),
+        ("fly_actions", NODE | WEB | REPORT | {"numpy"}),
+        ("mesh_markers", NODE | TECHNIQUES | WEB | REPORT | {"numpy"}),
         ("console", NODE | REPORT | {"fastapi", "pybullet", "rosbag"}),
         ("report", WEB | {"pybullet"}),
         ("raspberry_router", WEB | REPORT | SIMULATION | AUTOPILOT),

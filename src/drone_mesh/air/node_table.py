@@ -7,8 +7,6 @@ import re
 from dataclasses import dataclass
 from typing import Sequence, Tuple
 
-import numpy as np
-
 from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.communication.repair.options import RANGE_M
@@ -77,8 +75,6 @@ class NodeTable:
         self._obstacles = obstacles
         self._nodes: dict[int, Node] = {}
         self._positions: dict[int, Position] = {}  # also of nodes that are not registered yet
-        self._places: np.ndarray = np.zeros((MAX_NODE_ID + 1, 3))  # (id, xyz), metres
-        self._hears: np.ndarray = np.zeros(MAX_NODE_ID + 1, dtype=bool)  # registered, and on
         # Results of in_range, valid until a node moves or is switched.
         self._in_range: dict[int, tuple[int, ...]] = {}
 
@@ -104,7 +100,6 @@ class NodeTable:
         known = self._nodes.get(node_id)
         if known is None:
             self._positions.setdefault(node_id, position)
-            self._places[node_id] = self._positions[node_id]
         if known != Node(node_id, topic, on):
             self._set(Node(node_id, topic, on))
 
@@ -116,12 +111,10 @@ class NodeTable:
                 self._set(Node(node_id, node.topic, on))
         elif self._positions.get(node_id) != position:
             self._positions[node_id] = position
-            self._places[node_id] = position
             self._in_range.clear()
 
     def _set(self, node: Node) -> None:
         self._nodes[node.node_id] = node
-        self._hears[node.node_id] = node.on
         self._in_range.clear()
 
     # Requests --------------------------------------------------------------------------------
@@ -166,12 +159,8 @@ class NodeTable:
             raise AirError(f"node {node_id} is not registered")
         if not node.on:
             return ()
-        apart = self._places - self._places[node_id]  # (id, xyz), metres
-        near = (np.square(apart).sum(axis=1) < self._reach_m2) & self._hears
-        near[node_id] = False
-        here = self._positions[node_id]
-        others = (int(other) for other in np.flatnonzero(near))
-        return tuple(other for other in others if self._sees(here, self._positions[other]))
+        others = sorted(other for other in self._nodes if other != node_id)
+        return tuple(other for other in others if self.link(node_id, other) is not None)
 
     def _sees(self, here: Position, there: Position) -> bool:
         obstacles = self._obstacles

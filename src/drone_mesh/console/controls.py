@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Mapping, Sequence
+from typing import TYPE_CHECKING, ClassVar, Mapping, Sequence
 
 from drone_mesh.drone.flight_path import Point
 from drone_mesh.errors import MeshError
 from drone_mesh.formations.layouts import Order
 from drone_mesh.formations.missions import Mission
-from drone_mesh.formations.preview import FormationPreview
+
+if TYPE_CHECKING:  # which needs numpy
+    from drone_mesh.formations.preview import FormationPreview
 
 
 class OrderRefused(MeshError):

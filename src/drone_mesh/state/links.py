@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import enum
 import math
-from typing import Any, Iterable, Mapping, Sequence, Tuple
-
-import numpy as np
+from typing import Iterable, Mapping, Sequence, Tuple
 
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.drone.roles import Role
@@ -68,15 +66,14 @@ def links_by_use(
 
 def known_links(nodes: Sequence[NodeStatus]) -> set[Link]:
     """Pairs of nodes of which one lists the other as a neighbour while both are on."""
-    # numpy, because a crowd of 254 lists 36,000 neighbours.
-    on: np.ndarray = np.zeros(256, dtype=bool)  # an id is one byte
-    on[[node.id for node in nodes if node.on]] = True
-    listed: np.ndarray = np.zeros((on.size, on.size), dtype=bool)
-    for node in nodes:
-        listed[node.id, list(node.neighbours)] = True
-    linked = np.triu((listed | listed.T) & on & on[:, None], k=1)
-    pairs: Any = np.argwhere(linked).tolist()
-    return {(low, high) for low, high in pairs}
+    present = [node for node in nodes if node.on]
+    on = {node.id for node in present}
+    return {
+        (node.id, other) if node.id < other else (other, node.id)
+        for node in present
+        for other in on.intersection(node.neighbours)
+        if other != node.id
+    }
 
 
 def route_links(nodes: Sequence[NodeStatus]) -> set[Link]:
@@ -104,7 +101,7 @@ class LinkForecast:
 
     def __init__(self) -> None:
         self._before: tuple[float, dict[int, Sequence[float]]] = (-math.inf, {})
-        self._velocities: dict[int, np.ndarray] = {}
+        self._velocities: dict[int, Sequence[float]] = {}
 
     def update(
         self, links: Iterable[Link], nodes: Sequence[NodeStatus], now_s: float, range_m: float
@@ -118,7 +115,7 @@ class LinkForecast:
         if not 0.0 <= passed_s < VELOCITY_OVER_S:
             is_fresh = 0.0 < passed_s < 5 * VELOCITY_OVER_S
             self._velocities = {
-                node: (np.subtract(place, before[node]) / passed_s)
+                node: [moved_m / passed_s for moved_m in _from(before[node], place)]
                 for node, place in places.items()
                 if is_fresh and node in before
             }
@@ -126,11 +123,15 @@ class LinkForecast:
         found = []
         for one, other in links:
             if {one, other} <= self._velocities.keys() & places.keys():
-                away: Any = np.subtract(places[other], places[one]).tolist()
-                drift: Any = (self._velocities[other] - self._velocities[one]).tolist()
+                away = _from(places[one], places[other])
+                drift = _from(self._velocities[one], self._velocities[other])
                 if link_expires_s(away, drift, range_m) < SOON_S:
                     found.append((one, other))
         return sorted(found)
+
+
+def _from(one: Sequence[float], other: Sequence[float]) -> Sequence[float]:
+    return [b - a for a, b in zip(one, other)]
 
 
 def link_expires_s(away: Sequence[float], drift: Sequence[float], range_m: float) -> float:

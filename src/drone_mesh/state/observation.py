@@ -7,8 +7,6 @@ from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Iterable, Sequence
 
-import numpy as np
-
 from drone_mesh.air.obstacles import Box
 from drone_mesh.communication.control.router_states import RepairState
 from drone_mesh.communication.events.observer import MeshEvent, MeshEventKind
@@ -194,12 +192,9 @@ def describe_component(
     waits = repair.state is RepairState.LOST
     status.emergency_in = repair.emergency_s - now_s if waits else math.inf
     heard_s = component.get_neighbours()
-    # numpy, because a crowd of 254 has 36,000 neighbours to list twice a second.
-    ids = np.fromiter(heard_s, np.uint8, len(heard_s))
-    ages_s = now_s - np.fromiter(heard_s.values(), float, len(heard_s))
-    by_id = ids.argsort()
-    status.neighbours = ids[by_id].tobytes()
-    status.neighbour_ages = ages_s.clip(0, OLDEST_AGE_S).astype(np.uint8)[by_id].tobytes()
+    status.neighbours = bytes(sorted(heard_s))
+    ages_s = [int(now_s - heard_s[neighbour]) for neighbour in status.neighbours]
+    status.neighbour_ages = bytes([max(0, min(age_s, OLDEST_AGE_S)) for age_s in ages_s])
 
 
 def describe_drone(

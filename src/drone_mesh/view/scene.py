@@ -7,8 +7,6 @@ import math
 from dataclasses import dataclass
 from typing import Iterable, Sequence, Tuple
 
-import numpy as np
-
 from drone_mesh.drone.flight_path import Vector
 from drone_mesh.drone.roles import Role
 from drone_mesh.state.condition import Condition, condition_of, find_trouble, summarise
@@ -164,6 +162,8 @@ def crowding_m(drones: Sequence[DronePicture]) -> float:
 
     Infinite for fewer than two drones. A single close pair hardly affects it.
     """
+    import numpy as np  # in the process of a window or a picture; the world itself does without
+
     positions = np.array([drone.position for drone in drones], dtype=float).reshape(-1, 3)
     if len(positions) < 2:
         return math.inf

@@ -33,6 +33,7 @@ _MEASURE_PERIOD_S = 1.0  # wall
 _TOO_SLOW = 0.95  # of the requested factor
 _NAP_S = 0.001  # wall; while the mesh processes what is due
 _TASK_POLL_S = 0.2  # wall; how soon a waiting caller notices the end of the simulation
+_SHORTEST_NAP_S = 0.005  # wall; steps that become due meanwhile need one wake-up together
 _LONGEST_NAP_S = 0.05  # wall; a new speed or Ctrl-C takes effect after this at the latest
 
 # Simulated: a timer is late by at most this plus one step of the world, and so is the last
@@ -218,7 +219,7 @@ class WorldRunner:
                 time.sleep(_LONGEST_NAP_S)
                 return
             if wait_s > 0.0:
-                time.sleep(wait_s)
+                time.sleep(max(wait_s, _SHORTEST_NAP_S))
             self._tick.clock = ros_time(self._world.step())
             self._clock.publish(self._tick)
             if self._nodes is not None:
