@@ -130,6 +130,7 @@ SENTENCES = [
     f"it takes three of them within {antenna.FORGOTTEN_S:g} s",
     f"has challenged it within {complaints.CHALLENGED_FOR_S:g} s",
     f"it counts for {seal.LATE_ANSWER_S:g} s, also after the next challenge",
+    f"which acknowledges nothing, once in {seal.OWN_ID_AGAIN_S:g} s",
     f"until its next answer to a challenge within {seal.CHALLENGE_AGAIN_S:g} s",
     f"it came within {seal.CHALLENGE_AGAIN_S:g} s of the challenge",
     f"500 packets a second fill the channel at 250 kbit/s. An attacker that sends them for a year "

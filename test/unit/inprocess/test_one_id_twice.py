@@ -26,16 +26,14 @@ def start(routing: str, key: MeshKey | None, seed: int = 2) -> tuple[Network, Ne
     return mesh, twin
 
 
-TURNS = pytest.mark.xfail(strict=True, reason="handshakes take seconds, in which routes turn to it")
-
-
 @pytest.mark.parametrize(
     ("routing", "key", "seed"),
     [
         ("child_table_tree", None, 2),
         ("beacon", None, 2),
         ("child_table_tree", KEY, 4),
-        pytest.param("child_table_tree", KEY, 6, marks=TURNS),
+        ("child_table_tree", KEY, 6),
+        ("child_table_tree", KEY, 11),
         ("beacon", KEY, 2),
     ],
 )
@@ -75,16 +73,27 @@ def test_a_gateway_gives_way_to_no_other_radio_with_its_id(routing):
 
 
 def test_whoever_comes_back_after_giving_way_finds_the_id_introduced_again():
-    """The other one introduces itself only so often, but anew when the first can be back."""
+    """The other one introduces itself only so often, and apart, but anew when the first is back."""
     control, antenna, deadlines = Mock(), Mock(), Deadlines()
     own_id = OwnId(control, antenna, deadlines, Mock(), random.Random(1), 10.0, math.inf)
     control.says_connected.return_value = False
-    for now_s in (11.0, 41.0):
-        deadlines.now_s = now_s
+    for back_s in (11.0, 41.0):
+        sent_s = []
+        control.introduce.side_effect = lambda sent_s=sent_s: sent_s.append(deadlines.now_s)
+        deadlines.now_s = back_s
         for _ in range(4):
             own_id.heard(0, b"")
-    assert control.introduce.call_count == 3 + 3
+        while deadlines.next_s < math.inf:
+            deadlines.now_s = deadlines.next_s
+            own_id.on_due()
+            own_id.heard(0, b"")
+        assert len(sent_s) == 3
+        assert sent_s[0] == back_s
+        assert all(0.5 <= later - first <= 1.5 for first, later in zip(sent_s, sent_s[1:]))
     control.says_connected.return_value = True
     own_id.heard(0, b"")
     antenna.switch_power.assert_called_once_with(False)
-    assert 41.0 + 30.0 <= deadlines.at_s[Due.OWN_ID] <= 41.0 + 60.0
+    assert 41.0 + 30.0 <= deadlines.at_s[Due.OWN_ID] <= deadlines.now_s + 60.0
+    deadlines.now_s = deadlines.at_s[Due.OWN_ID]
+    own_id.on_due()
+    antenna.switch_power.assert_called_with(True)

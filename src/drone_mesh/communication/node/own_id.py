@@ -20,6 +20,7 @@ from drone_mesh.communication.timing import Deadlines, Due, RateLimit
 SHARED_FOR_S = 60.0  # for so long after the last packet of the other, both say so
 OFF_S = 30.0  # the antenna of a node that gives way is off for 1 to 2 times this
 INTRODUCTIONS = 3  # in OFF_S, so that the other one hears one each time it comes back
+APART_S = 1.0  # between two of them, 0.5 to 1.5 times this: both send, and hear nothing meanwhile
 
 
 @dataclass(eq=False)
@@ -30,7 +31,7 @@ class OwnId:
     _antenna: IWirelessCommunication
     _deadlines: Deadlines
     _complaints: Complaints
-    _rng: random.Random  # spreads the time off: two that gave way do not return together
+    _rng: random.Random  # two that gave way do not return together, nor do both send at one time
     _new_for_s: float  # it gives way until it has been connected for longer than this
     # When the node was first connected, since it last gave way; a gateway always was: its drones
     # look for it as soon as it starts.
@@ -38,6 +39,7 @@ class OwnId:
 
     def __post_init__(self) -> None:
         self._heard_s = -math.inf
+        self._is_off = False
         self._introductions = RateLimit(INTRODUCTIONS, OFF_S)
 
     def connected(self) -> None:
@@ -50,16 +52,23 @@ class OwnId:
         self._heard_s = now_s
         is_new = now_s - self._connected_s <= self._new_for_s
         if is_new and was_heard and self._control.says_connected(kind, payload):
-            self._connected_s = math.inf
+            self._connected_s, self._is_off = math.inf, True
             self._deadlines.set(Due.OWN_ID, now_s + OFF_S * (1.0 + self._rng.random()))
             self._antenna.switch_power(False)
-        elif self._introductions.count(0, now_s):
-            self._control.introduce()
+        elif self._deadlines.at_s[Due.OWN_ID] == math.inf:
+            self.on_due()
 
     @due(Due.OWN_ID)
-    def come_back(self) -> None:
-        self._deadlines.set(Due.OWN_ID, math.inf)
-        self._antenna.switch_power(True)
+    def on_due(self) -> None:
+        """Come back, or introduce itself, a few times in a row."""
+        next_s = math.inf
+        if self._is_off:
+            self._is_off = False
+            self._antenna.switch_power(True)
+        elif self._introductions.count(0, self._deadlines.now_s):
+            self._control.introduce()
+            next_s = self._deadlines.now_s + APART_S * (0.5 + self._rng.random())
+        self._deadlines.set(Due.OWN_ID, next_s)
 
     def is_shared(self) -> bool:
         """Whether the other radio was heard lately. Any thread may ask."""

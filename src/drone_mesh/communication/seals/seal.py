@@ -35,6 +35,7 @@ TAG_AT = PAYLOAD_BYTES - TAG_BYTES
 LAST_COUNT = 2**32 - 1  # the last counter of an epoch: an answer carries 4 bytes
 WAITING_CHALLENGES = 16  # most unanswered challenges
 CHALLENGE_AGAIN_S = 2.0  # least time between two challenges to one node
+OWN_ID_AGAIN_S = 0.5  # the same to another radio with this node's id, which acknowledges none
 CHALLENGE_OUT_S = 0.5  # after this time another challenge may replace it
 LATE_ANSWER_S = 10.0  # on a busy channel an answer waits for seconds in the queue of its sender
 LATE_CHALLENGES = 64  # that are no longer pending and may have such an answer
@@ -188,8 +189,11 @@ class HopSeal:
         while self._challenges and now_s - self._oldest_s() >= CHALLENGE_AGAIN_S:
             self._late.append(self._challenges.popitem(last=False))
         asked = self._asked.setdefault(node, _Asked())
-        if node in self._challenges or now_s < asked.next_s:
+        if now_s < asked.next_s:
             return None
+        pending = self._challenges.pop(node, None)
+        if pending is not None:
+            self._late.append((node, pending))
         doubted = self.knows(node, now_s)
         if doubted and not self._doubted.count(0, now_s):
             return None
@@ -199,7 +203,8 @@ class HopSeal:
             self._late.append(self._challenges.popitem(last=False))
         nonce = self._rng.getrandbits(_NONCE_BITS)
         self._challenges[node] = _Challenge(nonce, now_s, doubted)
-        asked.next_s = now_s + CHALLENGE_AGAIN_S * (2**asked.doubts if doubted else 1)
+        again_s = OWN_ID_AGAIN_S if node == self._node_id else CHALLENGE_AGAIN_S
+        asked.next_s = now_s + again_s * (2**asked.doubts if doubted else 1)
         return self._proven(MessageType.SEAL_CHALLENGE, node, _CHALLENGE.pack(nonce))
 
     @property

@@ -232,8 +232,9 @@ def test_another_radio_with_its_id_is_named_and_shown_that_the_id_is_in_use(rig,
     assert [record.getMessage() for record in caplog.records] == [
         "node 1: another radio uses id 1: give each node its own (1 so far)"
     ]
-    assert [payload[2] for payload in rig.broadcasts()] == [3, 3, 3]
     assert rig.mesh.get_shares_id()
+    rig.wait(3.0)
+    assert [payload[2] for payload in rig.broadcasts()] == [3, 3, 3]
     rig.wait(61.0)
     assert not rig.mesh.get_shares_id()
     assert rig.antenna.switched == []

@@ -151,6 +151,14 @@ def test_a_node_is_not_challenged_again_at_once():
     assert receiver.challenge(5, 2.0) is not None
 
 
+def test_another_radio_with_ones_own_id_is_challenged_again_soon_and_may_answer_late():
+    receiver, other = node(5), node(5, seed=1)
+    first = receiver.challenge(5, 0.0)
+    assert receiver.challenge(5, 0.4) is None
+    assert receiver.challenge(5, 0.5) is not None
+    assert receiver.answered(other.answer(first, 0.6), 0.6) is True
+
+
 @pytest.mark.parametrize(("late_s", "is_believed"), [(9.9, True), (10.1, False)])
 def test_on_a_busy_channel_an_answer_may_come_after_the_next_challenge(late_s, is_believed):
     receiver, sender = node(1), node(5)
