@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """README's commands for a second terminal, exactly as written and in that order."""
 
 from __future__ import annotations
@@ -11,13 +10,13 @@ import threading
 import unittest
 from pathlib import Path
 
-import rospy
-import rostest
-from rostest_support import MeshWatch
+from rostest_support import MeshWatch, call
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from fenced_blocks import ROOT, blocks  # noqa: E402
+
+from drone_mesh.srv import SetSpeed  # noqa: E402
 
 COMMAND_LIMIT_S = 60.0
 CONNECTED_WITHIN_S = 60.0  # simulated
@@ -54,16 +53,13 @@ class DocumentationTest(unittest.TestCase):
             self.assertEqual(process.returncode, 0, f"{command}\n{printed}")
 
     def test_each_command_beside_a_simulation_works(self) -> None:
-        rospy.init_node("test_documentation")
         mesh = MeshWatch(6)
+        mesh.switch(2, True)  # the test before has switched it off
         mesh.wait("not all nodes are connected", CONNECTED_WITHIN_S, mesh.connected)
+        call("/DroneFactory/setSpeed", SetSpeed, False, 1.0)
         tested = [block for block in blocks("bash") if block.test == "simulation"]
         commands = [command for block in tested for command in block.commands()]
         self.assertGreater(len(commands), 5)
         for command in commands:
             if not command.startswith("source "):  # each command has a shell of its own
                 self.run_command(command)
-
-
-if __name__ == "__main__":
-    rostest.rosrun("drone_mesh", "documentation", DocumentationTest)

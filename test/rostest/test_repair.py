@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Drones that are cut off: one of a line flies after the one that died, jammed ones stay.
 
-Before, the demonstration of a repair: at its end the fleet is as it was.
+Before, the demonstration of a repair: at its end the fleet is as it was. Behind, what README shows.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import rospy
 import rostest
 from rostest_support import LogWatch, MeshWatch, StateWatch, in_order
 from std_msgs.msg import Bool
+from test_documentation import DocumentationTest
 
 from drone_mesh.console.controls import OrderRefused
 from drone_mesh.console.demonstration import RepairDemonstration
@@ -121,7 +122,7 @@ class RepairTest(unittest.TestCase):
 
 
 def suite() -> unittest.TestSuite:
-    return in_order(DemonstrationTest, JammerTest, RepairTest)
+    return in_order(DemonstrationTest, JammerTest, RepairTest, DocumentationTest)
 
 
 if __name__ == "__main__":
