@@ -3,10 +3,10 @@
 import contextlib
 import sys
 
-# genpy loads numpy, where there is one, only to name its types in errors about fields: that is most
-# of its time, for which each program and each of its processes would wait.
+# genpy loads numpy, where there is one, only to know its types when it explains what is wrong with
+# a message: 0.08 s of each program's start.
 if "numpy" not in sys.modules:
     sys.modules["numpy"] = None  # type: ignore[assignment]
     with contextlib.suppress(ImportError):  # without ROS some modules serve all the same
-        import genpy.message  # noqa: F401
+        import genpy  # noqa: F401
     del sys.modules["numpy"]
