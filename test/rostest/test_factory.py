@@ -60,8 +60,8 @@ class FactoryTest(unittest.TestCase):
         self.mesh.wait("ticks", 10, lambda: read_s and read_s[-1] > read_s[0] + simulated_s)
         return read_s
 
-    def test_no_process_spends_time_and_memory_on_numpy_which_none_of_them_needs(self) -> None:
-        for node in ("/DroneFactory", "/WirelessSignalSimulator", "/fly_actions"):
+    def test_what_needs_no_numpy_spends_no_time_and_memory_on_it(self) -> None:
+        for node in ("/WirelessSignalSimulator", "/fly_actions"):
             libraries = Path(f"/proc/{pid_of(node)}/maps").read_text("utf-8")
             self.assertIn("python", libraries)
             self.assertNotIn("numpy", libraries, node)

@@ -136,12 +136,8 @@ class NodeTable:
         if source is None or destination is None or not (source.on and destination.on):
             return None
         here, there = self._positions[sender], self._positions[receiver]
-        distance_m2 = sum((a - b) * (a - b) for a, b in zip(here, there))
-        if distance_m2 >= self._reach_m2:
-            return None
-        if sender == receiver or self._sees(here, there):
-            return destination.topic
-        return None
+        is_heard = self._reaches(here, there) and (sender == receiver or self._sees(here, there))
+        return destination.topic if is_heard else None
 
     def in_range(self, node_id: int) -> tuple[int, ...]:
         """Ids of the nodes that a packet from `node_id` can reach, ascending.
@@ -159,8 +155,19 @@ class NodeTable:
             raise AirError(f"node {node_id} is not registered")
         if not node.on:
             return ()
-        others = sorted(other for other in self._nodes if other != node_id)
-        return tuple(other for other in others if self.link(node_id, other) is not None)
+        here, places = self._positions[node_id], self._positions
+        near = [
+            other
+            for other, node in self._nodes.items()
+            if node.on and self._reaches(here, places[other]) and other != node_id
+        ]
+        return tuple(other for other in sorted(near) if self._sees(here, places[other]))
+
+    def _reaches(self, here: Position, there: Position) -> bool:
+        x, y, z = here
+        to_x, to_y, to_z = there
+        apart_m2 = (to_x - x) * (to_x - x) + (to_y - y) * (to_y - y) + (to_z - z) * (to_z - z)
+        return apart_m2 < self._reach_m2
 
     def _sees(self, here: Position, there: Position) -> bool:
         obstacles = self._obstacles

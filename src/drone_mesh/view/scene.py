@@ -162,7 +162,7 @@ def crowding_m(drones: Sequence[DronePicture]) -> float:
 
     Infinite for fewer than two drones. A single close pair hardly affects it.
     """
-    import numpy as np  # in the process of a window or a picture; the world itself does without
+    import numpy as np  # only windows and pictures need it
 
     positions = np.array([drone.position for drone in drones], dtype=float).reshape(-1, 3)
     if len(positions) < 2:

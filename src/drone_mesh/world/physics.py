@@ -1,16 +1,19 @@
-"""The world of a simulation: pybullet's, or one without physics."""
+"""The world that this machine can have: pybullet's, or one without physics."""
 
 from __future__ import annotations
 
 import importlib.util
+import logging
 
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.world.worlds import World
 
+_log = logging.getLogger(__name__)
+
 
 def require_pybullet(purpose: str) -> None:
     """Raise ConfigurationError if pybullet is not installed."""
-    if importlib.util.find_spec("pybullet") is None:
+    if not _is_installed():
         raise ConfigurationError(
             f"{purpose} needs pybullet: pip install --use-pep517 -r requirements/physics.txt "
             "(Python 3.12 and newer: pip builds it from source, some minutes)"
@@ -18,13 +21,19 @@ def require_pybullet(purpose: str) -> None:
 
 
 def open_world(dynamic: bool) -> World:
-    """A BulletWorld if physics is to move the drones (`dynamic`), and otherwise a World.
+    """A BulletWorld. Without pybullet a World without physics, in which a flight looks the same.
 
-    Raises ConfigurationError if the first needs pybullet, which is missing.
+    Raises ConfigurationError if physics is to move the drones (`dynamic`) and pybullet is missing.
     """
-    if not dynamic:
+    if dynamic:
+        require_pybullet("flight dynamic")
+    elif not _is_installed():
+        _log.info("pybullet is not installed: the world is kinematic, and flight dynamic needs it")
         return World()
-    require_pybullet("flight dynamic")
     from drone_mesh.world.bullet_world import BulletWorld
 
     return BulletWorld()
+
+
+def _is_installed() -> bool:
+    return importlib.util.find_spec("pybullet") is not None

@@ -1,4 +1,4 @@
-"""Which world a simulation has: with pybullet, or without."""
+"""Which world a machine can have: with pybullet, and without."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import pytest
 
 from drone_mesh.drone.fleet import plan_fleet
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.world.bullet_world import BulletWorld
 from drone_mesh.world.factory import DroneFactory
 from drone_mesh.world.physics import open_world, require_pybullet
 from drone_mesh.world.worlds import PhysicalWorld
@@ -35,16 +34,13 @@ def flown(world):
         return places
 
 
-def test_a_drone_that_physics_does_not_move_flies_the_same_path_without_pybullet(without_pybullet):
+def test_a_drone_flies_the_same_path_without_pybullet(without_pybullet, monkeypatch):
     without = flown(open_world(dynamic=False))
-    assert flown(BulletWorld()) == without
+    monkeypatch.undo()
+    world = open_world(dynamic=False)
+    assert isinstance(world, PhysicalWorld)
+    assert flown(world) == without
     assert without[-1] == pytest.approx((3.0, 4.0, 2.1))
-
-
-def test_only_for_physics_there_is_a_world_with_it():
-    for dynamic in (True, False):
-        with open_world(dynamic) as world:
-            assert isinstance(world, PhysicalWorld) is dynamic
 
 
 def test_what_needs_physics_says_what_is_missing(without_pybullet):
