@@ -43,6 +43,7 @@ _ADDRESSES = 0x20
 _WRITABLE_BITS = [_WRITABLE.get(address, 0xFF) for address in range(_ADDRESSES)]
 _WRITABLE_WITHOUT_PLUS = list(_WRITABLE_BITS)
 _WRITABLE_WITHOUT_PLUS[Register.RF_SETUP] = 0x1F  # no RF_DR_LOW and no CONT_WAVE
+_OF_THE_AIR = (Register.RF_CH, Register.RF_SETUP, Register.SETUP_RETR)
 _TX_POWERS_DBM = (-18, -12, -6, 0)  # RF_PWR [DS Table 17]
 
 
@@ -87,6 +88,8 @@ class RegisterBank:
             self._derive_open_pipes()
         elif register is Register.RX_ADDR_P0:
             self._derive_pipes()
+        elif register in _OF_THE_AIR:
+            self._derive_air()
         else:
             self._derive()
 
