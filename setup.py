@@ -40,6 +40,7 @@ HOT = {
     " node_search plane queued_delivery",
     "communication/node": "component gateway router snapshots whereabouts",
     "communication/routing": "child_table_tree",
+    "communication/seals": "end_to_end replay seal",
     "communication/wire": "messages",
     "drone": "location",
     "inprocess": "clock drone node radio shared_air shared_antenna",

@@ -15,13 +15,16 @@ from drone_mesh import compiled
 ROOT = Path(__file__).resolve().parents[3]
 DIGEST = """
 import hashlib, itertools
+from drone_mesh.communication.seals.keys import MeshKey
 from drone_mesh.compiled import core
 from drone_mesh.inprocess import Network
 from drone_mesh.mobility import Area, Mobility, tracks_of
 
 print(core())
-for radio, routing in itertools.product(("disc", "shared"), ("beacon", "child_table_tree")):
-    network = Network(seed=7, radio=radio, routing=routing)
+for radio, routing, key in itertools.product(
+    ("disc", "shared"), ("beacon", "child_table_tree"), (None, MeshKey(bytes(16)))
+):
+    network = Network(seed=7, radio=radio, routing=routing, key=key)
     network.add_fleet(1, 24, 5, 6.0)
     network.run_for(20.0)
     places = {node: network.location(node).to_vector() for node in network.nodes}
@@ -29,10 +32,11 @@ for radio, routing in itertools.product(("disc", "shared"), ("beacon", "child_ta
     network.fly(tracks_of(mobility, places, {0}, Area(0.0, 0.0, 40.0, 40.0), seed=7))
     network.run_for(20.0)
     network.power(7, False)
+    network.send(5, 20, b"hello")
     network.run_for(40.0)
     paths = [network.path_to_gateway(node) for node in network.nodes]
     seen = (network.events, network.air.delivered, paths, network.status())
-    print(radio, routing, hashlib.sha256(repr(seen).encode()).hexdigest())
+    print(radio, routing, bool(key), hashlib.sha256(repr(seen).encode()).hexdigest())
 """
 
 METRICS = """
@@ -62,7 +66,7 @@ def test_seeded_meshes_do_the_same_in_both_cores() -> None:
     python, built = (start(core, ROOT / "src", "-c", DIGEST).stdout.splitlines() for core in cores)
     assert python[0].startswith("Python")
     assert built == ["compiled", *python[1:]]
-    assert len(built) == 5
+    assert len(built) == 9
 
 
 @pytest.mark.slow
