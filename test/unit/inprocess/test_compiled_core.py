@@ -26,14 +26,14 @@ for radio, routing, key in itertools.product(
 ):
     network = Network(seed=7, radio=radio, routing=routing, key=key)
     network.add_fleet(1, 24, 5, 6.0)
-    network.run_for(20.0)
+    network.run_for(10.0)
     places = {node: network.location(node).to_vector() for node in network.nodes}
     mobility = Mobility("random_waypoint", speed_m_s=(1.0, 3.0))
     network.fly(tracks_of(mobility, places, {0}, Area(0.0, 0.0, 40.0, 40.0), seed=7))
-    network.run_for(20.0)
+    network.run_for(10.0)
     network.power(7, False)
     network.send(5, 20, b"hello")
-    network.run_for(40.0)
+    network.run_for(25.0)
     paths = [network.path_to_gateway(node) for node in network.nodes]
     seen = (network.events, network.air.delivered, paths, network.status())
     print(radio, routing, bool(key), hashlib.sha256(repr(seen).encode()).hexdigest())
