@@ -37,7 +37,7 @@ from drone_mesh.msg import (
     Location,
     MeshState,
 )
-from drone_mesh.srv import OrderFormation, OrderLayout, WithdrawLayout
+from drone_mesh.srv import OrderFormation, OrderLayout, SetSpeed, WithdrawLayout
 
 DRAWN = (
     ("drone 1", [5.1213562, 52.0907270]),  # x -3, y 3
@@ -128,7 +128,9 @@ class StandingLayoutsTest(unittest.TestCase):
 
     def test_5_the_commands_show_progress_and_withdraw_on_ctrl_c(self) -> None:
         self.mesh.wait("1 and 2 connected", 60, lambda: self.mesh.connected((1, 2)))
-        flight = run_program("fly", "1", "-1.5", "2", "0")
+        self.assertTrue(call("/DroneFactory/setSpeed", SetSpeed, False, 1.0).success)
+        flight = run_program("fly", "1", "-1.5", "2", "0")  # it shows some of the states that come
+        self.assertTrue(call("/DroneFactory/setSpeed", SetSpeed, False, 5.0).success)
         self.assertEqual(flight.returncode, 0, flight.stdout + flight.stderr)
         self.assertRegex(flight.stdout, r"under way, \d+ m and \d+ s left\n(.*\n)*arrived\n")
         done = run_program("layout", "1")
