@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import re
 import unittest
+from unittest.mock import patch
 
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
+from rospy.impl.registration import RegManager
 from rostest_support import WALL_LIMIT_S, LogWatch, call, wait_for
+from std_msgs.msg import Float32
 
 from drone_mesh.msg import MeshEvent, MeshState
 from drone_mesh.srv import PowerSwitch, RequestDroneFlight, SetSpeed
@@ -39,6 +42,12 @@ class MeshStateTest(unittest.TestCase):
 
     def levels(self) -> dict[str, int]:
         return {s.name: s.level for s in self.diagnostics.status} if self.diagnostics else {}
+
+    def test_0_the_master_watch_connects_a_subscription_whose_publisher_rospy_missed(self) -> None:
+        with patch.object(RegManager, "publisher_update"):
+            topic = rospy.Subscriber("/DroneFactory/real_time_factor", Float32)
+        self.addCleanup(topic.unregister)
+        wait_for("its publisher", WALL_LIMIT_S, lambda: topic.get_num_connections() > 0)
 
     def test_1_a_state_has_what_the_nodes_know_and_their_positions(self) -> None:
         wait_for("all connected", WALL_LIMIT_S, lambda: self.hops() == [0, 1, 1, 2])

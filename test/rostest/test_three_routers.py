@@ -12,6 +12,8 @@ from test_document import DocumentTest
 from test_mesh_state import MeshStateTest
 from test_tools import ToolsTest
 
+from drone_mesh.ros.graph.master import MasterWatch
+
 
 class BackAtTheStart(unittest.TestCase):
     def test_the_drones_fly_back_to_where_they_started(self) -> None:
@@ -25,4 +27,5 @@ def suite() -> unittest.TestSuite:
 if __name__ == "__main__":
     rospy.init_node("test_three_routers")
     rest_between_ticks()
+    MasterWatch().start()  # the world registers its topics at this moment
     rostest.rosrun("drone_mesh", "three_routers", "__main__.suite")

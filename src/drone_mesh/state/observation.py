@@ -193,8 +193,8 @@ def describe_component(
     status.emergency_in = repair.emergency_s - now_s if waits else math.inf
     heard_s = component.get_neighbours()
     status.neighbours = bytes(sorted(heard_s))
-    ages_s = [int(now_s - heard_s[neighbour]) for neighbour in status.neighbours]
-    status.neighbour_ages = bytes([max(0, min(age_s, OLDEST_AGE_S)) for age_s in ages_s])
+    ages_s = (now_s - heard_s[neighbour] for neighbour in status.neighbours)
+    status.neighbour_ages = bytes([int(max(0.0, min(age_s, OLDEST_AGE_S))) for age_s in ages_s])
 
 
 def describe_drone(

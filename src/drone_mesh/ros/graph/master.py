@@ -75,6 +75,10 @@ class MasterWatch(Periodic):
     parameters cannot be looked up. The watch registers all topics and services of this process
     again. It restores the public parameters that it was given, and the private ones as they were at
     its start: a parameter that changes must not be private.
+
+    It also asks once more for the publishers of each topic that it finds without a connection.
+    rospy never connects to one that registers while a subscription is under way: it takes the
+    master's answer, which is older, for the news, if that comes later.
     """
 
     def __init__(self, *parameters: str) -> None:
@@ -83,6 +87,7 @@ class MasterWatch(Periodic):
         self._master = rosgraph.Master(rospy.get_name())
         self._names = [rospy.resolve_name(name) for name in (rospy.get_name(), *parameters)]
         self._values: dict[str, Any] = {}  # replaced as a whole
+        self._asked: set[str] = set()  # topics; the watch's own thread
 
     def start(self) -> None:
         """Store the parameters and start polling; the thread ends when the node shuts down."""
@@ -98,11 +103,21 @@ class MasterWatch(Periodic):
     def _work(self) -> None:
         try:
             self._master.lookupNode(rospy.get_name())
+            self._ask_again()
         except rosgraph.MasterException:  # a new master, which does not know this node
             if not (self._stopped.is_set() or rospy.is_shutdown()):
                 self._register_again()
         except NO_ANSWER as error:
             _log.debug("the master does not answer: %s", error)
+
+    def _ask_again(self) -> None:
+        topics = get_topic_manager()
+        subscribed = dict(topics.get_subscriptions())
+        for name in subscribed.keys() - self._asked:
+            subscriber = topics.get_subscriber_impl(name)
+            if subscriber is not None and not subscriber.has_connections():
+                get_registration_listeners().notify_added(name, subscribed[name], Registration.SUB)
+        self._asked = set(subscribed)
 
     def _register_again(self) -> None:
         listeners = get_registration_listeners()
