@@ -49,8 +49,8 @@ class FactoryTest(unittest.TestCase):
             self.assertTrue(call("/DroneFactory/setSpeed", SetSpeed, False, factor).success)
             read_s = self.read_for(2.0)
             steps_s = sorted(after - before for before, after in zip(read_s, read_s[1:]))
-            typical_s = steps_s[len(steps_s) // 2]
-            self.assertTrue(0.015 < typical_s < CLOCKS_DIFFER_S, (factor, typical_s))
+            self.assertGreater(sum(steps_s) / len(steps_s), 0.03, (factor, steps_s))
+            self.assertLess(steps_s[len(steps_s) // 2], CLOCKS_DIFFER_S, (factor, steps_s))
 
     def read_for(self, simulated_s: float) -> list[float]:
         """The ticks that rospy reads in this time."""

@@ -23,7 +23,7 @@ from drone_mesh.ros.views.console_controls import RosControls
 from drone_mesh.srv import OrderFormation, SetSpeed
 
 POSTS = {3: (3.0, 3.0, 3), 4: (3.0, 7.0, 3)}  # x, y, z
-POSTS_KEPT_S = 135.0  # simulated; a battery lasts for 120 s, and for 94 s until a relief is due
+POSTS_KEPT_S = 180.0  # simulated; a battery lasts for 120 s, and for 94 s until a relief is due
 FACTOR = 4.0  # of the launch file
 HOLDS_M = 2.2  # of the place or the one beside it
 

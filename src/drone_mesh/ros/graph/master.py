@@ -116,7 +116,12 @@ class MasterWatch(Periodic):
         for name in subscribed.keys() - self._asked:
             subscriber = topics.get_subscriber_impl(name)
             if subscriber is not None and not subscriber.has_connections():
-                get_registration_listeners().notify_added(name, subscribed[name], Registration.SUB)
+                # Not by rospy, which waits for a master that has died: the new one would know this
+                # node by one topic, and so the others would not be registered again.
+                uri = rospy.get_node_uri()
+                publishers = self._master.registerSubscriber(name, subscribed[name], uri)
+                node = bounded_proxy(uri, ANSWER_TIMEOUT_S)
+                node.publisherUpdate(rospy.get_name(), name, publishers)
         self._asked = set(subscribed)
 
     def _register_again(self) -> None:
